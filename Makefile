@@ -1,0 +1,41 @@
+# make demo   the sample kitchen through every stage, its certified bundle, and the app opened on it
+# make test   everything CI runs
+# make env | check | bench beside them
+SHELL := /bin/bash
+PYTHON ?= python3
+DATA ?= .demo
+PORT ?= 8000
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: demo test env check bench libs clean
+
+demo: env
+	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
+
+test: env check
+	"$(BIN)/python" scripts/run_tests.py
+
+env: libs $(STAMP)
+
+libs:
+	@bash scripts/system-libraries.sh
+
+$(STAMP): pyproject.toml constraints.txt
+	bash scripts/make-venv.sh "$(PYTHON)" "$(VENV)"
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
+	touch "$(STAMP)"
+
+check: env
+	"$(BIN)/ruff" format --check .
+	"$(BIN)/ruff" check .
+	"$(BIN)/mypy"
+	"$(BIN)/lint-imports"
+	bash scripts/check-static.sh
+
+bench: env
+	"$(BIN)/python" benchmarks/run.py $(BENCH)
+
+clean:
+	rm -rf "$(VENV)" "$(DATA)" build dist

@@ -1,0 +1,110 @@
+"""Archives that people send: looked at before anything in them is believed, unpacked only inside their folder."""
+
+import shutil
+import stat
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from r2c2r_core.errors import CaptureError
+
+MAX_DIRECTORY_BYTES = 64 * 1024 * 1024  # of the archive's own table of contents
+MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth do not compress like this
+MIN_SUSPICIOUS = 64 * 1024 * 1024  # bytes unpacked below which no ratio is suspicious
+
+
+def check_archive(path: Path, *, max_bytes: int, max_files: int) -> None:
+    """Raise CaptureError, in one line, unless the file is a complete zip that is safe to read."""
+    with path.open("rb") as handle:
+        if handle.read(4) != b"PK\x03\x04":
+            raise CaptureError(
+                f"{path.name} is not a zip or an .r3d", hint="send an .r3d from Record3D, or a zip of a recording's folder"
+            )
+    _refuse_large_directory(path, max_files)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError, OverflowError) as error:
+        raise CaptureError(f"{path.name} is damaged or cut short ({error})", hint="copy it from the phone again") from error
+    _refuse_unsafe(members, path.stat().st_size, max_bytes, max_files)
+
+
+def is_r3d(path: Path) -> bool:
+    """Whether the archive is a Record3D recording, which the core reads as it is."""
+    with zipfile.ZipFile(path) as archive:
+        return "metadata" in archive.namelist()
+
+
+def unpack(path: Path, folder: Path, *, max_bytes: int, max_files: int) -> Path:
+    """Unpack a checked archive; the folder that holds the recording, without lone outer folders."""
+    check_archive(path, max_bytes=max_bytes, max_files=max_files)
+    shutil.rmtree(folder, ignore_errors=True)
+    left = max_bytes
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for member in archive.infolist():
+                if not member.is_dir():
+                    left = _unpack_member(archive, member, folder, left)
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise CaptureError(f"the archive is damaged ({error})", hint="pack it again") from error
+    inner = folder
+    while len(entries := list(inner.iterdir())) == 1 and entries[0].is_dir():
+        inner = entries[0]
+    return inner
+
+
+def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, left: int) -> int:
+    target = folder.joinpath(*PurePosixPath(member.filename).parts)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with archive.open(member) as source, target.open("wb") as out:
+        while chunk := source.read(1 << 20):
+            left -= len(chunk)
+            if left < 0:  # its header lied
+                raise ValueError("more bytes than it declares")
+            out.write(chunk)
+    return left
+
+
+def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, max_files: int) -> None:
+    if not members:
+        raise CaptureError("the archive is empty", hint="pack the recording's folder")
+    if len(members) > max_files:
+        raise CaptureError(
+            f"the archive holds {len(members)} files, at most {max_files} expected", hint="pack one recording only"
+        )
+    total = sum(member.file_size for member in members)
+    if total > max_bytes:
+        raise CaptureError(
+            f"the archive unpacks to {total / 1e9:.1f} GB, at most {max_bytes / 1e9:.1f} GB allowed", hint="cut the recording"
+        )
+    if total > MIN_SUSPICIOUS and total > MAX_RATIO * packed:
+        raise CaptureError(
+            f"the archive unpacks to {total / max(packed, 1):.0f} times its size", hint="this is not a recording"
+        )
+    for member in members:
+        name = member.filename
+        parts = PurePosixPath(name.replace("\\", "/")).parts
+        if name.startswith(("/", "\\")) or ".." in parts or (parts and ":" in parts[0]) or "\x00" in name:
+            raise CaptureError(f"the archive holds the path {name[:80]!r}", hint="pack the folder with relative paths")
+        kind = stat.S_IFMT(member.external_attr >> 16)
+        if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+            raise CaptureError(f"the archive holds a link or a device ({name[:80]!r})", hint="pack plain files only")
+        if member.flag_bits & 0x1:
+            raise CaptureError("the archive is encrypted", hint="pack it without a password")
+
+
+def _refuse_large_directory(path: Path, max_files: int) -> None:
+    """Look at the end record by hand: parsing a hostile table of contents costs memory before it can be refused."""
+    size = path.stat().st_size
+    with path.open("rb") as handle:
+        handle.seek(max(size - 66_000, 0))
+        tail = handle.read()
+    at = tail.rfind(b"PK\x05\x06")
+    if at < 0 or len(tail) - at < 22:
+        raise CaptureError("the archive is cut short: its table of contents is missing", hint="copy it from the phone again")
+    directory_bytes = int.from_bytes(tail[at + 12 : at + 16], "little")
+    if directory_bytes == 0xFFFFFFFF:  # zip64: the true size is in the record before
+        record = tail.rfind(b"PK\x06\x06", 0, at)
+        directory_bytes = int.from_bytes(tail[record + 40 : record + 48], "little") if record >= 0 else 0
+    if directory_bytes > min(MAX_DIRECTORY_BYTES, max_files * 400):
+        raise CaptureError("the archive's table of contents is implausibly large", hint="pack one recording only")

@@ -1,0 +1,44 @@
+"""The clicks and corrections of a project as the files the core reads, and a key that changes when they do."""
+
+from typing import Any
+
+from sqlmodel import Session
+
+from app.db import history
+from app.db.queries import live_objects, points_of
+from r2c2r_core.workspace import content_key
+
+
+def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
+    """prompts.json of the project as it is now; objects without a click on them are left out."""
+    objects = []
+    for item in live_objects(session, project_id):
+        points = points_of(session, item.id)
+        if any(p.label == 1 for p in points):
+            clicks = [{"frame": p.frame, "x": p.x, "y": p.y, "label": p.label} for p in points]
+            objects.append({"name": item.name, "category": item.category, "points": clicks})
+    return {"version": 1, "objects": objects}
+
+
+def overrides_document(session: Session, project_id: str) -> dict[str, Any]:
+    """overrides.json of the project as it is now."""
+    entries = {}
+    for item in live_objects(session, project_id):
+        data = overrides_entry(history.override_data(session, item))
+        if data:
+            entries[item.name] = data
+    return {"version": 1, "objects": entries}
+
+
+def overrides_entry(stored: dict[str, Any]) -> dict[str, Any]:
+    """One object of overrides.json, from what is stored about it."""
+    data = {key: value for key, value in stored.items() if value not in (None, [])}
+    lower, upper = data.pop("joint_lower", None), data.pop("joint_upper", None)
+    if upper is not None:
+        data["joint_limits"] = [lower if lower is not None else 0.0, upper]
+    return data
+
+
+def inputs_key(session: Session, project_id: str) -> str:
+    """Key of everything a person gave: a result is current while its key is this one."""
+    return content_key(prompts_document(session, project_id), overrides_document(session, project_id))

@@ -1,0 +1,165 @@
+"""The only table definitions. A change here needs a migration in alembic/versions; a test compares the two.
+
+Times are seconds since 1970, UTC. Nothing but jobs' progress is ever updated without an event beside it.
+"""
+
+from typing import Any
+
+from sqlalchemy import JSON, Column, Index, UniqueConstraint
+from sqlmodel import Field, SQLModel
+
+
+class Project(SQLModel, table=True):
+    """One recording and what became of it."""
+
+    __tablename__ = "projects"
+
+    id: str = Field(primary_key=True)  # random, never used twice: media are cached for ever under it
+    name: str
+    status: str  # importing | failed | ready
+    created: float
+    updated: float
+    source_name: str
+    source_path: str | None = None  # absolute; the upload, or a recording on this machine
+    work_path: str | None = None  # absolute; set when the workspace is not in the project's folder
+    media_version: str = ""  # changes when the recording is read anew
+    capture: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
+    notices: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
+    error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+
+
+class SceneObject(SQLModel, table=True):
+    """One object a person named."""
+
+    __tablename__ = "objects"
+    __table_args__ = (Index("ix_objects_project", "project_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    name: str
+    category: str
+    colour: int  # index into the palette
+    version: int = 1  # grows with every change
+    deleted: bool = False
+
+
+class Point(SQLModel, table=True):
+    """One click, in pixels of the stored RGB frame."""
+
+    __tablename__ = "prompt_points"
+    __table_args__ = (Index("ix_prompt_points_object", "object_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    object_id: int = Field(foreign_key="objects.id", ondelete="CASCADE")
+    frame: int
+    x: float
+    y: float
+    label: int  # 1 on the object, 0 off it
+
+
+class Override(SQLModel, table=True):
+    """What a person corrected about one object; object_id None is the scene."""
+
+    __tablename__ = "overrides"
+    __table_args__ = (UniqueConstraint("project_id", "object_id", name="uq_overrides_object"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    object_id: int | None = Field(default=None, foreign_key="objects.id", ondelete="CASCADE")
+    data: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
+
+
+class Verdict(SQLModel, table=True):
+    """What a reviewer said about one candidate."""
+
+    __tablename__ = "verdicts"
+    __table_args__ = (UniqueConstraint("object_id", "candidate", name="uq_verdicts_candidate"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    object_id: int = Field(foreign_key="objects.id", ondelete="CASCADE")
+    candidate: str
+    verdict: str  # accepted | rejected
+    reason: str = ""
+    who: str
+    at: float
+
+
+class Event(SQLModel, table=True):
+    """Who changed what, when, from what to what. Append-only: undo and redo are events too."""
+
+    __tablename__ = "events"
+    __table_args__ = (Index("ix_events_object", "project_id", "object_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    object_id: int | None = None
+    scope: str  # prompts | review | project
+    action: str  # add point, rename … | undo | redo
+    text: str  # one line for a person
+    frame: int | None = None
+    who: str
+    at: float
+    before: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    after: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    target: int | None = None  # the event an undo or redo is about
+
+
+class Job(SQLModel, table=True):
+    """One piece of heavy work."""
+
+    __tablename__ = "jobs"
+    __table_args__ = (Index("ix_jobs_state", "state"), Index("ix_jobs_project", "project_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    kind: str  # import | sample | run
+    state: str  # queued | running | cancelling | cancelled | failed | done
+    payload: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
+    stage: str = ""
+    stage_fraction: float = 0.0
+    progress: float = 0.0
+    eta_s: float | None = None
+    message: str = ""
+    error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    log_path: str | None = None
+    attempts: int = 0
+    who: str = ""
+    owner_pid: int | None = None  # the server that runs it
+    worker_pid: int | None = None
+    worker_started: float | None = None  # the worker's creation time: its pid alone may be another's by now
+    heartbeat: float | None = None
+    created: float
+    started: float | None = None
+    finished: float | None = None
+
+
+class JobEvent(SQLModel, table=True):
+    """One line of a job's history."""
+
+    __tablename__ = "job_events"
+    __table_args__ = (Index("ix_job_events_job", "job_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    job_id: int = Field(foreign_key="jobs.id", ondelete="CASCADE")
+    at: float
+    kind: str  # state | stage | progress | error
+    stage: str = ""
+    fraction: float = 0.0
+    text: str = ""
+
+
+class Bundle(SQLModel, table=True):
+    """One finished bundle."""
+
+    __tablename__ = "bundles"
+    __table_args__ = (UniqueConstraint("project_id", "version", name="uq_bundles_version"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    version: int
+    path: str  # file name in the project's bundles folder
+    sha256: str
+    size: int
+    created: float
+    certificate: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/documents.py: inputs_key

@@ -1,0 +1,99 @@
+"""Every failure of the web app, and the one place where a failure becomes {kind, message, hint} and a status.
+
+R2C2RError (r2c2r_core.errors)
+├── AppError
+│   ├── NotFound            404
+│   ├── Conflict            409   someone else changed it; `current` is what is stored now
+│   ├── Unauthorised        401
+│   ├── Forbidden           403
+│   ├── TooLarge            413
+│   ├── NotReady            409   the thing asked for is not made yet
+│   └── Unavailable         503   a helper process is down
+└── the core's own errors   422 what was given, 507/503 the machine, 500 the work
+"""
+
+from typing import Any
+
+from r2c2r_core import errors as core
+
+
+class AppError(core.R2C2RError):
+    """A request that cannot be served."""
+
+
+class NotFound(AppError):
+    """No such thing."""
+
+
+class Conflict(AppError):
+    """It changed meanwhile; `current` is what is stored now."""
+
+    def __init__(self, message: str, *, hint: str = "", current: Any = None) -> None:
+        super().__init__(message, hint=hint)
+        self.current = current
+
+
+class Unauthorised(AppError):
+    """No session."""
+
+
+class Forbidden(AppError):
+    """Not allowed from here."""
+
+
+class TooLarge(AppError):
+    """More bytes than the limit."""
+
+
+class NotReady(AppError):
+    """The thing asked for is not made yet."""
+
+
+class Unavailable(AppError):
+    """A helper process is down."""
+
+
+class NoSpace(core.EnvironmentProblem):
+    """The disk is too full to start."""
+
+
+KINDS: tuple[tuple[type[core.R2C2RError], str, int], ...] = (
+    # the narrowest class first
+    (NotFound, "not-found", 404),
+    (Conflict, "conflict", 409),
+    (NotReady, "not-ready", 409),
+    (Unauthorised, "unauthorised", 401),
+    (Forbidden, "forbidden", 403),
+    (TooLarge, "too-large", 413),
+    (Unavailable, "unavailable", 503),
+    (NoSpace, "no-space", 507),
+    (core.CaptureError, "capture", 422),
+    (core.PromptError, "prompt", 422),
+    (core.OverrideError, "override", 422),
+    (core.BundleError, "bundle", 422),
+    (core.InputError, "input", 422),
+    (core.ObjectNotSeen, "object-not-seen", 422),
+    (core.GenerationFailed, "generation-failed", 500),
+    (core.PlacementFailed, "placement-failed", 500),
+    (core.ExportFailed, "export-failed", 500),
+    (core.StageError, "stage", 500),
+    (core.BackendUnavailable, "backend-unavailable", 503),
+    (core.EnvironmentProblem, "environment", 503),
+    (core.Cancelled, "cancelled", 409),
+    (core.R2C2RError, "error", 500),
+)
+
+
+def kind_of(error: core.R2C2RError) -> tuple[str, int]:
+    """The error's kind for a program, and its HTTP status."""
+    return next((kind, status) for cls, kind, status in KINDS if isinstance(error, cls))
+
+
+def body(kind: str, message: str, hint: str = "", current: Any = None) -> dict[str, Any]:
+    """The one shape of an error."""
+    return {"kind": kind, "message": message, "hint": hint, "current": current}
+
+
+def error_body(error: core.R2C2RError) -> dict[str, Any]:
+    """The error as the API says it."""
+    return body(kind_of(error)[0], error.message, error.hint, getattr(error, "current", None))

@@ -1,0 +1,119 @@
+"""Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR`.
+
+A zipped folder is unpacked first. Beside the workspace it writes what the web process needs at hand without loading the
+recording: frames.json (the frame table) and facts.json (what the recording is, and its problems).
+"""
+
+import argparse
+import json
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app import archives
+from app.jobs.messages import run_stage
+from app.settings import Settings
+from r2c2r_core.errors import PromptError
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.progress import Progress
+from r2c2r_core.workspace import Workspace, write_atomically
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Read, describe."""
+    parser = argparse.ArgumentParser(prog="app.jobs.ingest", description=__doc__)
+    parser.add_argument("workdir", type=Path)
+    parser.add_argument("folder", type=Path)
+    options = parser.parse_args(arguments)
+    return run_stage("ingest", lambda progress: ingest(options.workdir, options.folder, progress))
+
+
+def ingest(workdir: Path, folder: Path, progress: Progress) -> None:
+    """Read the recording that WORKDIR/request.json names, and describe it in the project's folder."""
+    from r2c2r_core.pipeline import reconstruct
+    from r2c2r_core.worker import read_request
+
+    request_path = workdir / "request.json"
+    document = json.loads(request_path.read_text())
+    source = _plain_source(Path(document["source"]), folder, progress)
+    write_atomically(request_path, json.dumps({**document, "source": str(source)}, indent=1).encode())
+    work = Workspace(workdir)
+    with suppress(PromptError):  # nobody has clicked yet; the recording is read before that is noticed
+        reconstruct(read_request(workdir), work, until="ingest", progress=progress)
+    capture: Capture | None = work.load_latest("ingest", "scene")
+    if capture is None:
+        raise PromptError("the recording was not read", hint="see the job's log")
+    describe(capture, folder, source)
+
+
+def describe(capture: Capture, folder: Path, source: Path | None) -> None:
+    """Write frames.json and facts.json."""
+    write_atomically(folder / "frames.json", json.dumps(frame_table(capture)).encode())
+    facts = {"facts": capture_facts(capture), "notices": list(capture.notices), "source": str(source) if source else None}
+    write_atomically(folder / "facts.json", json.dumps(facts, indent=1).encode())
+
+
+def frame_table(capture: Capture) -> list[dict[str, Any]]:
+    """schemas.FrameInfo of every frame."""
+    return [
+        {
+            "index": frame.index,
+            "timestamp_s": frame.timestamp_s,
+            "width": frame.rgb_camera.width,
+            "height": frame.rgb_camera.height,
+            "sharpness": round(float(frame.sharpness), 3),
+            "camera": [round(float(value), 4) for value in frame.world_from_camera.translation],
+        }
+        for frame in capture.frames
+    ]
+
+
+def capture_facts(capture: Capture) -> dict[str, Any]:
+    """schemas.CaptureFacts."""
+    first = capture.frames[0]
+    path = np.array([frame.world_from_camera.translation for frame in capture.frames])
+    stamps = [frame.timestamp_s for frame in capture.frames if frame.timestamp_s is not None]
+    verdict, reasons = _examined(capture)
+    return {
+        "format": capture.format,
+        "sha256": capture.sha256,
+        "frame_count": len(capture.frames),
+        "width": first.rgb_camera.width,
+        "height": first.rgb_camera.height,
+        "depth_width": first.depth_camera.width,
+        "depth_height": first.depth_camera.height,
+        "duration_s": round(stamps[-1] - stamps[0], 3) if len(stamps) > 1 else None,
+        "path_length_m": round(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), 3),
+        "up_source": capture.room.up_source,
+        "floor_found": capture.room.floor_found,
+        "verdict": verdict,
+        "reasons": reasons,
+    }
+
+
+def _examined(capture: Capture) -> tuple[str, list[str]]:
+    from r2c2r_core.ingest.doctor import examine
+
+    report = examine(capture)
+    return report.verdict, list(report.reasons)
+
+
+def _plain_source(source: Path, folder: Path, progress: Progress) -> Path:
+    """The recording as the core reads it: a zipped folder is unpacked, anything else stays as it is."""
+    if not source.is_file():
+        return source
+    limits = Settings(data_dir=folder)
+    if source.suffix.lower() in (".zip", ".r3d"):
+        archives.check_archive(source, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)
+        if source.suffix.lower() == ".zip" and not archives.is_r3d(source):
+            progress.at(0.0, "unpacking")
+            unpacked = folder / "unpacked"
+            return archives.unpack(source, unpacked, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)
+    return source
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,136 @@
+"""What a finished or failed job leaves in the database."""
+
+import hashlib
+import json
+import os
+import shutil
+import time
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import func
+from sqlmodel import Session, select
+
+from app.db import history
+from app.db.queries import live_objects, newest_bundle
+from app.db.tables import Bundle, Job, Point, Project, SceneObject
+from app.files import ProjectFiles
+from app.jobs.runner import Finisher
+from r2c2r_core.errors import ExportFailed
+from r2c2r_core.segment.prompts import parse_prompts
+
+
+def import_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+    """The project shows its recording."""
+    adopt_capture(project, files)
+    session.add(project)
+
+
+def sample_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+    """The project shows its recording, and the sample's clicks are in it."""
+    adopt_capture(project, files)
+    session.add(project)
+    if not live_objects(session, project.id):
+        adopt_prompts(session, project, json.loads((files.source / "prompts.json").read_text()), job.who)
+
+
+def run_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+    """The bundle becomes a version, unless it is the same as the newest one."""
+    adopt_bundle(session, project, files, job.payload.get("inputs", ""))
+    shutil.copyfile(files.work / "prompts.json", files.finished_prompts)
+
+
+def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+    """An import that did not come to its end leaves the project failed, with the reason."""
+    project.updated = time.time()
+    if job.kind in ("import", "sample"):
+        project.status = "failed"
+        cancelled = {"kind": "cancelled", "message": "the import was cancelled", "hint": "retry it, or delete the project"}
+        project.error = job.error or cancelled
+    session.add(project)
+
+
+FINISHERS: dict[str, Finisher] = {"import": import_done, "sample": sample_done, "run": run_done}
+
+
+def adopt_capture(project: Project, files: ProjectFiles) -> None:
+    """Take over facts.json, which the ingest process wrote."""
+    found: dict[str, Any] = json.loads((files.root / "facts.json").read_text())
+    project.capture, project.notices = found["facts"], found["notices"]
+    project.source_path = found["source"] or project.source_path
+    project.status, project.error, project.updated = "ready", None, time.time()
+    project.media_version = f"{found['facts']['sha256'][:8]}{int(project.updated):x}"
+    shutil.rmtree(files.previews, ignore_errors=True)
+
+
+def adopt_prompts(session: Session, project: Project, document: dict[str, Any], who: str) -> list[SceneObject]:
+    """Add the objects of a prompts.json; one whose name is taken gets the file's clicks and category."""
+    known = {item.name: item for item in live_objects(session, project.id)}
+    colours = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
+    items = []
+    for prompt in parse_prompts(document).objects:
+        item = known.get(prompt.name)
+        if item is None:
+            item = SceneObject(project_id=project.id, name=prompt.name, category=prompt.category, colour=colours, deleted=True)
+            session.add(item)
+            session.flush()
+            colours += 1
+        with history.change(session, item, "prompts", "import", f"imported {prompt.name}", who=who):
+            item.deleted, item.category = False, prompt.category
+            session.add(item)
+            for old in session.exec(select(Point).where(Point.object_id == item.id)):
+                session.delete(old)
+            session.flush()
+            session.add_all(Point(object_id=item.id or 0, frame=p.frame, x=p.x, y=p.y, label=p.label) for p in prompt.points)
+        items.append(item)
+    return items
+
+
+def adopt_bundle(session: Session, project: Project, files: ProjectFiles, inputs: str) -> Bundle:
+    """Keep a copy of the workspace's bundle as the next version."""
+    made = files.work / "bundle.zip"
+    if not made.is_file():
+        raise ExportFailed("the run ended without a bundle", hint="see the job's log")
+    digest = _sha256(made)
+    newest = newest_bundle(session, project.id)
+    if newest is not None and newest.sha256 == digest:
+        newest.inputs = inputs
+        session.add(newest)
+        return newest
+    version = newest.version + 1 if newest else 1
+    files.bundles.mkdir(parents=True, exist_ok=True)
+    kept = files.bundles / f"v{version}.zip"
+    temporary = kept.with_suffix(".part")
+    shutil.copyfile(made, temporary)
+    os.replace(temporary, kept)
+    bundle = Bundle(
+        project_id=project.id, version=version, path=kept.name, sha256=digest, size=kept.stat().st_size, created=time.time()
+    )
+    bundle.certificate, bundle.inputs = _certificate(kept, files.work), inputs
+    project.updated = time.time()
+    session.add(bundle)
+    session.add(project)
+    return bundle
+
+
+def _certificate(bundle: Path, work: Path) -> dict[str, Any] | None:
+    """The certificate as JSON: the stored noun, else what the bundle's report says."""
+    from app.jobs.plain import plain
+    from r2c2r_core.workspace import Workspace
+
+    noun = Workspace(work).load_latest("export", "scene")
+    if noun is not None:
+        found: dict[str, Any] = plain(noun)
+        return found
+    try:
+        with zipfile.ZipFile(bundle) as archive:
+            report: dict[str, Any] = json.loads(archive.read("report.json"))
+            return report.get("certificate", report)
+    except (KeyError, ValueError, OSError, zipfile.BadZipFile):
+        return None
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()

@@ -1,0 +1,168 @@
+"""The web app, put together. Importing this module creates nothing."""
+
+import asyncio
+import errno
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import anyio
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from app import errors, schemas
+from app.db.engine import open_engine
+from app.hub import Hub
+from app.jobs.live import LiveSegmenters
+from app.jobs.outcomes import FINISHERS, job_ended
+from app.jobs.plans import Commands
+from app.jobs.runner import Runner
+from app.routes import jobs, live, media, pages, projects, prompts, reviews, scenes, system, viewer
+from app.security import Guard, Keys
+from app.services.context import Context
+from app.services.prompts import tell_object
+from app.settings import Settings, shipped
+from app.viewer.client import Viewer
+from r2c2r_core.errors import R2C2RError
+
+_log = logging.getLogger(__name__)
+
+TIDY_S = 30.0
+ROUTERS = (system, projects, prompts, jobs, reviews, scenes, media, viewer, live, pages)
+STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
+
+
+def create_app(settings: Settings, *, commands: Commands | None = None, viewer_client: Viewer | None = None) -> FastAPI:
+    """The app; `commands` and `viewer_client` are other processes in the place of the real ones, for tests."""
+    static = shipped("static", "index.html")
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        context = await anyio.to_thread.run_sync(_open, settings, commands or Commands(), viewer_client)
+        app.state.context = context
+        tidying = asyncio.create_task(_tidy(context))
+        try:
+            yield
+        finally:
+            tidying.cancel()
+            await anyio.to_thread.run_sync(_close, context)
+
+    app = FastAPI(
+        title="r2c2r",
+        version="1",
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        responses={code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422)},
+    )
+    for module in ROUTERS:
+        app.include_router(module.router)
+    app.mount("/static", RevalidatedFiles(directory=static), name="static")
+    _add_error_handlers(app)
+    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    app.add_middleware(Guard, keys=Keys(settings.data_dir), allowed_hosts=settings.allowed_hosts)
+    return app
+
+
+class RevalidatedFiles(StaticFiles):
+    """Static files that a browser asks about each time, so that an update is seen at once."""
+
+    def file_response(self, *arguments: object, **options: object) -> object:  # type: ignore[override]
+        """The file, to be revalidated."""
+        answer = super().file_response(*arguments, **options)  # type: ignore[arg-type]
+        answer.headers["cache-control"] = "no-cache"
+        return answer
+
+    async def get_response(self, path: str, scope: Scope) -> object:  # type: ignore[override]
+        """Development files beside the pages are not served."""
+        if path.split("/", 1)[0] not in ("index.html", "css", "js", "icons", "favicon.svg"):
+            raise HTTPException(404)
+        return await super().get_response(path, scope)
+
+
+def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) -> Context:
+    """Everything that runs: the database, the queue, the live segmenters, the viewer."""
+    engine, hub = open_engine(settings.database), Hub()
+    runner = Runner(engine, hub, settings, commands, FINISHERS, job_ended)
+    context = Context(
+        settings=settings,
+        engine=engine,
+        hub=hub,
+        keys=Keys(settings.data_dir),
+        runner=runner,
+        live=LiveSegmenters(hub, settings, commands),
+        viewer=viewer_client or Viewer(settings),
+        static=shipped("static", "index.html"),
+    )
+    context.live.on_object = lambda project, number: _tell(context, project, number)
+    if settings.run_jobs:
+        runner.start()
+    return context
+
+
+async def _tidy(context: Context) -> None:
+    """Close what nobody looks at any more."""
+    while True:
+        await asyncio.sleep(TIDY_S)
+        await anyio.to_thread.run_sync(context.viewer.close_idle)
+
+
+def _tell(context: Context, project: str, number: int) -> None:
+    try:
+        tell_object(context, project, number)
+    except R2C2RError:  # deleted meanwhile
+        return
+
+
+def _close(context: Context) -> None:
+    context.live.stop()
+    context.viewer.stop()
+    context.runner.stop()
+    context.engine.dispose()
+
+
+def _add_error_handlers(app: FastAPI) -> None:
+    """Every failure leaves in the one shape."""
+
+    @app.exception_handler(R2C2RError)
+    async def known(_: Request, error: R2C2RError) -> JSONResponse:
+        return JSONResponse(errors.error_body(error), errors.kind_of(error)[1])
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"] if part != "body") or "the body"
+        return JSONResponse(errors.body("invalid", f"{where}: {first['msg']}", "see /api/openapi.json"), 422)
+
+    @app.exception_handler(HTTPException)
+    async def refused(_: Request, error: HTTPException) -> JSONResponse:
+        kind = STATUS_KINDS.get(error.status_code, "error")
+        return JSONResponse(errors.body(kind, str(error.detail)), error.status_code, headers=error.headers)
+
+    @app.exception_handler(OperationalError)
+    async def database(request: Request, error: OperationalError) -> JSONResponse:
+        if "disk" in str(error.orig) or "full" in str(error.orig):
+            return _full_disk()
+        _log.exception("%s %s", request.method, request.url.path, exc_info=error)
+        return JSONResponse(errors.body("environment", "the database does not answer", "try again in a moment"), 503)
+
+    @app.exception_handler(OSError)
+    async def files(request: Request, error: OSError) -> JSONResponse:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return _full_disk()
+        return await unexpected(request, error)
+
+    @app.exception_handler(Exception)
+    async def unexpected(request: Request, error: Exception) -> JSONResponse:
+        _log.exception("%s %s", request.method, request.url.path, exc_info=error)
+        return JSONResponse(errors.body("internal", "the server met an unexpected error", "it is in the server's log"), 500)
+
+
+def _full_disk() -> JSONResponse:
+    return JSONResponse(errors.body("no-space", "the disk is full", "free some space: nothing already made is lost"), 507)

@@ -1,0 +1,139 @@
+"""A worker process that speaks JSON lines, in a process group of its own, so that stopping it stops its children too."""
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import psutil
+
+import app
+
+Line = dict[str, Any]
+
+
+class Worker:
+    """A running worker. Its stderr, and whatever on stdout is not JSON, goes to the log."""
+
+    def __init__(self, command: Sequence[str], log: Path) -> None:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        self._log: IO[bytes] = log.open("ab")
+        self._lines: queue.Queue[Line | None] = queue.Queue()
+        self.process = subprocess.Popen(
+            list(command),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            start_new_session=True,
+            env=_environment(),
+        )
+        self._reader = threading.Thread(target=self._read, name=f"worker-{self.process.pid}", daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """The worker's process id, which is also its group's."""
+        return self.process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still runs."""
+        return self.process.poll() is None
+
+    def next_line(self, timeout: float) -> Line | None:
+        """The next message; raises queue.Empty after the timeout; None when the worker said its last."""
+        line = self._lines.get(timeout=timeout)
+        if line is None:
+            self._lines.put(None)  # for whoever asks again
+        return line
+
+    def say(self, message: Line) -> bool:
+        """Send it a message; False when it is gone."""
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(json.dumps(message).encode() + b"\n")
+            self.process.stdin.flush()
+        except (OSError, ValueError):
+            return False
+        return True
+
+    def ask_to_stop(self) -> None:
+        """SIGTERM to the whole group."""
+        _signal_group(self.pid, signal.SIGTERM)
+
+    def kill(self) -> None:
+        """SIGKILL to the whole group."""
+        _signal_group(self.pid, signal.SIGKILL)
+
+    def close(self, grace_s: float = 0.0) -> int:
+        """Wait for the end, or bring it about after the grace; its exit status."""
+        try:
+            self.process.wait(timeout=grace_s if grace_s > 0 else 0.001)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        status = self.process.wait()
+        self.kill()  # what it started may outlive it
+        self._reader.join(timeout=5)
+        for stream in (self.process.stdin, self.process.stdout, self._log):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+        return status
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        with contextlib.suppress(ValueError):  # closed under us
+            for raw in self.process.stdout:
+                self._take(raw)
+        self._lines.put(None)
+
+    def _take(self, raw: bytes) -> None:
+        try:
+            line = json.loads(raw)
+        except ValueError:
+            line = None
+        if isinstance(line, dict):
+            self._lines.put(line)
+        else:
+            with contextlib.suppress(OSError):  # a full disk must not stop us listening
+                self._log.write(raw)
+
+
+def python_module(*words: str) -> tuple[str, ...]:
+    """The command that runs a module of ours."""
+    return (sys.executable, "-m", *words)
+
+
+def started_at(pid: int) -> float | None:
+    """When the process was created; None when there is none. A pid alone may be another's by now."""
+    try:
+        return float(psutil.Process(pid).create_time())
+    except psutil.Error:
+        return None
+
+
+def end_orphan(pid: int | None, started: float | None) -> None:
+    """Kill the group of a worker that lost its server, if it is still that worker."""
+    if pid is None or started is None:
+        return
+    now = started_at(pid)
+    if now is not None and abs(now - started) < 1.0:
+        _signal_group(pid, signal.SIGKILL)
+
+
+def _signal_group(pid: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, number)
+
+
+def _environment() -> dict[str, str]:
+    root = str(Path(app.__file__).resolve().parent.parent)
+    known = os.environ.get("PYTHONPATH")
+    return {**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONPATH": f"{root}{os.pathsep}{known}" if known else root}

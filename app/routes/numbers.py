@@ -1,0 +1,10 @@
+"""Numbers in addresses, within what the database can hold."""
+
+from typing import Annotated
+
+from fastapi import Path, Query
+
+RowId = Annotated[int, Path(ge=0, lt=2**63)]
+FrameNumber = Annotated[int, Path(ge=0, lt=2**31)]
+Count = Annotated[int, Query(ge=0, lt=2**31)]
+OptionalId = Annotated[int | None, Query(ge=0, lt=2**63)]

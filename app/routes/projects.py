@@ -1,0 +1,68 @@
+"""Projects and how recordings get in."""
+
+from fastapi import APIRouter, Request
+
+from app import schemas
+from app.deps import Ctx
+from app.routes.numbers import Count, OptionalId
+from app.services import imports, projects
+
+router = APIRouter(prefix="/api/projects", tags=["projects"])
+
+
+@router.get("", operation_id="listProjects")
+def list_projects(context: Ctx) -> list[schemas.Project]:
+    """All projects, last touched first."""
+    return projects.list_projects(context)
+
+
+@router.post("/upload", operation_id="uploadProject", status_code=202)
+async def upload_project(context: Ctx, request: Request, filename: str, name: str | None = None) -> schemas.Project:
+    """A new project from the request's body (the raw bytes of an .r3d or a zip); starts the import."""
+    length = request.headers.get("content-length")
+    size = int(length) if length and length.isdigit() else None
+    return await imports.from_upload(context, filename, name, size, request.stream())
+
+
+@router.post("/import", operation_id="importProject", status_code=202)
+def import_project(context: Ctx, body: schemas.ImportPath) -> schemas.Project:
+    """A new project from a recording on the server's machine; starts the import."""
+    return imports.from_path(context, body)
+
+
+@router.post("/sample", operation_id="sampleProject", status_code=202)
+def sample_project(context: Ctx, body: schemas.SampleRequest) -> schemas.Project:
+    """A new project with a synthetic kitchen and its prompts."""
+    return imports.from_sample(context, body)
+
+
+@router.get("/{project}", operation_id="getProject")
+def get_project(context: Ctx, project: str) -> schemas.Project:
+    """One project."""
+    return projects.get_project(context, project)
+
+
+@router.patch("/{project}", operation_id="renameProject")
+def rename_project(context: Ctx, project: str, body: schemas.ProjectRename) -> schemas.Project:
+    """A new name."""
+    return projects.rename(context, project, body.name)
+
+
+@router.delete("/{project}", operation_id="deleteProject")
+def delete_project(context: Ctx, project: str) -> schemas.Deleted:
+    """Delete the project and its files; a recording imported by path stays where it is."""
+    return projects.delete(context, project)
+
+
+@router.get("/{project}/frames", operation_id="listFrames")
+def list_frames(context: Ctx, project: str) -> list[schemas.FrameInfo]:
+    """The recording's frames, in order."""
+    return projects.frames(context, project)
+
+
+@router.get("/{project}/history", operation_id="getHistory")
+def get_history(
+    context: Ctx, project: str, object: OptionalId = None, before: OptionalId = None, limit: Count = 200
+) -> list[schemas.HistoryEntry]:
+    """Who changed what, newest first."""
+    return projects.history(context, project, object, before, limit)

@@ -1,0 +1,114 @@
+"""Objects, clicks, undo, and the masks that follow from them."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.routes.numbers import FrameNumber, RowId
+from app.services import masks, prompts
+
+router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
+
+
+@router.get("/objects", operation_id="listObjects")
+def list_objects(context: Ctx, project: str, deleted: bool = False) -> list[schemas.SceneObject]:
+    """The project's objects in the order they were made; deleted ones too when asked."""
+    return prompts.list_objects(context, project, deleted)
+
+
+@router.post("/objects", operation_id="createObject", status_code=201)
+def create_object(context: Ctx, project: str, body: schemas.ObjectIn, infer: bool = True) -> schemas.SceneObject:
+    """A new object, with its first clicks if there are any; `infer` starts its masks."""
+    return prompts.create(context, project, body, infer)
+
+
+@router.patch("/objects/{object}", operation_id="editObject")
+def edit_object(context: Ctx, project: str, object: RowId, body: schemas.ObjectPatch) -> schemas.SceneObject:
+    """Rename, recategorise, recolour; 409 with what is stored now when `version` is old."""
+    return prompts.edit(context, project, object, body)
+
+
+@router.delete("/objects/{object}", operation_id="deleteObject")
+def delete_object(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
+    """Take the object out; undo brings it back."""
+    return prompts.delete(context, project, object)
+
+
+@router.post("/objects/{object}/points", operation_id="addPoint", status_code=201)
+def add_point(context: Ctx, project: str, object: RowId, body: schemas.PointIn, infer: bool = True) -> schemas.SceneObject:
+    """One click; without `infer` the masks wait for the next one (or for segment)."""
+    return prompts.add_point(context, project, object, body, infer)
+
+
+@router.patch("/objects/{object}/points/{point}", operation_id="movePoint")
+def move_point(
+    context: Ctx, project: str, object: RowId, point: RowId, body: schemas.PointPatch, infer: bool = True
+) -> schemas.SceneObject:
+    """Move a click or flip its label."""
+    return prompts.move_point(context, project, object, point, body, infer)
+
+
+@router.delete("/objects/{object}/points/{point}", operation_id="deletePoint")
+def delete_point(context: Ctx, project: str, object: RowId, point: RowId, infer: bool = True) -> schemas.SceneObject:
+    """Take a click away."""
+    return prompts.delete_point(context, project, object, point, infer)
+
+
+@router.post("/undo", operation_id="undo")
+def undo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Undo the last change of one object, or of the project; 409 when there is none."""
+    return prompts.undo(context, project, body)
+
+
+@router.post("/redo", operation_id="redo")
+def redo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Redo what was undone last; 409 when there is nothing."""
+    return prompts.redo(context, project, body)
+
+
+@router.get("/prompts.json", operation_id="exportPrompts")
+def export_prompts(context: Ctx, project: str) -> schemas.PromptsFile:
+    """The clicks as the command line reads them."""
+    return prompts.export_file(context, project)
+
+
+@router.post("/prompts.json", operation_id="importPrompts")
+def import_prompts(context: Ctx, project: str, body: schemas.PromptsFile) -> list[schemas.SceneObject]:
+    """Add the objects of a prompts file; an object whose name is taken gets that file's points instead of its own."""
+    return prompts.import_file(context, project, body)
+
+
+@router.get("/live", operation_id="getLive")
+def get_live(context: Ctx, project: str) -> schemas.LiveStatus:
+    """Whether masks can be drawn at once."""
+    return masks.status(context, project)
+
+
+@router.post("/live/open", operation_id="openLive")
+def open_live(context: Ctx, project: str) -> schemas.LiveStatus:
+    """Start preparing the live segmenter; it also starts by itself with the first click."""
+    return masks.open_live(context, project)
+
+
+@router.post("/objects/{object}/segment", operation_id="segmentObject", status_code=202)
+def segment_object(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
+    """Compute the object's masks now."""
+    return masks.segment(context, project, object)
+
+
+@router.post("/objects/{object}/segment/cancel", operation_id="cancelSegment")
+def cancel_segment(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
+    """Stop computing the object's masks; those already there stay."""
+    return masks.cancel(context, project, object)
+
+
+@router.get("/lanes", operation_id="getLanes")
+def get_lanes(context: Ctx, project: str) -> list[schemas.Lane]:
+    """Where each object is seen."""
+    return masks.lanes(context, project)
+
+
+@router.get("/masks/{frame}", operation_id="getMasks")
+def get_masks(context: Ctx, project: str, frame: FrameNumber) -> list[schemas.FrameMask]:
+    """All objects' masks on one frame."""
+    return masks.on_frame(context, project, frame)

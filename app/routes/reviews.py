@@ -1,0 +1,48 @@
+"""Candidates, what people say about them, and what they correct."""
+
+from fastapi import APIRouter, Request
+
+from app import schemas
+from app.deps import Ctx
+from app.routes.numbers import RowId
+from app.services import reviews
+
+router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
+
+
+@router.get("/candidates", operation_id="listCandidates")
+def list_candidates(context: Ctx, project: str) -> list[schemas.CandidateGroup]:
+    """Every object's candidates with their evidence."""
+    return reviews.groups(context, project)
+
+
+@router.get("/objects/{object}/candidates", operation_id="getCandidates")
+def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.CandidateGroup:
+    """One object's candidates; 409 while there are none."""
+    return reviews.group(context, project, object)
+
+
+@router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201)
+async def upload_candidate(
+    context: Ctx, request: Request, project: str, object: RowId, filename: str, rerun: bool = True
+) -> schemas.Reviewed:
+    """A mesh (the request's body: GLB, OBJ, PLY or STL) as this object's candidate, chosen by a person."""
+    return await reviews.upload(context, project, object, filename, request.stream(), rerun)
+
+
+@router.post("/objects/{object}/verdicts", operation_id="giveVerdict")
+def give_verdict(context: Ctx, project: str, object: RowId, body: schemas.VerdictIn) -> schemas.Reviewed:
+    """Accept, reject or clear; undo with scope `review`."""
+    return reviews.give_verdict(context, project, object, body)
+
+
+@router.get("/objects/{object}/override", operation_id="getOverride")
+def get_override(context: Ctx, project: str, object: RowId) -> schemas.OverrideData:
+    """What was corrected about the object."""
+    return reviews.get_override(context, project, object)
+
+
+@router.patch("/objects/{object}/override", operation_id="setOverride")
+def set_override(context: Ctx, project: str, object: RowId, body: schemas.OverridePatch) -> schemas.Reviewed:
+    """Correct the object; what depends on it runs again."""
+    return reviews.set_override(context, project, object, body)

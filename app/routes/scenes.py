@@ -1,0 +1,27 @@
+"""The finished scene, its certificate and its bundles."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.services import bundles, scenes
+
+router = APIRouter(prefix="/api/projects/{project}", tags=["scenes"])
+
+
+@router.get("/scene", operation_id="getScene")
+def get_scene(context: Ctx, project: str) -> schemas.SceneSummary:
+    """The finished scene as a table; 409 while there is none."""
+    return scenes.summary(context, project)
+
+
+@router.get("/certificate", operation_id="getCertificate")
+def get_certificate(context: Ctx, project: str) -> schemas.Certificate:
+    """The newest bundle's certificate; 409 while there is none."""
+    return bundles.certificate(context, project)
+
+
+@router.get("/bundles", operation_id="listBundles")
+def list_bundles(context: Ctx, project: str) -> list[schemas.Bundle]:
+    """All versions, newest first."""
+    return bundles.list_bundles(context, project)

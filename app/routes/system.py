@@ -1,0 +1,27 @@
+"""What this app can do, and folders a recording may be taken from."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.services import system
+
+router = APIRouter(prefix="/api", tags=["system"])
+
+
+@router.get("/health", operation_id="health")
+def health() -> dict[str, str]:
+    """Alive."""
+    return {"state": "ok"}
+
+
+@router.get("/system", operation_id="getSystem")
+def get_system(context: Ctx) -> schemas.SystemInfo:
+    """Limits, categories, palette, free space."""
+    return system.describe(context)
+
+
+@router.get("/browse", operation_id="browse")
+def browse(context: Ctx, path: str | None = None) -> schemas.FolderListing:
+    """A folder on the server's machine, below an allowed root; without a path, the roots."""
+    return system.browse(context, path)

@@ -1,0 +1,43 @@
+"""The 3D view: what it shows, and the way to it through this origin."""
+
+from fastapi import APIRouter, Request, WebSocket
+from fastapi.responses import Response
+
+from app import schemas
+from app.deps import Ctx
+from app.services import viewers
+from app.services.context import Context
+
+router = APIRouter(tags=["viewer"])
+
+
+@router.post("/api/projects/{project}/viewer", operation_id="openViewer")
+def open_viewer(context: Ctx, request: Request, project: str) -> schemas.ViewerSession:
+    """Where the 3D view is; says so, with a picture and a mesh to show instead, when it is down."""
+    return viewers.open_view(context, project, request.state.session)
+
+
+@router.post("/api/projects/{project}/viewer/show", operation_id="showInViewer")
+def show_in_viewer(context: Ctx, project: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
+    """Change what the 3D view shows."""
+    return viewers.show(context, project, body)
+
+
+@router.post("/api/projects/{project}/viewer/joints", operation_id="setJoints")
+def set_joints(context: Ctx, project: str, body: schemas.JointValues) -> schemas.ViewerShown:
+    """Move joints of the scene in the 3D view."""
+    return viewers.set_joints(context, project, body.values)
+
+
+@router.get("/viewer/{token}/{path:path}", include_in_schema=False)
+async def viewer_page(context: Ctx, request: Request, token: str, path: str) -> Response:
+    """The 3D view's page."""
+    return await viewers.page(context, token, path, request.state.session)
+
+
+@router.websocket("/viewer/{token}")
+@router.websocket("/viewer/{token}/")
+async def viewer_socket(socket: WebSocket, token: str) -> None:
+    """The 3D view's connection."""
+    context: Context = socket.app.state.context
+    await viewers.socket(context, token, socket)

@@ -1,0 +1,114 @@
+"""Finished bundles: versions, their certificate, and single files out of the newest one."""
+
+import os
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlmodel import col, select
+
+from app import schemas
+from app.db import queries
+from app.db.documents import inputs_key
+from app.db.engine import reading
+from app.db.tables import Bundle
+from app.errors import NotFound, NotReady
+from app.services.context import Context
+
+
+@dataclass(frozen=True, slots=True)
+class BundleFile:
+    """A bundle on disk."""
+
+    path: Path
+    file_name: str
+    sha256: str
+
+
+def list_bundles(context: Context, project_id: str) -> list[schemas.Bundle]:
+    """All versions, newest first."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        rows = session.exec(select(Bundle).where(Bundle.project_id == project_id).order_by(col(Bundle.version).desc()))
+        now = inputs_key(session, project_id)
+        return [queries.bundle_shape(row, project.name, now) for row in rows]
+
+
+def file(context: Context, project_id: str, version: int) -> BundleFile:
+    """One version's file."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        row = session.exec(select(Bundle).where(Bundle.project_id == project_id, Bundle.version == version)).first()
+        path = context.files(project).bundles / row.path if row else None
+        if row is None or path is None or not path.is_file():
+            raise NotFound(f"no bundle of version {version}", hint="see the list of versions")
+        return BundleFile(path, queries.bundle_file_name(project.name, row.version, row.sha256), row.sha256)
+
+
+def certificate(context: Context, project_id: str) -> schemas.Certificate:
+    """The newest bundle's certificate."""
+    with reading(context.engine) as session:
+        queries.project_row(session, project_id)
+        row = queries.newest_bundle(session, project_id)
+    if row is None or not row.certificate:
+        raise NotReady("there is no certified bundle yet", hint="run the project first")
+    said: dict[str, Any] = row.certificate
+    known = {name: said.get(name) for name in schemas.Certificate.model_fields if said.get(name) is not None}
+    empty = {
+        "passed": False,
+        "findings": [],
+        "loaders": [],
+        "joints": [],
+        "rest_penetration_m": 0.0,
+        "drift_m": 0.0,
+        "realtime_factor": 0.0,
+    }
+    return schemas.Certificate.model_validate({**empty, **known, "version": row.version})
+
+
+def member(context: Context, project_id: str, name: str) -> Path:
+    """A file of the newest bundle, taken out of the zip once."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        row = queries.newest_bundle(session, project_id)
+        files = context.files(project)
+    if row is None:
+        raise NotReady("there is no bundle yet", hint="run the project first")
+    target = files.previews / f"bundle-v{row.version}" / name
+    if not target.is_file():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part = target.with_name(f".{target.name}.{os.getpid()}")
+        try:
+            with zipfile.ZipFile(files.bundles / row.path) as archive:
+                part.write_bytes(archive.read(_inside(archive, name)))
+        except (KeyError, FileNotFoundError) as error:
+            raise NotFound(f"the bundle has no {name}") from error
+        part.replace(target)
+    return target
+
+
+def folder(context: Context, project_id: str) -> Path | None:
+    """The newest bundle unpacked, for loaders that want files; None when there is none."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        row = queries.newest_bundle(session, project_id)
+        files = context.files(project)
+    if row is None:
+        return None
+    target = files.previews / f"bundle-v{row.version}" / "files"
+    if not target.is_dir():
+        part = target.with_name(f".files.{os.getpid()}")
+        with zipfile.ZipFile(files.bundles / row.path) as archive:
+            archive.extractall(part)  # our own exporter's archive
+        part.replace(target)
+    urdf = next(iter(sorted(target.rglob("scene.urdf"))), None)
+    return urdf.parent if urdf else None
+
+
+def _inside(archive: zipfile.ZipFile, name: str) -> str:
+    """The member called `name`, wherever the bundle's root is in the zip."""
+    for member_name in sorted(archive.namelist(), key=len):
+        if member_name == name or member_name.endswith(f"/{name}"):
+            return member_name
+    raise KeyError(name)

@@ -1,0 +1,123 @@
+"""Heavy work: start, watch, cancel, read the log."""
+
+from pathlib import Path
+
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db import queries
+from app.db.documents import inputs_key, prompts_document
+from app.db.engine import reading, writing
+from app.db.tables import Job, JobEvent, Project
+from app.errors import Conflict, NotReady
+from app.services import projects
+from app.services.context import Context
+from app.services.imports import queue_job
+from r2c2r_core.errors import PromptError
+
+
+def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.Job:
+    """Queue a reconstruction of the project as it is now."""
+    _check_backends(body)
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        job = queue_run(context, session, project, body)
+    context.runner.wake()
+    context.runner.tell(job.id or 0)
+    projects.tell(context, project_id)
+    return get_job(context, job.id or 0)
+
+
+def queue_run(context: Context, session: Session, project: Project, body: schemas.RunRequest) -> Job:
+    """A waiting run with everything said so far; one under way that already knows it all is that run."""
+    if project.status != "ready":
+        raise NotReady("the recording has not been read yet", hint="wait for the import")
+    if not prompts_document(session, project.id)["objects"]:
+        raise PromptError("no object has a click on it", hint="click at least one object on the annotate page")
+    payload = {**body.model_dump(), "inputs": inputs_key(session, project.id)}
+    active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
+    for job in session.exec(active):
+        if job.state == "queued" and job.started is None:
+            job.payload = payload  # it reads the clicks when it starts
+            session.add(job)
+            return job
+        if job.payload == payload:
+            return job
+    return queue_job(context, session, project, "run", payload)
+
+
+def list_jobs(context: Context, project_id: str | None, limit: int) -> list[schemas.Job]:
+    """Jobs, newest first."""
+    with reading(context.engine) as session:
+        query = select(Job).order_by(col(Job.id).desc()).limit(min(max(limit, 1), 500))
+        if project_id is not None:
+            query = query.where(Job.project_id == project_id)
+        return [queries.job_shape(session, row) for row in session.exec(query)]
+
+
+def get_job(context: Context, job_id: int) -> schemas.Job:
+    """One job."""
+    with reading(context.engine) as session:
+        return queries.job_shape(session, queries.job_row(session, job_id))
+
+
+def cancel(context: Context, job_id: int) -> schemas.Job:
+    """Ask the job to stop."""
+    context.runner.cancel(job_id)
+    return get_job(context, job_id)
+
+
+def retry(context: Context, job_id: int) -> schemas.Job:
+    """Queue a failed or cancelled job again; a run takes the clicks of now."""
+    with writing(context.engine) as session:
+        row = queries.job_row(session, job_id)
+        project = queries.project_row(session, row.project_id)
+        if row.state not in ("failed", "cancelled"):
+            raise Conflict(f"the job is {row.state}", hint="only failed or cancelled jobs can be retried")
+        if row.kind == "run":
+            job = queue_run(
+                context, session, project, schemas.RunRequest(**{k: v for k, v in row.payload.items() if k != "inputs"})
+            )
+        else:
+            if project.source_path is None:
+                raise Conflict("the recording never arrived", hint="delete the project and upload it again")
+            project.status, project.error = "importing", None
+            session.add(project)
+            job = queue_job(context, session, project, row.kind, row.payload)
+    context.runner.wake()
+    context.runner.tell(job.id or 0)
+    projects.tell(context, job.project_id)
+    return get_job(context, job.id or 0)
+
+
+def events(context: Context, job_id: int, after: int) -> list[schemas.JobEvent]:
+    """The job's history after an event."""
+    with reading(context.engine) as session:
+        queries.job_row(session, job_id)
+        rows = session.exec(
+            select(JobEvent).where(JobEvent.job_id == job_id, col(JobEvent.id) > after).order_by(col(JobEvent.id))
+        )
+        return [schemas.JobEvent(**row.model_dump(exclude={"job_id"})) for row in rows]
+
+
+def log(context: Context, job_id: int, tail: int) -> str:
+    """The end of the job's log."""
+    with reading(context.engine) as session:
+        path = queries.job_row(session, job_id).log_path
+    if path is None or not Path(path).is_file():
+        return ""
+    wanted = min(max(tail, 1), 2_000_000)
+    with Path(path).open("rb") as handle:
+        handle.seek(max(Path(path).stat().st_size - wanted, 0))
+        return handle.read(wanted).decode(errors="replace")
+
+
+def _check_backends(body: schemas.RunRequest) -> None:
+    """An unknown backend is refused before anything is queued."""
+    from r2c2r_core.align.protocol import MATCHERS
+    from r2c2r_core.generate.stage import GENERATORS
+    from r2c2r_core.segment.stage import SEGMENTERS
+
+    for registry, name in ((SEGMENTERS, body.segmenter), (GENERATORS, body.generator), (MATCHERS, body.matcher)):
+        if name is not None:
+            registry.get(name)

@@ -1,0 +1,149 @@
+"""Pixels and meshes for the browser, made once and kept in the project's previews."""
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.db import queries
+from app.db.engine import reading
+from app.errors import NotFound, NotReady
+from app.files import ProjectFiles, inside
+from app.services import projects
+from app.services.context import Context
+from app.services.reviews import candidate_mesh, generate_key
+
+WIDTHS = (160, 320, 480, 960, 1920)
+DEPTH_STEP_M = 0.00025  # of the stored depth (r2c2r_core.ingest.store)
+
+_LOCKS = [threading.Lock() for _ in range(16)]
+
+
+def frame(context: Context, project_id: str, index: int, width: int | None) -> Path:
+    """A frame's JPEG, at its stored size or at one of the kept widths."""
+    files = _files(context, project_id)
+    stored, size = _stored_frame(files, index)
+    if width is None or width >= size[0]:
+        return stored
+    kept = next((w for w in WIDTHS if w >= width), size[0])
+    if kept >= size[0]:
+        return stored
+    return _kept(files.previews / "frames" / str(kept) / f"{index:06d}.jpg", lambda: _shrink(stored, kept))
+
+
+def depth(context: Context, project_id: str, index: int) -> Path:
+    """A frame's depth in colours."""
+    files = _files(context, project_id)
+    _stored_frame(files, index)
+    stored = files.work / "capture" / "depth" / f"{index:06d}.png"
+    if not stored.is_file():
+        raise NotFound(f"frame {index} has no depth image")
+    return _kept(files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored))
+
+
+def thumbnail(context: Context, project_id: str) -> Path:
+    """The picture of the finished scene, or the sharpest frame from the middle of the recording."""
+    table = projects.frame_table(_files(context, project_id))
+    middle = table[len(table) // 4 : max(3 * len(table) // 4, len(table) // 4 + 1)]
+    best = max(middle, key=lambda entry: float(entry["sharpness"]))
+    return frame(context, project_id, int(best["index"]), 480)
+
+
+def candidate_glb(context: Context, project_id: str, object_id: int, candidate: str) -> Path:
+    """A candidate as GLB."""
+    files, name = _object_files(context, project_id, object_id)
+    key = generate_key(files, name)
+    target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.glb")
+    return _kept(target, lambda: _glb(files, name, candidate))
+
+
+def candidate_png(context: Context, project_id: str, object_id: int, candidate: str) -> Path:
+    """A candidate rendered."""
+    files, name = _object_files(context, project_id, object_id)
+    key = generate_key(files, name)
+    target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.png")
+    return _kept(target, lambda: _picture(files, name, candidate))
+
+
+def _files(context: Context, project_id: str) -> ProjectFiles:
+    with reading(context.engine) as session:
+        return context.files(queries.project_row(session, project_id))
+
+
+def _object_files(context: Context, project_id: str, object_id: int) -> tuple[ProjectFiles, str]:
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        return context.files(project), queries.object_row(session, project_id, object_id, deleted=True).name
+
+
+def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int]]:
+    for entry in projects.frame_table(files):
+        if entry["index"] == index:
+            stored = files.work / "capture" / "rgb" / f"{index:06d}.jpg"
+            if not stored.is_file():
+                raise NotReady(f"frame {index} is being read again", hint="wait for the running job")
+            return stored, (int(entry["width"]), int(entry["height"]))
+    raise NotFound(f"the recording has no frame {index}")
+
+
+def _kept(target: Path, make: Callable[[], bytes]) -> Path:
+    """The file, made if it is not there; two who ask at once make it once."""
+    if target.is_file():
+        return target
+    with _LOCKS[hash(target) % len(_LOCKS)]:
+        if not target.is_file():
+            content = make()
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_name(f".{target.name}.{os.getpid()}")
+            part.write_bytes(content)
+            part.replace(target)
+    return target
+
+
+def _shrink(stored: Path, width: int) -> bytes:
+    scale = next((f for f in (8, 4, 2) if _reduced_width(stored, f) >= width), 1)
+    flag = {8: cv2.IMREAD_REDUCED_COLOR_8, 4: cv2.IMREAD_REDUCED_COLOR_4, 2: cv2.IMREAD_REDUCED_COLOR_2}.get(
+        scale, cv2.IMREAD_COLOR
+    )
+    image = cv2.imread(str(stored), flag | cv2.IMREAD_IGNORE_ORIENTATION)
+    if image is None:
+        raise NotFound(f"{stored.name} is not readable")
+    height = max(round(image.shape[0] * width / image.shape[1]), 1)
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 82])[1].tobytes()
+
+
+def _reduced_width(stored: Path, factor: int) -> int:
+    from PIL import Image
+
+    with Image.open(stored) as opened:  # reads the header only
+        return opened.width // factor
+
+
+def _colour_depth(stored: Path) -> bytes:
+    raw = cv2.imread(str(stored), cv2.IMREAD_UNCHANGED)
+    if raw is None:
+        raise NotFound(f"{stored.name} is not readable")
+    metres = raw.astype(np.float32) * DEPTH_STEP_M
+    valid = raw > 0
+    near, far = np.percentile(metres[valid], (2, 98)) if valid.any() else (0.0, 1.0)
+    share = np.clip((metres - near) / max(far - near, 1e-3), 0, 1)
+    colours = cv2.applyColorMap((255 - share * 255).astype(np.uint8), cv2.COLORMAP_TURBO)
+    return cv2.imencode(".png", np.dstack([colours, valid.astype(np.uint8) * 255]))[1].tobytes()
+
+
+def _glb(files: ProjectFiles, name: str, candidate: str) -> bytes:
+    from app.services.meshes import mesh_glb, upright
+
+    asset = candidate_mesh(files, name, candidate)
+    return mesh_glb(asset.mesh, upright(files, name, candidate))
+
+
+def _picture(files: ProjectFiles, name: str, candidate: str) -> bytes:
+    from app.services.meshes import mesh_picture, upright
+
+    asset = candidate_mesh(files, name, candidate)
+    return mesh_picture(asset.mesh, upright(files, name, candidate))

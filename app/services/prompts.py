@@ -1,0 +1,290 @@
+"""Objects and clicks. Every change is stored, with what was before it, before the answer goes out."""
+
+import re
+from typing import Literal
+
+from sqlalchemy import func
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db import history, queries
+from app.db.engine import reading, writing
+from app.db.tables import Event, Point, Project, SceneObject
+from app.errors import Conflict, NotFound
+from app.jobs.outcomes import adopt_prompts
+from app.services import masks
+from app.services.context import Context
+from app.services.projects import frame_table
+from r2c2r_core.errors import PromptError
+
+_NAME = re.compile(r"[A-Za-z0-9_]+")
+
+
+def list_objects(context: Context, project_id: str, deleted: bool) -> list[schemas.SceneObject]:
+    """The project's objects in the order they were made."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        query = select(SceneObject).where(SceneObject.project_id == project_id).order_by(col(SceneObject.id))
+        if not deleted:
+            query = query.where(col(SceneObject.deleted).is_(False))
+        stacks = history.all_stacks(session, project_id, "prompts")
+        empty = history.Stacks((), ())
+        return [_shape(context, session, project, item, stacks.get(item.id, empty)) for item in session.exec(query)]
+
+
+def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
+    """A new object, with its first clicks if there are any."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        for point in body.points:
+            _check_point(context, project, point.frame, point.x, point.y)
+        category = _category(body.category)
+        name = _free_name(session, project_id, category) if not body.name else _name(session, project_id, body.name, None)
+        count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project_id)).one()
+        item = SceneObject(project_id=project_id, name=name, category=category, colour=count, deleted=True)
+        session.add(item)
+        session.flush()
+        frame = body.points[0].frame if body.points else None
+        with history.change(session, item, "prompts", "create", f"added {name}", who=context.settings.user, frame=frame):
+            item.deleted = False
+            session.add(item)
+            session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
+    return _after(context, project_id, item.id, infer and bool(body.points))
+
+
+def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
+    """Rename, recategorise, recolour."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        if body.version is not None and body.version != item.version:
+            current = _shape(context, session, project, item, None).model_dump()
+            raise Conflict(f"{item.name} was changed meanwhile", hint="look at what is stored now", current=current)
+        wanted = _wanted(session, item, body)
+        text = ", ".join(f"{key} of {item.name} → {value}" for key, value in wanted.items()) or "nothing"
+        with history.change(session, item, "prompts", "edit", text, who=context.settings.user):
+            for key, value in wanted.items():
+                setattr(item, key, value)
+            session.add(item)
+    return _after(context, project_id, object_id, infer="category" in wanted)
+
+
+def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+    """Take the object out; undo brings it back."""
+    with writing(context.engine) as session:
+        item = queries.object_row(session, project_id, object_id)
+        with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.settings.user):
+            item.deleted = True
+            session.add(item)
+    context.live.cancel(project_id, object_id)
+    return _after(context, project_id, object_id, infer=False)
+
+
+def add_point(context: Context, project_id: str, object_id: int, body: schemas.PointIn, infer: bool) -> schemas.SceneObject:
+    """One click."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        _check_point(context, project, body.frame, body.x, body.y)
+        text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
+        with history.change(session, item, "prompts", "add point", text, who=context.settings.user, frame=body.frame):
+            session.add(Point(object_id=item.id or 0, **body.model_dump()))
+    return _after(context, project_id, object_id, infer)
+
+
+def move_point(
+    context: Context, project_id: str, object_id: int, point_id: int, body: schemas.PointPatch, infer: bool
+) -> schemas.SceneObject:
+    """Move a click or flip its label."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        point = _point(session, item, point_id)
+        changes = body.model_dump(exclude_none=True)
+        _check_point(context, project, point.frame, changes.get("x", point.x), changes.get("y", point.y))
+        text = f"moved a point of {item.name}, frame {point.frame}"
+        with history.change(session, item, "prompts", "move point", text, who=context.settings.user, frame=point.frame):
+            point.sqlmodel_update(changes)
+            session.add(point)
+    return _after(context, project_id, object_id, infer)
+
+
+def delete_point(context: Context, project_id: str, object_id: int, point_id: int, infer: bool) -> schemas.SceneObject:
+    """Take a click away."""
+    with writing(context.engine) as session:
+        item = queries.object_row(session, project_id, object_id)
+        point = _point(session, item, point_id)
+        text = f"removed a point of {item.name}, frame {point.frame}"
+        with history.change(session, item, "prompts", "remove point", text, who=context.settings.user, frame=point.frame):
+            session.delete(point)
+    return _after(context, project_id, object_id, infer)
+
+
+def undo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Undo the last change of one object, or of the project."""
+    return _step(context, project_id, body, "undo")
+
+
+def redo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Redo what was undone last."""
+    return _step(context, project_id, body, "redo")
+
+
+def export_file(context: Context, project_id: str) -> schemas.PromptsFile:
+    """The clicks as the command line reads them."""
+    with reading(context.engine) as session:
+        queries.project_row(session, project_id)
+        objects = []
+        for item in queries.live_objects(session, project_id):
+            points = [_file_point(point) for point in queries.points_of(session, item.id)]
+            objects.append(schemas.PromptsFileObject(name=item.name, category=item.category, points=points))
+        return schemas.PromptsFile(version=1, objects=objects)
+
+
+def import_file(context: Context, project_id: str, body: schemas.PromptsFile) -> list[schemas.SceneObject]:
+    """Add the objects of a prompts file."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        for entry in body.objects:
+            for point in entry.points:
+                _check_point(context, project, point.frame, point.x, point.y)
+        items = adopt_prompts(session, project, body.model_dump(), context.settings.user)
+    return [_after(context, project_id, item.id, infer=False) for item in items]
+
+
+def _file_point(point: Point) -> schemas.PromptsFilePoint:
+    return schemas.PromptsFilePoint(frame=point.frame, x=point.x, y=point.y, label=1 if point.label else 0)
+
+
+def object_shape(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+    """One object as it goes over the wire, also a deleted one."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id, deleted=True)
+        return _shape(context, session, project, item, None)
+
+
+def tell_object(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+    """Show the object's state to every tab."""
+    shape = object_shape(context, project_id, object_id)
+    context.hub.publish("object", project_id, object=shape.model_dump())
+    return shape
+
+
+def _step(context: Context, project_id: str, body: schemas.UndoRequest, direction: Literal["undo", "redo"]) -> schemas.Undone:
+    with writing(context.engine) as session:
+        queries.project_row(session, project_id)
+        number = body.object if body.object is not None else history.last_change(session, project_id, body.scope, direction)
+        if number is None:
+            raise Conflict(f"nothing to {direction}")
+        item = queries.object_row(session, project_id, number, deleted=True)
+        step = history.undo if direction == "undo" else history.redo
+        event = step(session, item, body.scope, who=context.settings.user)
+    shape = _after(context, project_id, number, infer=body.scope == "prompts")
+    if body.scope == "review":
+        context.hub.publish("review", project_id, object=number)
+    return schemas.Undone(object=shape, text=event.text, frame=event.frame)
+
+
+def _after(context: Context, project_id: str, object_id: int | None, infer: bool) -> schemas.SceneObject:
+    """What follows from a stored change: masks where asked for, and every tab told."""
+    if infer and object_id is not None:
+        masks.follow(context, project_id, object_id)
+    return tell_object(context, project_id, object_id or 0)
+
+
+def _shape(
+    context: Context, session: Session, project: Project, item: SceneObject, stacks: history.Stacks | None
+) -> schemas.SceneObject:
+    stacks = stacks or history.stacks_of(session, item.project_id, item.id, "prompts")
+    points = queries.points_of(session, item.id)
+    state, frames, notices = masks.state_of(context, project, item, points)
+    saved = session.exec(
+        select(func.max(Event.at)).where(Event.project_id == item.project_id, Event.object_id == item.id)
+    ).one()
+    return schemas.SceneObject(
+        id=item.id or 0,
+        project=item.project_id,
+        name=item.name,
+        category=item.category,
+        colour=item.colour,
+        version=item.version,
+        deleted=item.deleted,
+        points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in points],
+        can_undo=bool(stacks.done),
+        can_redo=bool(stacks.undone),
+        segment=state,
+        mask_frames=frames,
+        notices=[*notices, *_category_notice(item.category)],
+        saved=saved or 0.0,
+    )
+
+
+def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:
+    """What the patch changes, checked."""
+    wanted: dict[str, object] = {}
+    if body.name is not None and body.name != item.name:
+        wanted["name"] = _name(session, item.project_id, body.name, item.id)
+    if body.category is not None and _category(body.category) != item.category:
+        wanted["category"] = _category(body.category)
+    if body.colour is not None and body.colour != item.colour:
+        wanted["colour"] = body.colour
+    return wanted
+
+
+def _point(session: Session, item: SceneObject, point_id: int) -> Point:
+    found = session.get(Point, point_id)
+    if found is None or found.object_id != item.id:
+        raise NotFound(f"no point {point_id} on {item.name}", hint="it may have been removed meanwhile")
+    return found
+
+
+def _check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
+    """Raise PromptError for a click that is on no frame or outside its image."""
+    table = {entry["index"]: entry for entry in frame_table(context.files(project))}
+    if frame not in table:
+        raise PromptError(f"the recording has no frame {frame}", hint=f"its {len(table)} frames are listed under /frames")
+    width, height = table[frame]["width"], table[frame]["height"]
+    if not (0 <= x < width and 0 <= y < height):
+        raise PromptError(
+            f"the click at ({x:g}, {y:g}) is outside the image of {width}x{height}", hint="click inside the image"
+        )
+
+
+def _name(session: Session, project_id: str, name: str, mine: int | None) -> str:
+    """The name, when simulators accept it and no other object has it."""
+    name = name.strip()
+    if not _NAME.fullmatch(name):
+        raise PromptError(
+            f"the name '{name}' is not usable", hint="use letters, digits and underscores: simulators accept no more"
+        )
+    if name.casefold() in _names(session, project_id, mine):
+        raise PromptError(f"two objects named '{name}'", hint="names are unique: choose another one")
+    return name
+
+
+def _free_name(session: Session, project_id: str, category: str) -> str:
+    stem = re.sub(r"[^A-Za-z0-9]+", "_", category).strip("_") or "object"
+    taken = _names(session, project_id, None)
+    number = 1
+    while f"{stem}_{number}".casefold() in taken:
+        number += 1
+    return f"{stem}_{number}"
+
+
+def _names(session: Session, project_id: str, without: int | None) -> set[str]:
+    return {item.name.casefold() for item in queries.live_objects(session, project_id) if item.id != without}
+
+
+def _category(category: str) -> str:
+    cleaned = " ".join(category.split())
+    if not cleaned:
+        raise PromptError("the category is empty", hint="write what it is: drawer, cabinet, bottle …")
+    return cleaned
+
+
+def _category_notice(category: str) -> list[str]:
+    from r2c2r_core.synthesize.fixtures.table import fixture_for
+
+    notice = fixture_for(category)[1]
+    return [notice] if notice else []

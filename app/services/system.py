@@ -1,0 +1,89 @@
+"""What this app can do, and folders a recording may be taken from."""
+
+from pathlib import Path
+
+from app import schemas
+from app.errors import Forbidden, NotFound
+from app.files import free_bytes
+from app.services.context import Context
+from r2c2r_core import __version__
+
+PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
+    "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00",
+    "#cc79a7", "#9467bd", "#8c564b", "#17becf", "#bcbd22", "#7f7f7f",
+]  # fmt: skip
+
+
+def describe(context: Context) -> schemas.SystemInfo:
+    """Limits, categories, palette, free space."""
+    settings = context.settings
+    return schemas.SystemInfo(
+        version=__version__,
+        user=settings.user,
+        max_upload_bytes=settings.max_upload_bytes,
+        free_bytes=free_bytes(settings.data_dir),
+        import_roots=[str(root) for root in settings.roots],
+        categories=_categories(),
+        palette=PALETTE,
+        viewer=context.viewer.enabled,
+    )
+
+
+def browse(context: Context, path: str | None) -> schemas.FolderListing:
+    """A folder below an allowed root; without a path, the roots."""
+    if not path:
+        roots = [
+            schemas.FolderEntry(name=str(r), path=str(r), folder=True, size=None) for r in context.settings.roots if r.is_dir()
+        ]
+        return schemas.FolderListing(path="", parent=None, entries=roots)
+    folder = allowed_path(context, path)
+    if not folder.is_dir():
+        raise NotFound(f"{folder} is not a folder")
+    try:
+        found = sorted(
+            (p for p in folder.iterdir() if not p.name.startswith(".")), key=lambda p: (p.is_file(), p.name.casefold())
+        )
+    except PermissionError as error:
+        raise Forbidden(f"{folder} may not be read by this app", hint="choose another folder") from error
+    entries = [_entry(p) for p in found[:2000] if p.is_dir() or p.is_file()]
+    parent = folder.parent if _is_allowed(context, folder.parent) else None
+    return schemas.FolderListing(path=str(folder), parent=str(parent) if parent else "", entries=entries)
+
+
+def allowed_path(context: Context, path: str) -> Path:
+    """The path, resolved; raises Forbidden outside the allowed roots (links count as where they lead)."""
+    if "\x00" in path:
+        raise Forbidden("the path holds a zero byte")
+    try:
+        resolved = Path(path).expanduser().resolve()
+    except (OSError, RuntimeError) as error:
+        raise NotFound(f"{path}: {error}") from error
+    if not _is_allowed(context, resolved):
+        roots = ", ".join(str(root) for root in context.settings.roots)
+        raise Forbidden(f"{resolved} is outside the folders recordings may come from", hint=f"allowed: {roots}")
+    return resolved
+
+
+def _is_allowed(context: Context, path: Path) -> bool:
+    return any(path.is_relative_to(root.resolve()) for root in context.settings.roots)
+
+
+def _entry(path: Path) -> schemas.FolderEntry:
+    folder = path.is_dir()
+    return schemas.FolderEntry(name=path.name, path=str(path), folder=folder, size=None if folder else path.stat().st_size)
+
+
+def _categories() -> list[schemas.Category]:
+    from r2c2r_core.synthesize.fixtures.table import FIXTURES
+
+    return [schemas.Category(name=s.name, label=s.name.replace("_", " "), joint=_JOINTS[s.opening]) for s in FIXTURES]
+
+
+_JOINTS = {
+    "drawer": "prismatic",
+    "side": "revolute",
+    "pair": "revolute",
+    "bottom": "revolute",
+    "fixed": "none",
+    "rigid": "none",
+}

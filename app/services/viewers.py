@@ -1,0 +1,87 @@
+"""The 3D view: what it shows, and who reaches it."""
+
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import WebSocket
+from fastapi.responses import Response
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading
+from app.errors import Forbidden, NotReady, Unavailable
+from app.services import bundles
+from app.services.context import Context
+from app.viewer import proxy
+
+
+def open_view(context: Context, project_id: str, session_id: str) -> schemas.ViewerSession:
+    """Where the 3D view is, or what to show instead."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        bundle = queries.newest_bundle(session, project_id)
+    if project.status != "ready":
+        raise NotReady("the recording has not been read yet", hint="wait for the import")
+    instead = {
+        "fallback_glb": f"/media/{project_id}/scene.glb?v={bundle.version}" if bundle else None,
+        "fallback_image": f"/media/{project_id}/preview.png?v={bundle.version}"
+        if bundle
+        else f"/media/{project_id}/thumbnail.jpg",
+    }
+    try:
+        token = context.viewer.open(project_id, context.files(project).work, session_id)
+    except Unavailable as error:
+        return schemas.ViewerSession(state="down", url=None, message=str(error), **instead)
+    return schemas.ViewerSession(state="ready", url=f"/viewer/{token}/", message="", **instead)
+
+
+def show(context: Context, project_id: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
+    """Change what the 3D view shows."""
+    from app.services.meshes import upright
+
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, body.object) if body.object is not None else None
+    wish: dict[str, Any] = body.model_dump(exclude={"object"})
+    files = context.files(project)
+    if item is not None:
+        wish["name"] = item.name
+    if body.mode == "candidate":
+        if item is None:
+            raise NotReady("a candidate of which object?", hint="give the object")
+        wish["candidate"] = body.candidate or _chosen(context, project_id, item.id or 0)
+        wish["rotation"] = upright(files, item.name, wish["candidate"]).tolist()
+    if body.mode == "scene":
+        folder: Path | None = bundles.folder(context, project_id)
+        wish["bundle"] = str(folder) if folder else None
+    return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, wish))
+
+
+def set_joints(context: Context, project_id: str, values: dict[str, float]) -> schemas.ViewerShown:
+    """Move joints of the shown scene."""
+    with reading(context.engine) as session:
+        queries.project_row(session, project_id)
+    return schemas.ViewerShown.model_validate(context.viewer.move(project_id, values))
+
+
+async def page(context: Context, token: str, path: str, session_id: str) -> Response:
+    """The 3D view's page, or a file of it."""
+    return await proxy.fetch_page(context.viewer.port(token, session_id), quote(path), context.viewer.key)
+
+
+async def socket(context: Context, token: str, connection: WebSocket) -> None:
+    """The 3D view's connection."""
+    try:
+        port = context.viewer.port(token, connection.state.session)
+    except (Forbidden, Unavailable) as error:
+        await connection.close(4403 if isinstance(error, Forbidden) else 1013, error.message)
+        return
+    with context.viewer.watched(token):
+        await proxy.pump(connection, port, context.viewer.key)
+
+
+def _chosen(context: Context, project_id: str, object_id: int) -> str:
+    from app.services.reviews import group
+
+    return group(context, project_id, object_id).chosen

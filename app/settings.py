@@ -1,0 +1,66 @@
+"""What the app is told when it starts."""
+
+import getpass
+import os
+import secrets
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import app
+
+MEBIBYTE = 1024 * 1024
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """One running app. Paths are absolute; sizes in bytes; times in seconds."""
+
+    data_dir: Path
+    launch_token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    host: str = "127.0.0.1"
+    allowed_hosts: tuple[str, ...] = LOOPBACK
+    import_roots: tuple[Path, ...] = ()
+    max_upload_bytes: int = 16 * 1024 * MEBIBYTE
+    max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE
+    max_unpacked_files: int = 200_000
+    min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
+    heavy_jobs: int = 1
+    job_attempts: int = 3  # how often a job that lost its server is taken up again
+    kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
+    live_idle_s: float = 600.0
+    viewer_idle_s: float = 600.0
+    run_jobs: bool = True  # tests of other things leave the queue alone
+    preview_width: int = 960
+    user: str = field(default_factory=lambda: _user_name())
+
+    @property
+    def database(self) -> Path:
+        """The SQLite file."""
+        return self.data_dir / "r2c2r.db"
+
+    @property
+    def roots(self) -> tuple[Path, ...]:
+        """Folders a recording may be taken from by path."""
+        return self.import_roots or (Path.home(), self.data_dir)
+
+
+def default_data_dir() -> Path:
+    """Where projects live unless someone says otherwise; the command line says the same."""
+    return Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r")).expanduser().resolve()
+
+
+def shipped(name: str, marker: str) -> Path:
+    """The folder `name` that travels with the app: beside `app/` in a checkout, `app/_<name>` in an installed wheel."""
+    package = Path(app.__file__).resolve().parent
+    for place in (package.parent / name, package / f"_{name}"):
+        if (place / marker).is_file():
+            return place
+    raise FileNotFoundError(f"{name}/{marker} is neither beside {package} nor in it; reinstall r2c2r")
+
+
+def _user_name() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):  # a container's numeric user has no name
+        return "local"

@@ -1,0 +1,91 @@
+"""viser through the app's own origin: its page with our rules in it, and its connection pumped both ways."""
+
+import asyncio
+import contextlib
+import http.client
+
+import anyio
+import websockets
+from starlette.responses import Response
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.typing import Subprotocol
+
+from app.errors import NotFound, Unavailable
+from app.viewer.contract import KEY_HEADER
+
+PAGE_POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; "
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+    "connect-src 'self' data: blob:; frame-ancestors 'self'"
+)
+# viser's client reconnects only while its document has the focus, which the parent page keeps; its panels are not ours
+INJECTED = (
+    b"<script>document.hasFocus=()=>true</script><style>[data-floating-window],[data-dock-leaf]{display:none!important}"
+    b".mantine-Notifications-root{display:none!important}</style>"
+)
+
+
+async def fetch_page(port: int, path: str, key: str) -> Response:
+    """A file of viser's client; its page gets what it needs to live in an iframe."""
+    try:
+        status, content_type, content = await anyio.to_thread.run_sync(_fetch, port, path, key)
+    except OSError as error:
+        raise Unavailable("the 3D view does not answer", hint="open the review page again") from error
+    if status != 200:
+        raise NotFound("the 3D view has no such file")
+    if content_type.startswith("text/html"):
+        content = content.replace(b"<head>", b"<head>" + INJECTED, 1)
+    headers = {"content-security-policy": PAGE_POLICY, "cache-control": "no-store", "content-type": content_type}
+    return Response(content, headers=headers)
+
+
+async def pump(socket: WebSocket, port: int, key: str) -> None:
+    """Carry messages both ways until either side leaves."""
+    wanted = [Subprotocol(name) for name in socket.scope["subprotocols"]]
+    try:
+        upstream = await websockets.connect(
+            f"ws://127.0.0.1:{port}/",
+            subprotocols=wanted or None,
+            max_size=None,
+            compression=None,
+            proxy=None,
+            additional_headers={KEY_HEADER: key},
+        )
+    except (OSError, websockets.WebSocketException):
+        await socket.close(1013, "the 3D view does not answer")
+        return
+    async with upstream:
+        await socket.accept(subprotocol=upstream.subprotocol)
+        tasks = {asyncio.create_task(_up(socket, upstream)), asyncio.create_task(_down(socket, upstream))}
+        _, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in pending:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # already closed by the browser
+        await socket.close(upstream.close_code if upstream.close_code in (1002, 1011) else 1000)
+
+
+async def _up(socket: WebSocket, upstream: websockets.ClientConnection) -> None:
+    with contextlib.suppress(WebSocketDisconnect, websockets.ConnectionClosed):
+        while True:
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            content = message.get("bytes")
+            await upstream.send(content if content is not None else message["text"])
+
+
+async def _down(socket: WebSocket, upstream: websockets.ClientConnection) -> None:
+    with contextlib.suppress(WebSocketDisconnect, websockets.ConnectionClosed, RuntimeError):
+        async for content in upstream:
+            await (socket.send_bytes(content) if isinstance(content, bytes) else socket.send_text(content))
+
+
+def _fetch(port: int, path: str, key: str) -> tuple[int, str, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    try:
+        connection.request("GET", f"/{path}", headers={KEY_HEADER: key})
+        answer = connection.getresponse()
+        return answer.status, answer.getheader("content-type", "application/octet-stream"), answer.read()
+    finally:
+        connection.close()

@@ -1,0 +1,222 @@
+"""What a project's 3D view shows, read from its workspace. Runs in the viewer's process."""
+
+import warnings
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.errors import InputError
+from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.workspace import Workspace
+
+MAX_POINTS = 300_000
+POINTS_PER_NODE = 150_000  # one websocket frame each, so that the page stays alive while they arrive
+
+
+@dataclass(slots=True)
+class Joint:
+    """One joint of the shown scene."""
+
+    name: str
+    lower: float
+    upper: float
+    value: float
+
+
+@dataclass(slots=True)
+class View:
+    """One project's server and what is on it."""
+
+    server: Any
+    work: Workspace
+    shown: list[Any] = field(default_factory=list)
+    cloud: list[Any] = field(default_factory=list)
+    cloud_full: bool = False
+    urdf: Any = None
+    joints: list[Joint] = field(default_factory=list)
+    mode: str = ""
+    text: str = ""
+    known_capture: Any = None
+
+    def show(self, wish: dict[str, Any]) -> None:
+        """Replace what is shown."""
+        self._clear()
+        self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud", bool(wish.get("full")))
+        self.mode = wish["mode"]
+        self.text = _MODES[self.mode](self, wish)
+
+    def move(self, values: dict[str, float]) -> None:
+        """Set joints, clamped to their limits; unknown names are refused."""
+        known = {joint.name: joint for joint in self.joints}
+        for name, value in values.items():
+            if name not in known:
+                raise InputError(f"the shown scene has no joint '{name[:60]}'", hint="show the scene first")
+            known[name].value = float(min(max(value, known[name].lower), known[name].upper))
+        if self.urdf is not None and self.joints:
+            self.urdf.update_cfg(np.array([joint.value for joint in self.joints]))
+
+    def _clear(self) -> None:
+        for handle in self.shown:
+            handle.remove()
+        self.shown.clear()
+        if self.urdf is not None:
+            with warnings.catch_warnings(action="ignore"):  # it removes frames before the meshes that hang on them
+                self.urdf.remove()
+        self.urdf, self.joints = None, []
+
+    def _show_cloud(self, wanted: bool, full: bool) -> None:
+        if wanted and (not self.cloud or (full and not self.cloud_full)):
+            for handle in self.cloud:
+                handle.remove()
+            self.cloud = self._add_cloud(full)
+            self.cloud_full = full
+        for handle in self.cloud:
+            handle.visible = wanted
+
+    def _add_cloud(self, full: bool) -> list[Any]:
+        surface = self._capture().surface
+        order = np.random.default_rng(0).permutation(len(surface.vertices_world))
+        order = order if full else order[:MAX_POINTS]
+        size = max(surface.voxel_m, 0.004)
+        return [
+            self.server.scene.add_point_cloud(
+                f"/cloud/{start}",
+                surface.vertices_world[part].astype(np.float32),
+                surface.colours[part],
+                point_size=size,
+                point_shape="circle",
+                precision="float32",
+            )
+            for start in range(0, len(order), POINTS_PER_NODE)
+            for part in (order[start : start + POINTS_PER_NODE],)
+        ]
+
+    def _show_scan(self, wish: dict[str, Any]) -> str:
+        surface = self._capture().surface
+        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
+        low, high = np.percentile(surface.vertices_world, (5, 95), axis=0)
+        self._look(positions.mean(axis=0), (low + high) / 2)
+        count = len(surface.vertices_world)
+        return f"{min(count, MAX_POINTS) if not self.cloud_full else count} of {count} points of the scan"
+
+    def _show_candidate(self, wish: dict[str, Any]) -> str:
+        asset = self._asset(wish)
+        rotation = np.asarray(wish.get("rotation", np.eye(3)), dtype=np.float64)
+        vertices = asset.mesh.vertices @ rotation.T
+        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        for handle in self.cloud:  # a candidate has its own frame: the scan means nothing beside it
+            handle.visible = False
+        self.shown.append(self._add_mesh("/shown/0", asset.mesh, vertices, float(wish.get("opacity", 1.0))))
+        radius = float(np.linalg.norm(vertices, axis=1).max())
+        self._look(np.array([-0.5, -1.6, 0.6]) * 1.6 * radius, np.zeros(3))
+        return f"candidate {asset.candidate_id}, {len(asset.mesh.faces)} faces"
+
+    def _show_aligned(self, wish: dict[str, Any]) -> str:
+        names = [wish["name"]] if wish.get("name") else self.work.names("align")
+        centres = []
+        for number, name in enumerate(names):
+            placement = self.work.load_latest("align", name)
+            if placement is None:
+                if wish.get("name"):
+                    raise InputError(f"{name} has no placement yet", hint="run the project first")
+                continue
+            asset = self._asset({"name": name, "candidate": placement.candidate_id})
+            vertices = placement.world_from_mesh.apply(asset.mesh.vertices)
+            self.shown.append(self._add_mesh(f"/shown/{number}", asset.mesh, vertices, float(wish.get("opacity", 1.0))))
+            centres.append((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+        if not centres:
+            raise InputError("nothing is placed yet", hint="run the project first")
+        self._look_from_path(np.mean(centres, axis=0))
+        return f"{len(centres)} placed mesh{'es' if len(centres) > 1 else ''} over the scan"
+
+    def _show_scene(self, wish: dict[str, Any]) -> str:
+        if not wish.get("bundle"):
+            raise InputError("there is no finished scene yet", hint="run the project first")
+        from viser.extras import ViserUrdf
+
+        collision = bool(wish.get("collision"))
+        robot = _loaded(Path(wish["bundle"]) / "scene.urdf", collision)
+        self.urdf = ViserUrdf(
+            self.server, robot, root_node_name="/urdf", load_meshes=not collision, load_collision_meshes=collision
+        )
+        limits = self.urdf.get_actuated_joint_limits()
+        self.joints = [_joint(name, *limits[name]) for name in self.urdf.get_actuated_joint_names()]
+        self.move({})  # until the first configuration every joint stands at the origin
+        low, high = np.percentile(self._capture().surface.vertices_world, (5, 95), axis=0)
+        self._look_from_path((low + high) / 2)
+        return f"{len(self.joints)} joints" + (", colliders" if collision else "")
+
+    def _asset(self, wish: dict[str, Any]) -> Any:
+        found = self.work.load_latest("generate", wish["name"])
+        wanted = wish.get("candidate") or (found.chosen_id if found else None)
+        for asset in found.candidates if found else ():
+            if asset.candidate_id == wanted:
+                return asset
+        raise InputError(f"{wish['name']} has no candidate {wanted}", hint="run the project first")
+
+    def _add_mesh(self, node: str, mesh: TexturedMesh, vertices: np.ndarray, opacity: float) -> Any:
+        import trimesh
+        from PIL import Image
+
+        look: dict[str, Any] = {
+            "baseColorTexture": Image.fromarray(mesh.texture),
+            "metallicFactor": 0.0,
+            "roughnessFactor": 0.9,
+        }
+        if opacity < 1.0:  # GLB handles have no opacity of their own
+            look |= {"baseColorFactor": [255, 255, 255, round(255 * opacity)], "alphaMode": "BLEND"}
+        visual = trimesh.visual.TextureVisuals(uv=mesh.uv, material=trimesh.visual.material.PBRMaterial(**look))
+        shown = trimesh.Trimesh(vertices, mesh.faces, visual=visual, process=False)
+        _ = shown.vertex_normals  # without them every face is shaded flat
+        return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
+
+    def _look_from_path(self, target: np.ndarray) -> None:
+        """Look at the target from where the person who filmed stood, a little further away."""
+        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
+        start = positions.mean(axis=0)
+        self._look(target + 1.15 * (start - target), target)
+
+    def _look(self, position: np.ndarray, target: np.ndarray) -> None:
+        place, aim = tuple(float(v) for v in position), tuple(float(v) for v in target)
+        self.server.initial_camera.position, self.server.initial_camera.look_at = place, aim
+        for client in self.server.get_clients().values():
+            client.camera.position, client.camera.look_at = place, aim
+
+    def _capture(self) -> Any:
+        if self.known_capture is None:
+            self.known_capture = self.work.load_latest("ingest", "scene")
+            if self.known_capture is None:
+                raise InputError("the recording has not been read yet", hint="wait for the import")
+        return self.known_capture
+
+
+def _loaded(path: Path, collision: bool) -> Any:
+    """The URDF, its textures as dull as they are: without a word about metal, GLB means all metal, which is drawn dark."""
+    import trimesh
+    import yourdfpy
+
+    robot = yourdfpy.URDF.load(
+        str(path),
+        build_scene_graph=not collision,
+        load_meshes=not collision,
+        build_collision_scene_graph=collision,
+        load_collision_meshes=collision,
+        filename_handler=partial(yourdfpy.filename_handler_magic, dir=str(path.parent)),
+    )
+    for shape in (robot.collision_scene if collision else robot.scene).geometry.values():
+        image = getattr(getattr(shape.visual, "material", None), "image", None)
+        if image is not None:
+            dull = trimesh.visual.material.PBRMaterial(baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.9)
+            shape.visual = trimesh.visual.TextureVisuals(uv=shape.visual.uv, material=dull)
+    return robot
+
+
+def _joint(name: str, lower: float | None, upper: float | None) -> Joint:
+    low, high = lower if lower is not None else 0.0, upper if upper is not None else np.pi
+    return Joint(name, float(low), float(high), float(min(max(0.0, low), high)))
+
+
+_MODES = {"cloud": View._show_scan, "candidate": View._show_candidate, "aligned": View._show_aligned, "scene": View._show_scene}

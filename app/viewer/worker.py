@@ -1,0 +1,95 @@
+"""The viewer's process: `python -m app.viewer.worker`, one viser server per open project, commanded by JSON lines.
+
+Reads {"id", "cmd": "open" | "show" | "joints" | "close", "project", …} and prints {"id", "ok": {…}} or {"id", "error": {…}}.
+The first line is the key that the app's proxy will show. End of input ends it.
+"""
+
+import json
+import sys
+import traceback
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from app.viewer import contract
+from app.viewer.scene import View
+from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.workspace import Workspace
+
+AMBIENT = 1.6  # textures carry the room's light already: shown darker than the scan beside them, they look wrong
+
+
+def main() -> int:
+    """Answer commands until the input ends."""
+    key = json.loads(sys.stdin.readline())["key"]
+    views: dict[str, View] = {}
+    for line in sys.stdin:
+        command = json.loads(line)
+        try:
+            answer: dict[str, Any] = {"ok": _COMMANDS[command["cmd"]](views, key, command)}
+        except R2C2RError as error:
+            answer = {"error": {"kind": type(error).__name__, "message": error.message, "hint": error.hint}}
+        except Exception as error:  # one wish must not end the view of everybody
+            traceback.print_exc()
+            answer = {"error": {"kind": "internal", "message": f"unexpected: {error}", "hint": "see the viewer's log"}}
+        sys.stdout.write(json.dumps({"id": command["id"], **answer}) + "\n")
+        sys.stdout.flush()
+    for view in views.values():
+        view.server.stop()
+    return 0
+
+
+def _open(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    project = command["project"]
+    if project not in views:
+        views[project] = View(_prepared(contract.open_server(key)), Workspace(Path(command["workdir"])))
+    return {"port": views[project].server.get_port()}
+
+
+def _show(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    view = _view(views, command)
+    view.show(command)
+    return _state(view)
+
+
+def _joints(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    view = _view(views, command)
+    view.move(command["values"])
+    return _state(view)
+
+
+def _close(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    view = views.pop(command["project"], None)
+    if view is not None:
+        view.server.stop()
+    return {}
+
+
+def _view(views: dict[str, View], command: dict[str, Any]) -> View:
+    if command["project"] not in views:
+        raise InputError("the 3D view of this project is not open", hint="open it first")
+    return views[command["project"]]
+
+
+def _state(view: View) -> dict[str, Any]:
+    return {"mode": view.mode, "text": view.text, "joints": [asdict(joint) for joint in view.joints]}
+
+
+def _prepared(server: Any) -> Any:
+    server.scene.set_up_direction("+z")
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=AMBIENT)
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+_COMMANDS: dict[str, Callable[[dict[str, View], str, dict[str, Any]], dict[str, Any]]] = {
+    "open": _open,
+    "show": _show,
+    "joints": _joints,
+    "close": _close,
+}
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,290 @@
+"""Poses worth trying: the mesh's box axes laid onto the object's, in all ways a box can be turned."""
+
+from dataclasses import dataclass
+from itertools import permutations, product
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.align.judge import face_depth
+from r2c2r_core.align.observe import Observation, View, mask_box
+from r2c2r_core.align.shape import Shape
+from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.registration import umeyama_batch
+from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z, rotation_between
+from r2c2r_core.model.track import MaskTrack
+
+
+class Hypothesis(NamedTuple):
+    """A pose of the mesh and where it came from."""
+
+    pose: Similarity3  # world_from_mesh
+    up_mesh: Vector3 | None  # the mesh direction that should be vertical
+    source: str  # "box" or "features"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Extents:
+    """The object's box in a gravity-aligned frame; axes where `known` is False were not seen from both sides."""
+
+    world_from_axes: Matrix3  # columns: right, into, up
+    low: Vector3  # along those axes, in metres from the world's origin
+    high: Vector3
+    known: np.ndarray  # (3,) bool
+    towards: Vector3  # mean direction to the cameras, in those axes
+
+    @property
+    def size(self) -> Vector3:
+        """Side lengths."""
+        return np.asarray(self.high - self.low)
+
+
+def box_hypotheses(shape: Shape, observation: Observation, track: MaskTrack, room_yaw_rad: float) -> list[Hypothesis]:
+    """All turns of the mesh's box onto the measured boxes, with the scales their sides suggest.
+
+    Gravity fixes the world's up, not the mesh's: a mesh comes in an arbitrary frame, so each of its box directions may
+    be up. Furniture shares its front's axes (24 turns); a free-standing thing may face anywhere (15 degree steps).
+    """
+    boxes = measured_extents(observation, track, room_yaw_rad)
+    found: list[Hypothesis] = []
+    for box in boxes:
+        turns = _turns(shape, box, free_yaw=track.kind == "thing")
+        for rotation, up in turns:
+            found.extend(Hypothesis(pose, up, "box") for pose in _scaled(shape, rotation, box, track))
+        if track.kind != "front" and box is boxes[0]:
+            found.extend(_by_outline(shape, turns, observation.views))
+    return found
+
+
+def signed_permutations() -> list[Matrix3]:
+    """The 24 rotations of a cube (the paper's eq. 11-12 mean these: no reflections)."""
+    turns = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            if np.linalg.det(matrix) > 0:
+                turns.append(matrix)
+    return turns
+
+
+def measured_extents(observation: Observation, track: MaskTrack, room_yaw_rad: float) -> list[Extents]:
+    """The object's box as the segmenter measured it and as the visible points suggest it."""
+    boxes = []
+    if track.front is not None:
+        front = track.front
+        rotation = front.world_from_front.rotation
+        low, high = _span(observation, rotation)
+        centre = rotation.T @ front.world_from_front.translation
+        half = np.array([front.width_m / 2, 0.0, front.height_m / 2])
+        known = np.array([True, False, True])
+        low = np.where(known, centre - half, np.minimum(low, centre))
+        high = np.where(known, centre + half, np.maximum(high, centre))
+        boxes.append(_extents(observation, rotation, low, high, known))
+    if track.box is not None and track.kind != "front":
+        rotation = track.box.world_from_object.rotation
+        centre, half = rotation.T @ track.box.world_from_object.translation, track.box.dimensions_m / 2
+        boxes.append(_extents(observation, rotation, centre - half, centre + half, np.ones(3, dtype=bool)))
+    if track.kind != "front" or not boxes:
+        for rotation in (_plan_axes(observation), rotation_about_z(room_yaw_rad)):
+            if len(observation.points_world) >= 30:
+                low, high = _span(observation, rotation)
+                boxes.append(_extents(observation, rotation, low, high, np.ones(3, dtype=bool)))
+    return _distinct(boxes)
+
+
+def settle(
+    hypotheses: list[Hypothesis], shape: Shape, observation: Observation, keep: int, *, outlines: bool
+) -> list[Hypothesis]:
+    """Let all hypotheses slide onto the points together (few points, closest-point steps), and keep the best fitting.
+
+    With `outlines` the boxes around the masks count too: they know the size where depth is missing.
+    """
+    points = observation.points_world
+    if len(points) < 30 or not hypotheses:
+        return hypotheses[:keep]
+    sample = points[np.linspace(0, len(points) - 1, min(160, len(points))).astype(np.int64)]
+    scales = np.array([h.pose.scale for h in hypotheses])
+    rotations = np.stack([h.pose.rotation for h in hypotheses])
+    shifts = np.stack([h.pose.translation for h in hypotheses])
+    first_scales, gate = scales.copy(), 0.12 * observation.size_m
+    distance = np.zeros((len(scales), len(sample)))
+    for step in range(6):
+        local = np.einsum("kji,knj->kni", rotations, sample[None] - shifts[:, None]) / scales[:, None, None]
+        raw, nearest = shape.tree.query(local.reshape(-1, 3))
+        distance = raw.reshape(distance.shape) * scales[:, None]
+        if step == 5:
+            break
+        matched = shape.points[nearest].reshape(local.shape)
+        weight = 1.0 / (1.0 + (distance / gate) ** 2) ** 2
+        target = np.broadcast_to(sample[None], matched.shape)
+        scales, rotations, shifts = umeyama_batch(matched, target, weight)
+        bounded = np.clip(scales, 0.8 * first_scales, 1.25 * first_scales)
+        centre = np.einsum("kn,knj->kj", weight / weight.sum(axis=1, keepdims=True), matched)
+        turned = np.einsum("kij,kj->ki", rotations, centre)
+        shifts = shifts + (scales - bounded)[:, None] * turned
+        scales, gate = bounded, max(0.7 * gate, 0.02 * observation.size_m)
+    cost = np.minimum(distance / (0.1 * observation.size_m), 1.0).mean(axis=1)
+    if outlines:
+        cost = cost + _outline_misfit(shape, scales, rotations, shifts, observation.views)
+    order = np.argsort(cost, kind="stable")
+    kept: list[int] = []
+    for k in order:
+        if len(kept) == keep:
+            break
+        if all(not _same(scales, rotations, int(k), j) for j in kept):
+            kept.append(int(k))
+    return [Hypothesis(Similarity3(float(scales[k]), rotations[k], shifts[k]), hypotheses[k].up_mesh, "box") for k in kept]
+
+
+def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple[View, ...]) -> list[Hypothesis]:
+    """The turns at the size and place that the masks' boxes alone suggest, where the views agree on them."""
+    boxes = np.array([mask_box(v) for v in views])
+    eyes = np.array([v.world_from_camera.translation for v in views])
+    middle = np.column_stack([(boxes[:, 0] + boxes[:, 2]) / 2, (boxes[:, 1] + boxes[:, 3]) / 2, np.ones(len(views))])
+    rays = np.stack([v.world_from_camera.rotation @ m for v, m in zip(views, middle, strict=True)])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    across = np.eye(3)[None] - rays[:, :, None] * rays[:, None, :]
+    normal = across.sum(axis=0)
+    if np.linalg.cond(normal) > 300.0:  # all views from one side: the distance stays open
+        return []
+    centre = np.linalg.solve(normal, (across @ eyes[:, :, None]).sum(axis=0)[:, 0])
+    distance = np.linalg.norm(eyes - centre, axis=1)
+    sample = shape.points[:: max(len(shape.points) // 250, 1)]
+    found = []
+    for rotation, up in turns:
+        turned = sample @ rotation.T
+        seen = np.stack([turned @ v.world_from_camera.rotation[:, :2] for v in views])  # (views, n, 2)
+        spread = np.ptp(seen, axis=1)
+        ratio = np.log((boxes[:, 2:] - boxes[:, :2]) * distance[:, None] / np.maximum(spread, 1e-9))
+        if np.median(np.abs(ratio - np.median(ratio))) < 0.1:
+            scale = float(np.exp(np.median(ratio)))
+            pivot = (turned.min(axis=0) + turned.max(axis=0)) / 2
+            found.append(Hypothesis(Similarity3(scale, rotation, centre - scale * pivot), up, "box"))
+    return found
+
+
+def _outline_misfit(
+    shape: Shape, scales: np.ndarray, rotations: np.ndarray, shifts: np.ndarray, views: tuple[View, ...]
+) -> np.ndarray:
+    """1 less the mean overlap of the placed samples' box with the mask's box, per hypothesis."""
+    sample = shape.points[:: max(len(shape.points) // 200, 1)]
+    world = scales[:, None, None] * (sample @ rotations.transpose(0, 2, 1)) + shifts[:, None]
+    overlap = np.zeros(len(scales))
+    for view in views:
+        camera = (world - view.world_from_camera.translation) @ view.world_from_camera.rotation
+        uv = camera[..., :2] / np.maximum(camera[..., 2:], 0.05)
+        limit = view.camera.cx / view.camera.fx
+        low, high = np.clip(uv.min(axis=1), -limit, limit), np.clip(uv.max(axis=1), -limit, limit)
+        box = mask_box(view)
+        common = np.maximum(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0).prod(axis=1)
+        union = (high - low).prod(axis=1) + (box[2:] - box[:2]).prod() - common
+        overlap += common / np.maximum(union, 1e-12)
+    return np.asarray(1.0 - overlap / max(len(views), 1))
+
+
+def _same(scales: np.ndarray, rotations: np.ndarray, a: int, b: int) -> bool:
+    """Whether two settled hypotheses will end in the same place."""
+    turn = np.trace(rotations[a].T @ rotations[b])
+    close = turn > 1.0 + 2.0 * np.cos(np.radians(7))
+    return bool(close and abs(np.log(scales[a] / scales[b])) < 0.04)
+
+
+def _turns(shape: Shape, box: Extents, *, free_yaw: bool) -> list[tuple[Matrix3, Vector3]]:
+    """Rotations world_from_mesh to try, each with the mesh direction it makes vertical."""
+    if not free_yaw:
+        return [
+            (box.world_from_axes @ turn @ frame.T, (turn @ frame.T).T @ np.array([0.0, 0.0, 1.0]))
+            for frame in shape.frames[:2]
+            for turn in signed_permutations()
+        ]
+    turns = []
+    for up in shape.ups:
+        upright = rotation_between(up, np.array([0.0, 0.0, 1.0]))
+        sides = shape.frames[0] - np.outer(up, up @ shape.frames[0])
+        side = upright @ sides[:, int(np.argmax(np.linalg.norm(sides, axis=0)))]
+        first = float(np.arctan2(box.world_from_axes[1, 0], box.world_from_axes[0, 0]) - np.arctan2(side[1], side[0]))
+        turns += [(rotation_about_z(first + np.radians(15) * k) @ upright, up) for k in range(24)]
+    return turns
+
+
+def _scaled(shape: Shape, rotation: Matrix3, box: Extents, track: MaskTrack) -> list[Similarity3]:
+    """The turned mesh at the scales its visible sides suggest, standing where the box stands."""
+    turned = shape.points[::3] @ rotation.T @ box.world_from_axes
+    low, high = np.quantile(turned, 0.005, axis=0), np.quantile(turned, 0.995, axis=0)
+    ratio = box.size / np.maximum(high - low, 1e-9)
+    if not box.known[1]:
+        pair = ratio[[0, 2]]
+        if pair.max() / pair.min() > 1.4:
+            return []
+        scales = [float(np.sqrt(pair.prod()))]
+    else:
+        scales = _distinct_scales([float(np.median(ratio)), float(ratio[2]), float(ratio.max())], ratio)
+    return [_stand(shape, rotation, scale, low, high, box, track) for scale in scales]
+
+
+def _distinct_scales(scales: list[float], ratio: np.ndarray) -> list[float]:
+    """Scales that differ by 6 % and leave no visible side far longer than the mesh's."""
+    kept: list[float] = []
+    for scale in scales:
+        if ratio.max() / scale < 1.35 and all(abs(np.log(scale / k)) > 0.06 for k in kept):
+            kept.append(scale)
+    return kept
+
+
+def _stand(
+    shape: Shape, rotation: Matrix3, scale: float, low: Vector3, high: Vector3, box: Extents, track: MaskTrack
+) -> Similarity3:
+    """Put the side that faces the cameras where the box has it; the middle where neither side does."""
+    facing = np.where(np.abs(box.towards) > 0.45, np.sign(box.towards), 0.0)
+    facing[box.known & (np.abs(scale * (high - low) - box.size) < 0.06 * box.size)] = 0.0
+    mesh_anchor = scale * ((low + high) / 2 + facing * (high - low) / 2)
+    box_anchor = (box.low + box.high) / 2 + facing * box.size / 2
+    pose = Similarity3(scale, rotation, box.world_from_axes @ (box_anchor - mesh_anchor))
+    if track.front is None or box.known[1]:
+        return pose
+    shift = -face_depth(pose, shape, track.front)
+    return Similarity3(scale, rotation, pose.translation + shift * track.front.world_from_front.rotation[:, 1])
+
+
+def _extents(observation: Observation, rotation: Matrix3, low: Vector3, high: Vector3, known: np.ndarray) -> Extents:
+    """With the mean direction towards the cameras."""
+    cameras = np.array([v.world_from_camera.translation for v in observation.views]) - observation.centre_world
+    towards = (cameras / np.linalg.norm(cameras, axis=1, keepdims=True)).mean(axis=0) @ rotation
+    return Extents(world_from_axes=rotation, low=low, high=high, known=known, towards=towards)
+
+
+def _span(observation: Observation, rotation: Matrix3) -> tuple[Vector3, Vector3]:
+    """Low and high of the visible points along the axes, without the outermost percent."""
+    points = observation.points_world @ rotation
+    if not len(points):
+        return np.full(3, np.inf), np.full(3, -np.inf)
+    return np.quantile(points, 0.01, axis=0), np.quantile(points, 0.99, axis=0)
+
+
+def _plan_axes(observation: Observation) -> Matrix3:
+    """Axes of the tightest upright box around the visible points."""
+    angles = np.radians(np.arange(0, 90, 3))
+    areas = []
+    for angle in angles:
+        low, high = _span(observation, rotation_about_z(float(angle)))
+        areas.append(float(np.prod(high[:2] - low[:2])))
+    return rotation_about_z(float(angles[int(np.argmin(areas))]))
+
+
+def _distinct(boxes: list[Extents]) -> list[Extents]:
+    """Boxes whose yaw or size differ: 5 degrees (modulo a quarter turn) or 10 % of a side."""
+    kept: list[Extents] = []
+    for box in boxes:
+        if all(_differs(box, k) for k in kept):
+            kept.append(box)
+    return kept[:3]
+
+
+def _differs(a: Extents, b: Extents) -> bool:
+    relative = np.abs(a.world_from_axes.T @ b.world_from_axes)[:2, :2]
+    turned = relative.max(axis=1).min() < np.cos(np.radians(5))
+    same_order = relative[0, 0] > relative[0, 1]
+    size = b.size if same_order else b.size[[1, 0, 2]]
+    resized = (np.abs(np.log(np.maximum(a.size, 1e-3) / np.maximum(size, 1e-3))) > 0.1).any()
+    return bool(turned or resized)

@@ -1,0 +1,265 @@
+"""Fine registration: observed points onto the model, silhouettes onto the masks, uprightness (mends paper eq. 7 and its ICP).
+
+Closest points alone let a flat front slide in its plane, so mask outlines (and the measured panel's edges) hold it there.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.align.judge import behind_face, face_depth, render_pose
+from r2c2r_core.align.observe import Observation, View
+from r2c2r_core.align.shape import Shape
+from r2c2r_core.arrays import Matrix3, Points, Vector3
+from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.model.track import FrontPanel, MaskTrack
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Anchors:
+    """What is known besides points and masks."""
+
+    up_mesh: Vector3 | None  # should be vertical
+    up_weight: float  # 0..1
+    front: FrontPanel | None
+    support_z_m: float | None
+
+
+class Rows(NamedTuple):
+    """Linearised residuals: `jacobian` (n, 7) over turn, shift, log scale; residuals in the unit of `weight` ** -0.5."""
+
+    jacobian: np.ndarray
+    residual: np.ndarray
+    weight: np.ndarray
+
+
+def refine(
+    pose: Similarity3,
+    shape: Shape,
+    observation: Observation,
+    anchors: Anchors,
+    *,
+    free_scale: bool,
+    iterations: int,
+    loose: float,
+) -> Similarity3:
+    """Damped Gauss-Newton over turn, shift and (when free) scale; gates shrink from `loose` (a share of the size) on."""
+    gate = loose * observation.size_m
+    for _ in range(iterations):
+        pivot = _pivot(pose, shape)
+        rows = [
+            point_rows(pose, shape, observation, pivot, gate),
+            outline_rows(pose, shape, observation.views, anchors.front, pivot, gate),
+            anchor_rows(pose, shape, anchors, pivot),
+        ]
+        step = _solve(rows, observation.size_m, free_scale)
+        pose = _moved(pose, step, pivot)
+        gate = max(0.75 * gate, 0.012 * observation.size_m, 0.006)
+    return pose
+
+
+def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anchors:
+    """What holds for this kind of object."""
+    box_axis = up_mesh is not None and float(np.abs(shape.frames[0].T @ up_mesh).max()) > np.cos(np.radians(3))
+    strength = 1.0 if track.kind != "thing" else 0.3
+    return Anchors(
+        up_mesh=up_mesh,
+        up_weight=strength if box_axis else 0.1,
+        front=track.front if track.kind == "front" else None,
+        support_z_m=track.box.support_z_m if track.box is not None and track.kind == "thing" else None,
+    )
+
+
+def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot: Vector3, gate: float) -> Rows:
+    """Each observed point to the tangent plane of the nearest mesh point that faces the cameras."""
+    observed = observation.points_world
+    if not len(observed):
+        return _no_rows()
+    _, nearest = shape.tree.query(pose.inverse.apply(observed))
+    placed = pose.apply(shape.points[nearest])
+    normals = shape.normals[nearest] @ pose.rotation.T
+    residual = np.einsum("nj,nj->n", normals, placed - observed)
+    apart = np.linalg.norm(placed - observed, axis=1)
+    weight = 1.0 / (1.0 + (apart / gate) ** 2) ** 2 / observation.noise_m**2
+    if shape.oriented:
+        weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < -0.1] = 0.0
+    # Depth errors are correlated: thousands of points carry the information of some hundreds.
+    weight *= 800.0 / len(observed)
+    return Rows(_jacobian(placed - pivot, normals), residual, weight)
+
+
+def outline_rows(
+    pose: Similarity3, shape: Shape, views: tuple[View, ...], front: FrontPanel | None, pivot: Vector3, gate: float
+) -> Rows:
+    """Each silhouette pixel of the placed mesh to the mask's outline, in metres across the line of sight."""
+    vertices = pose.apply(shape.vertices)
+    behind = behind_face(pose, shape, vertices, front)
+    parts = [_outline_of_view(shape, vertices, behind, view, pivot, gate) for view in views]
+    parts = [p for p in parts if len(p.residual)]
+    if not parts:
+        return _no_rows()
+    total = sum(len(p.residual) for p in parts)
+    joined = Rows(*(np.concatenate([getattr(p, name) for p in parts]) for name in Rows._fields))
+    return joined._replace(weight=joined.weight * min(200.0 / total, 1.0))
+
+
+def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector3) -> Rows:
+    """Uprightness, the measured panel's edges and direction, and the height of what the thing stands on."""
+    rows: list[tuple[np.ndarray, float, float]] = []
+    if anchors.up_mesh is not None:
+        up = pose.rotation @ anchors.up_mesh
+        weight = 100.0 * anchors.up_weight / np.radians(1.0) ** 2
+        rows += [(_turn_row(up, axis), float(up @ axis), weight) for axis in np.eye(3)[:2]]
+    if anchors.front is not None:
+        rows += _panel_rows(pose, shape, anchors.front, pivot)
+    if anchors.support_z_m is not None:
+        placed = pose.apply(shape.vertices)
+        lowest = placed[int(np.argmin(placed[:, 2]))]
+        gap = float(lowest[2] - anchors.support_z_m)
+        if abs(gap) < 0.03:
+            up_axis = np.array([[0.0, 0.0, 1.0]])
+            rows.append((_jacobian((lowest - pivot)[None], up_axis)[0], gap, 40.0 / 0.008**2))
+    if not rows:
+        return _no_rows()
+    return Rows(np.stack([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
+
+
+def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
+    """Largest over smallest eigenvalue of the points' normal matrix in turn and shift: large = the surface slides."""
+    rows = point_rows(pose, shape, observation, _pivot(pose, shape), 0.05 * observation.size_m)
+    if len(rows.residual) < 6:
+        return 1e9
+    scaled = rows.jacobian[:, :6] / np.array([0.5 * observation.size_m] * 3 + [1.0] * 3)
+    values = np.linalg.eigvalsh((scaled * rows.weight[:, None]).T @ scaled)
+    return float(min(values[-1] / max(values[0], 1e-12 * values[-1]), 1e9))
+
+
+def surface_distance(pose: Similarity3, shape: Shape, points_world: Points) -> np.ndarray:
+    """Distance of points to the placed surface, metres; the spacing of the samples it is known by is allowed for."""
+    local = pose.inverse.apply(points_world)
+    distance, nearest = shape.tree.query(local)
+    away = np.abs(np.einsum("nj,nj->n", shape.normals[nearest], local - shape.points[nearest]))
+    spacing = _spacing(shape)
+    along = np.sqrt(np.maximum(distance**2 - away**2, 0.0))
+    return np.asarray(np.hypot(away, np.maximum(along - 1.5 * spacing, 0.0)) * pose.scale)
+
+
+def _spacing(shape: Shape) -> float:
+    """Typical distance between neighbouring samples, in the mesh's unit."""
+    distance, _ = shape.tree.query(shape.points[:: max(len(shape.points) // 300, 1)], k=2)
+    return float(np.median(distance[:, 1]) * 2.0)
+
+
+def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: View, pivot: Vector3, gate: float) -> Rows:
+    """Silhouette residuals of one view."""
+    rendered = render_pose(shape, vertices, behind, view)
+    rim = rendered.own & ~ndimage.binary_erosion(rendered.own, border_value=1)
+    beside_hidden = ndimage.binary_dilation(rendered.hidden | _nearer(view, rendered.depth_m), iterations=2)
+    rows, columns = np.nonzero(rim & view.trusted & view.inside & ~beside_hidden)
+    if len(rows) < 4:
+        return _no_rows()
+    depth = rendered.depth_m[rows, columns].astype(np.float64)
+    metres_per_px = depth / view.camera.fx
+    residual = (view.signed_px[rows, columns] + 0.5) * metres_per_px
+    smooth = ndimage.gaussian_filter(view.signed_px, 1.0)
+    slope_v, slope_u = np.gradient(smooth)
+    g = np.stack([slope_u[rows, columns], slope_v[rows, columns]], axis=1)
+    length = np.linalg.norm(g, axis=1)
+    usable = length > 0.3
+    x = (columns + 0.5 - view.camera.cx) / view.camera.fx
+    y = (rows + 0.5 - view.camera.cy) / view.camera.fy
+    points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
+    direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1) / np.maximum(length, 1e-6)[:, None]
+    weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
+    return Rows(_jacobian(points - pivot, view.world_from_camera.turn(direction)), residual, weight)
+
+
+def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
+    """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
+    grown = ndimage.maximum_filter(rendered_depth, size=5)
+    return np.asarray(
+        (rendered_depth == 0) & (grown > 0) & ~view.mask & (view.depth_m > 0) & (view.depth_m < grown - 0.04 - 0.02 * grown)
+    )
+
+
+def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vector3) -> list[tuple[np.ndarray, float, float]]:
+    """The mesh's front face to the measured rectangle: four edges, and the facing direction."""
+    to_front = front.world_from_front.inverse
+    axes = front.world_from_front.rotation
+    local = to_front.apply(pose.apply(shape.points))
+    depth = face_depth(pose, shape, front)
+    facing = to_front.turn(shape.normals @ pose.rotation.T)[:, 1] < -0.85
+    face = local[facing & (np.abs(local[:, 1] - depth) < 0.012)]
+    if len(face) < 50:
+        return []
+    trust = 60.0 * max(front.confidence, 0.1)
+    rows = []
+    for axis, size in ((0, front.width_m), (2, front.height_m)):
+        inner_low, inner_high = np.quantile(face[:, axis], [0.01, 0.99])
+        overhang = 0.01 / 0.98 * (inner_high - inner_low)  # what the quantiles cut from an evenly sampled face
+        for edge, wanted in ((inner_low - overhang, -size / 2), (inner_high + overhang, size / 2)):
+            middle = np.median(face, axis=0)
+            middle[axis] = edge
+            point = front.world_from_front.apply(middle[None])[0]
+            rows.append((_jacobian((point - pivot)[None], axes[:, axis][None])[0], float(edge - wanted), trust / 0.005**2))
+    outward = pose.rotation @ _nearest_axis(shape, pose.rotation.T @ -axes[:, 1])
+    if outward @ -axes[:, 1] > np.cos(np.radians(8)):
+        rows += [(_turn_row(outward, axes[:, k]), float(outward @ axes[:, k]), trust / np.radians(1.0) ** 2) for k in (0, 2)]
+    return rows
+
+
+def _nearest_axis(shape: Shape, direction: Vector3) -> Vector3:
+    """The box axis of the mesh nearest to a direction, signed along it."""
+    along = shape.frames[0].T @ direction
+    k = int(np.argmax(np.abs(along)))
+    return np.asarray(shape.frames[0][:, k] * np.sign(along[k]))
+
+
+def _turn_row(direction: Vector3, axis: Vector3) -> np.ndarray:
+    """How `direction @ axis` changes with a turn of `direction`."""
+    return np.concatenate([np.cross(direction, axis), np.zeros(4)])
+
+
+def _jacobian(arms: Points, directions: Points) -> np.ndarray:
+    """How points at `arms` from the pivot move along `directions`, by turn (rad), shift (m) and log scale."""
+    return np.column_stack([np.cross(arms, directions), directions, np.einsum("nj,nj->n", arms, directions)])
+
+
+def _no_rows() -> Rows:
+    return Rows(np.zeros((0, 7)), np.zeros(0), np.zeros(0))
+
+
+def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
+    """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
+    normal, right = np.zeros((7, 7)), np.zeros(7)
+    for part in rows:
+        weighted = part.jacobian * part.weight[:, None]
+        normal += weighted.T @ part.jacobian
+        right -= weighted.T @ part.residual
+    unit = np.array([2.0 / max(size_m, 1e-3)] * 3 + [1.0] * 3 + [2.0 / max(size_m, 1e-3)])  # a metre at the rim
+    scaled = normal * np.outer(unit, unit)
+    # One observation of half a size stops directions that nothing holds.
+    scaled += np.eye(7) * (1e-6 * np.trace(scaled) / 7 + 4.0 / max(size_m, 1e-3) ** 2)
+    if not free_scale:
+        scaled[6, :], scaled[:, 6] = 0.0, 0.0
+        scaled[6, 6] = 1.0
+        right[6] = 0.0
+    step = unit * np.linalg.solve(scaled, unit * right)
+    limits = np.array([np.radians(6)] * 3 + [0.1 * size_m] * 3 + [0.08])
+    return np.asarray(step / max(1.0, float((np.abs(step) / limits).max())))
+
+
+def _moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
+    """The pose after a step about the pivot."""
+    turn: Matrix3 = Rotation.from_rotvec(step[:3]).as_matrix()
+    grow = float(np.exp(step[6]))
+    translation = grow * turn @ (pose.translation - pivot) + pivot + step[3:6]
+    return Similarity3(pose.scale * grow, turn @ pose.rotation, translation)
+
+
+def _pivot(pose: Similarity3, shape: Shape) -> Vector3:
+    """The middle of the placed mesh."""
+    return np.asarray(pose.apply(((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2)[None])[0])

@@ -1,0 +1,40 @@
+"""SIFT keypoints with RootSIFT descriptors (Arandjelović and Zisserman 2012), ratio and mutual test."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.align.protocol import Features, Matches
+from r2c2r_core.arrays import Image, Mask
+
+
+class SiftMatcher:
+    """The weight-free matcher."""
+
+    def __init__(self, *, keypoints: int = 250, ratio: float = 0.85, contrast: float = 0.02) -> None:
+        self._ratio = ratio
+        self._sift = cv2.SIFT_create(nfeatures=keypoints, contrastThreshold=contrast)  # type: ignore[attr-defined]
+
+    def describe(self, image: Image, mask: Mask) -> Features:
+        """Keypoints of `image` inside `mask`."""
+        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+        found, descriptors = self._sift.detectAndCompute(grey, mask.astype(np.uint8) * 255)
+        if descriptors is None or not len(found):
+            return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
+        root = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-6))
+        return Features(np.array([k.pt for k in found], dtype=np.float64) + 0.5, root.astype(np.float32))
+
+    def match(self, first: Features, second: Features) -> Matches:
+        """Pairs that are each other's best and clearly better than the second best."""
+        if len(first.uv_px) < 2 or len(second.uv_px) < 2:
+            return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64))
+        likeness = first.descriptors @ second.descriptors.T  # of unit vectors: distance^2 = 2 - 2 * likeness
+        best = likeness.argmax(axis=1)
+        rows = np.arange(len(best))
+        top = likeness[rows, best]
+        likeness[rows, best] = -1.0
+        runner_up = likeness.max(axis=1)
+        likeness[rows, best] = top
+        clear = (1.0 - top) < self._ratio**2 * (1.0 - runner_up)
+        mutual = likeness.argmax(axis=0)[best] == rows
+        chosen = np.flatnonzero(clear & mutual)
+        return Matches(chosen, best[chosen])

@@ -1,0 +1,292 @@
+"""Place a candidate of unknown pose and scale in the scan (paper §4.3, mended by method.md rows 1-7).
+
+Geometry proposes (all turns of the mesh's box onto the measured box), features add proposals, and one score decides:
+rendered masks, depth and colours against the photos. Nothing but the mesh's surface and texture is used of the asset.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.align.hypotheses import Hypothesis, box_hypotheses, settle
+from r2c2r_core.align.judge import Judgement, judge
+from r2c2r_core.align.lift import Lifted
+from r2c2r_core.align.observe import Observation, View, known_corners, look_at, observe
+from r2c2r_core.align.protocol import MATCHERS, Matcher
+from r2c2r_core.align.refine import anchors_for, point_condition, refine, surface_distance
+from r2c2r_core.align.render import render_views
+from r2c2r_core.align.shape import Shape, prepare_shape
+from r2c2r_core.align.voting import Votes, inliers_of, match_views, vote
+from r2c2r_core.errors import PlacementFailed
+from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignConfig:
+    """Sizes of the search. Pixel sizes are of our own small views, not of a camera."""
+
+    views: int = 9  # photos compared
+    view_px: int = 128
+    match_photos: int = 6
+    match_views: int = 100  # rendered views (the authors': 200)
+    match_px: int = 200
+    points: int = 1600  # observed points kept
+    surface_points: int = 8000  # samples of the mesh
+    face_limit: int = 6000
+    settled: int = 36  # hypotheses rendered and compared
+    refined: int = 8  # of them refined
+    least_iou: float = 0.2  # below it nothing is trustworthy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trial:
+    """A hypothesis with its score."""
+
+    hypothesis: Hypothesis
+    judgement: Judgement
+
+
+def place_mesh(
+    capture: Capture,
+    track: MaskTrack,
+    asset: MeshAsset,
+    matcher: str,
+    config: AlignConfig,
+    *,
+    seed: int = 0,
+    progress: Progress = SILENT,
+) -> Placement:
+    """The similarity that takes the candidate's frame to the world, with its evidence; raises PlacementFailed."""
+    rng = np.random.default_rng(seed)
+    progress.at(0.0, f"{asset.object_name}: gathering views")
+    observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
+    _require_evidence(observation, track)
+    shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
+    progress.at(0.15, f"{asset.object_name}: matching keypoints")
+    lifted = _match(capture, track, asset.mesh, observation, MATCHERS.load(matcher), config)
+    scale_range = _scale_range(shape, observation)
+    votes = vote(lifted, shape.diameter, scale_range, rng)
+    progress.at(0.5, f"{asset.object_name}: trying poses")
+    boxes = box_hypotheses(shape, observation, track, capture.room.manhattan_yaw_rad)
+    proposals = settle(boxes, shape, observation, config.settled, outlines=track.kind != "front")
+    proposals += [Hypothesis(pose, _upright_axis(shape, pose), "features") for pose in votes.hypotheses]
+    trials = _try(proposals, shape, observation, track, scale_range, config, progress.part(0.55, 0.95))
+    if not trials:
+        raise PlacementFailed(
+            f"{asset.object_name}: no pose of {asset.candidate_id} fits the visible size",
+            hint="choose another candidate, or check the mask",
+        )
+    best = _finish(trials[0], shape, observation, track)
+    if best.judgement.iou < config.least_iou:
+        raise PlacementFailed(
+            f"{asset.object_name}: the best pose of {asset.candidate_id} covers the mask with IoU {best.judgement.iou:.2f}, "
+            f"{config.least_iou:.2f} needed",
+            hint="choose another candidate, or add a click on a frame that shows more of the object",
+        )
+    return _placement(best, trials, lifted, votes, shape, observation, track, asset, matcher)
+
+
+def _require_evidence(observation: Observation, track: MaskTrack) -> None:
+    """Raise where there is nothing to place against."""
+    if not observation.views:
+        raise PlacementFailed(f"{track.name}: no frame shows enough of the object", hint="add a click on a nearer frame")
+    if len(observation.points_world) < 30 and not len(known_corners(track)):
+        raise PlacementFailed(
+            f"{track.name}: {len(observation.points_world)} depth points inside the masks, 30 needed",
+            hint="film it from nearer, or click frames where its depth is measured",
+        )
+
+
+def _match(
+    capture: Capture, track: MaskTrack, mesh: TexturedMesh, observation: Observation, matcher: Matcher, config: AlignConfig
+) -> list[Lifted]:
+    """Matches between the photos and rendered views of the mesh, as points."""
+    photos = _larger_views(capture, track, observation, config)
+    renders, centre, radius = render_views(mesh, count=config.match_views, size_px=config.match_px)
+    features = [matcher.describe(r.image, r.depth > 0) for r in renders]
+    return match_views(photos, renders, features, matcher, centre, radius)
+
+
+def _larger_views(capture: Capture, track: MaskTrack, observation: Observation, config: AlignConfig) -> tuple[View, ...]:
+    """The views with the largest masks again, at the size keypoints need."""
+    order = sorted(observation.views, key=lambda v: -int(np.count_nonzero(v.mask)))[: config.match_photos]
+    return tuple(
+        look_at(capture, track, capture.frame(v.frame_index), observation.centre_world, config.match_px) for v in order
+    )
+
+
+def _scale_range(shape: Shape, observation: Observation) -> tuple[float, float]:
+    """Scales at which the mesh is as large as what is seen, to three times that (the rest may be hidden)."""
+    likely = observation.size_m / shape.diameter
+    return 0.65 * likely, 3.0 * likely
+
+
+def _upright_axis(shape: Shape, pose: Similarity3) -> np.ndarray | None:
+    """The mesh direction that a pose nearly makes vertical, if it is one the thing may stand along."""
+    up = pose.rotation.T @ np.array([0.0, 0.0, 1.0])
+    nearest = max(shape.ups, key=lambda u: float(u @ up))
+    return nearest if nearest @ up > np.cos(np.radians(15)) else None
+
+
+def _try(
+    proposals: list[Hypothesis],
+    shape: Shape,
+    observation: Observation,
+    track: MaskTrack,
+    scale_range: tuple[float, float],
+    config: AlignConfig,
+    progress: Progress,
+) -> list[Trial]:
+    """Render and compare all proposals in some views, refine the best different ones, and order them by score."""
+    front = track.front if track.kind == "front" else None
+    few = observation.views[::2] if len(observation.views) > 5 else observation.views
+    rough = []
+    for k, proposal in enumerate(proposals):
+        progress.at(0.5 * k / max(len(proposals), 1), f"{track.name}: pose {k + 1}/{len(proposals)}")
+        if scale_range[0] <= proposal.pose.scale <= scale_range[1]:
+            rough.append(Trial(hypothesis=proposal, judgement=judge(proposal.pose, shape, few, front)))
+    rough.sort(key=lambda t: -t.judgement.score)
+    trials = []
+    for k, trial in enumerate(_different(rough, 10.0)[: config.refined]):
+        progress.at(0.5 + 0.5 * k / config.refined, f"{track.name}: refining pose {k + 1}")
+        anchors = anchors_for(track, shape, trial.hypothesis.up_mesh)
+        pose = refine(trial.hypothesis.pose, shape, observation, anchors, free_scale=True, iterations=8, loose=0.06)
+        if scale_range[0] <= pose.scale <= scale_range[1]:
+            trials.append(
+                Trial(hypothesis=trial.hypothesis._replace(pose=pose), judgement=judge(pose, shape, observation.views, front))
+            )
+    return sorted(trials, key=lambda t: -t.judgement.score)
+
+
+def _different(trials: list[Trial], angle_deg: float) -> list[Trial]:
+    """The best of each group of poses that agree in rotation and scale."""
+    kept: list[Trial] = []
+    for trial in trials:
+        a = trial.hypothesis.pose
+        if all(
+            _angle_deg(a, k.hypothesis.pose) > angle_deg or abs(np.log(a.scale / k.hypothesis.pose.scale)) > 0.1 for k in kept
+        ):
+            kept.append(trial)
+    return kept
+
+
+def _finish(trial: Trial, shape: Shape, observation: Observation, track: MaskTrack) -> Trial:
+    """Joint refit with scale free, then closest points with scale frozen."""
+    anchors = anchors_for(track, shape, trial.hypothesis.up_mesh)
+    pose = refine(trial.hypothesis.pose, shape, observation, anchors, free_scale=True, iterations=10, loose=0.02)
+    pose = refine(pose, shape, observation, anchors, free_scale=False, iterations=4, loose=0.012)
+    judgement = judge(pose, shape, observation.views, anchors.front)
+    if judgement.score < trial.judgement.score - 0.01:
+        return trial
+    return Trial(hypothesis=trial.hypothesis._replace(pose=pose), judgement=judgement)
+
+
+def _placement(
+    best: Trial,
+    trials: list[Trial],
+    lifted: list[Lifted],
+    votes: Votes,
+    shape: Shape,
+    observation: Observation,
+    track: MaskTrack,
+    asset: MeshAsset,
+    matcher: str,
+) -> Placement:
+    """Gather the evidence for the chosen pose."""
+    pose = best.hypothesis.pose
+    rival = _rival(best, trials, shape)
+    rms = _rms(pose, shape, observation)
+    placement = Placement(
+        object_name=asset.object_name,
+        candidate_id=asset.candidate_id,
+        world_from_mesh=pose,
+        matches=sum(len(m.points_mesh) for m in lifted),
+        inliers=sum(
+            int(np.count_nonzero(inliers_of(pose, m.points_mesh, m.points_world, 3.0 * m.noise_m, shape.diameter)))
+            for m in lifted
+        ),
+        votes=votes.by_frame,
+        rms_m=rms,
+        mask_iou=best.judgement.iou,
+        condition=point_condition(pose, shape, observation),
+        unsure=rival is not None and _ties(best.judgement, rival.judgement),
+        runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
+        method=f"{best.hypothesis.source} + {matcher}",
+        warnings=(),
+    )
+    return replace(placement, warnings=_warnings(placement, best, observation))
+
+
+def _rms(pose: Similarity3, shape: Shape, observation: Observation) -> float:
+    """Root mean square distance of the observed points to the placed mesh, without the farthest tenth (mask leaks)."""
+    if not len(observation.points_world):
+        return float("nan")
+    distance = np.sort(surface_distance(pose, shape, observation.points_world))
+    return float(np.sqrt((distance[: max(int(0.9 * len(distance)), 1)] ** 2).mean()))
+
+
+def _rival(best: Trial, trials: list[Trial], shape: Shape) -> Trial | None:
+    """The best pose that is turned differently; a turn about the axis of a round thing is no difference."""
+    for trial in trials:
+        if _angle_deg(best.hypothesis.pose, trial.hypothesis.pose) < 20.0:
+            continue
+        if _looks_same(best.hypothesis.pose, trial.hypothesis.pose, shape):
+            continue
+        return trial
+    return None
+
+
+def _looks_same(a: Similarity3, b: Similarity3, shape: Shape) -> bool:
+    """Whether the turn between two poses is one of a continuous family that leaves the shape as it is (a bottle's yaw)."""
+    axis = Rotation.from_matrix(b.rotation.T @ a.rotation).as_rotvec()  # in the mesh frame
+    axis = axis / np.linalg.norm(axis)
+    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
+    sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
+    radius = float(np.median(np.linalg.norm(np.cross(sample, axis), axis=1)))
+    worst = 0.0
+    for angle in (0.4, 0.9, 1.7):
+        spin = Rotation.from_rotvec(angle * axis).as_matrix()
+        distance, _ = shape.tree.query(sample @ spin.T + middle)
+        worst = max(worst, float(np.quantile(distance, 0.9)))
+    return worst < 0.2 * radius  # a square's corners move by 0.3
+
+
+def _ties(best: Judgement, rival: Judgement) -> bool:
+    """Whether the two cannot be told apart: the scores are close, or close and not consistently ordered over views."""
+    gain = np.array([a.total - b.total for a, b in zip(best.views, rival.views, strict=True)])
+    mean = best.score - rival.score
+    if mean > 0.05:
+        return False
+    if mean < 0.003:
+        return True
+    spread = float(gain.std(ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
+    return bool(mean < 2.0 * spread)
+
+
+def _warnings(placement: Placement, best: Trial, observation: Observation) -> tuple[str, ...]:
+    """One line each, for a person."""
+    lines = []
+    if placement.mask_iou < 0.6:
+        lines.append(f"the placed mesh covers the masks poorly (IoU {placement.mask_iou:.2f})")
+    allowed = max(0.015, 0.03 * observation.size_m)
+    if not placement.rms_m <= allowed:
+        lines.append(f"scan and mesh are {placement.rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
+    if placement.unsure:
+        lines.append("another orientation fits about as well: check which side is the front")
+    if placement.condition > 30000:
+        lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")
+    if len(observation.views) < 3:
+        lines.append(f"only {len(observation.views)} frames show the object")
+    return tuple(lines)
+
+
+def _angle_deg(a: Similarity3, b: Similarity3) -> float:
+    """Angle between the rotations of two poses."""
+    cosine = (np.trace(a.rotation.T @ b.rotation) - 1) / 2
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))

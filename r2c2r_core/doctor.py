@@ -1,0 +1,106 @@
+"""`r2c2r doctor`: what this machine can do, and the command that mends what it cannot."""
+
+import ctypes.util
+import shutil
+import socket
+import sys
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal
+
+from r2c2r_core.registry import Registry
+
+OPEN3D_LIBRARIES = ("EGL", "GL", "X11", "usb-1.0", "udev", "idn2")
+"""Without any of these `import open3d` fails (measured by hiding each)."""
+OPEN3D_PACKAGES = "libegl1 libgl1 libx11-6 libusb-1.0-0 libudev1 libidn2-0"
+
+_LOW_DISK_BYTES = 5e9  # a 180-frame project takes about 1 GB
+
+
+@dataclass(frozen=True, slots=True)
+class MachineFinding:
+    """One line of the doctor's table."""
+
+    what: str
+    state: Literal["ok", "absent", "problem"]
+    detail: str
+
+    def to_json(self) -> dict[str, str]:
+        """As a JSON table."""
+        return asdict(self)
+
+
+def examine_machine(data_dir: Path) -> list[MachineFinding]:
+    """System libraries, backends with their licences, loaders, GPU, default port, free disk."""
+    return [
+        MachineFinding("python", "ok", sys.version.split()[0]),
+        _system_libraries(),
+        *_backends(),
+        *_loaders(),
+        _gpu(),
+        _port(8000),
+        _disk(data_dir),
+    ]
+
+
+def missing_libraries() -> list[str]:
+    """Libraries Open3D needs and this machine lacks."""
+    if not sys.platform.startswith("linux"):
+        return []
+    return [name for name in OPEN3D_LIBRARIES if ctypes.util.find_library(name) is None]
+
+
+def _system_libraries() -> MachineFinding:
+    missing = missing_libraries()
+    if missing:
+        detail = f"lacks {', '.join(missing)}: sudo apt-get install -y {OPEN3D_PACKAGES}"
+        return MachineFinding("system libraries", "problem", detail)
+    return MachineFinding("system libraries", "ok", "all that Open3D needs")
+
+
+def _backends() -> list[MachineFinding]:
+    from r2c2r_core.align.protocol import MATCHERS
+    from r2c2r_core.generate.stage import GENERATORS
+    from r2c2r_core.segment.stage import SEGMENTERS
+
+    registries: tuple[Registry, ...] = (SEGMENTERS, GENERATORS, MATCHERS)
+    findings = []
+    for registry in registries:
+        for backend in registry.backends:
+            ready, reason = registry.available(backend.name)
+            detail = f"{reason}; {backend.licence}"
+            findings.append(MachineFinding(f"{registry.seam} {backend.name}", "ok" if ready else "absent", detail))
+    return findings
+
+
+def _loaders() -> list[MachineFinding]:
+    findings = []
+    for package, hint in (("mujoco", ""), ("yourdfpy", ""), ("pybullet", "pip install 'r2c2r[bullet]'")):
+        try:
+            findings.append(MachineFinding(f"loader {package}", "ok", version(package)))
+        except PackageNotFoundError:
+            findings.append(MachineFinding(f"loader {package}", "absent", hint))
+    return findings
+
+
+def _gpu() -> MachineFinding:
+    driver = shutil.which("nvidia-smi")
+    return MachineFinding("gpu", "ok" if driver else "absent", driver or "none needed: every stage runs on the CPU")
+
+
+def _port(port: int) -> MachineFinding:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return MachineFinding(f"port {port}", "absent", "taken: use r2c2r serve --port")
+    return MachineFinding(f"port {port}", "ok", "free")
+
+
+def _disk(data_dir: Path) -> MachineFinding:
+    existing = next(folder for folder in (data_dir, *data_dir.parents) if folder.exists())
+    free = shutil.disk_usage(existing).free
+    state: Literal["ok", "problem"] = "ok" if free > _LOW_DISK_BYTES else "problem"
+    return MachineFinding("disk", state, f"{free / 1e9:.1f} GB free at {existing}")

@@ -1,0 +1,33 @@
+"""Where the object stands and how it is turned."""
+
+import numpy as np
+
+from r2c2r_core.evaluate.records import ObjectRecord
+from r2c2r_core.model.report import Metric
+
+
+def pose_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
+    """Distance of the box centres and of the front faces' centres in mm, and the yaw in degrees.
+
+    The front is reported apart because a built-in unit's back, and with it the centre, cannot be seen.
+    """
+    centre = found.world_from_object.translation - truth.world_from_object.translation
+    front = _front_centre(found) - _front_centre(truth)
+    return (
+        Metric(name="centre", value=1000 * float(np.linalg.norm(centre)), unit="mm", better="lower", tolerance=3.0),
+        Metric(name="front_centre", value=1000 * float(np.linalg.norm(front)), unit="mm", better="lower", tolerance=3.0),
+        _yaw(truth, found),
+    )
+
+
+def _front_centre(thing: ObjectRecord) -> np.ndarray:
+    half_depth = np.array([[0.0, -thing.dimensions_m[1] / 2, 0.0]])
+    return thing.world_from_object.apply(half_depth)[0]
+
+
+def _yaw(truth: ObjectRecord, found: ObjectRecord) -> Metric:
+    if truth.turns_freely:
+        return Metric(name="yaw", value=None, unit="deg", better="lower", tolerance=0.3, note="round about its vertical axis")
+    turn = truth.world_from_object.rotation.T @ found.world_from_object.rotation
+    yaw = abs(float(np.degrees(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))))
+    return Metric(name="yaw", value=yaw, unit="deg", better="lower", tolerance=0.3)

@@ -1,0 +1,154 @@
+"""Bundles and truth files as plain records, both in the bundle's world frame."""
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import BundleError
+from r2c2r_core.geometry.transforms import Rigid3
+
+_POSE_KEYS = ("capture_from_object", "world_from_object", "pose")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointRecord:
+    """One joint; axis and origin in the world frame."""
+
+    name: str
+    type: str
+    axis: Vector3
+    origin: Vector3
+    lower: float
+    upper: float
+    limit_source: str  # "truth", or what the manifest says
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ObjectRecord:
+    """One object of a bundle or of a truth file."""
+
+    name: str
+    category: str
+    dimensions_m: Vector3  # width, depth, height
+    world_from_object: Rigid3
+    joints: tuple[JointRecord, ...]
+    observed_axes: tuple[bool, bool, bool] | None = None  # truth only; None: not stated
+    turns_freely: bool = False  # truth only: round about its vertical axis, so that yaw means nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BundleRecord:
+    """What the evaluation reads of a manifest."""
+
+    objects: tuple[ObjectRecord, ...]
+    world_from_capture: Rigid3
+
+
+def read_bundle(path: Path) -> BundleRecord:
+    """The manifest of a bundle, zip or folder; raises BundleError when it cannot be read."""
+    document = _parse(_manifest_bytes(path), path)
+    try:
+        world_from_capture = Rigid3.from_matrix(_matrix(document["world_from_capture"]))
+        objects = tuple(_object(entry, Rigid3()) for entry in document["objects"])
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BundleError(
+            f"{path}: manifest.json lacks or misstates {error}", hint="write the bundle again with r2c2r run"
+        ) from error
+    return BundleRecord(objects=objects, world_from_capture=world_from_capture)
+
+
+def read_truth(path: Path, world_from_capture: Rigid3) -> tuple[ObjectRecord, ...]:
+    """The objects of a truth file, taken from the capture frame into the world; raises BundleError."""
+    try:
+        document = _parse(path.read_bytes(), path)
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read ({error.strerror})", hint="give the truth.json of the sample") from error
+    try:
+        return tuple(_object(entry, world_from_capture) for entry in document["objects"])
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BundleError(f"{path}: an object lacks or misstates {error}", hint="see the truth format in the README") from error
+
+
+def _manifest_bytes(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            return (path / "manifest.json").read_bytes()
+        with zipfile.ZipFile(path) as bundle:
+            names = [name for name in bundle.namelist() if name.split("/")[-1] == "manifest.json" and name.count("/") <= 1]
+            if not names:
+                raise BundleError(f"{path}: no manifest.json inside", hint="give a bundle written by r2c2r run")
+            return bundle.read(names[0])
+    except zipfile.BadZipFile as error:
+        raise BundleError(f"{path}: not a zip, or truncated", hint="give a bundle written by r2c2r run") from error
+    except OSError as error:
+        raise BundleError(
+            f"{path}: manifest.json cannot be read ({error.strerror})", hint="give a bundle's zip or folder"
+        ) from error
+
+
+def _parse(content: bytes, path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(content)
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BundleError(f"{path}: not valid JSON ({error})") from error
+    if not isinstance(document, dict) or not isinstance(document.get("objects"), list):
+        raise BundleError(f"{path}: expected a JSON object with a list `objects`")
+    return document
+
+
+def _object(entry: dict[str, Any], world_from_file: Rigid3) -> ObjectRecord:
+    joints = entry.get("joints")
+    if joints is None:
+        joints = [entry["joint"]] if entry.get("joint") else []
+    observed = entry.get("observed_axes")
+    return ObjectRecord(
+        name=str(entry["name"]),
+        category=str(entry["category"]),
+        dimensions_m=_vector(entry["dimensions_m"]),
+        world_from_object=world_from_file @ Rigid3.from_matrix(_matrix(_pose(entry))),
+        joints=tuple(_joint(joint, world_from_file) for joint in joints),
+        observed_axes=None if observed is None else (bool(observed[0]), bool(observed[1]), bool(observed[2])),
+        turns_freely=entry.get("symmetry") == "axial",
+    )
+
+
+def _pose(entry: dict[str, Any]) -> Any:
+    for key in _POSE_KEYS:
+        if key in entry:
+            return entry[key]
+    raise KeyError(" or ".join(_POSE_KEYS))
+
+
+def _joint(entry: dict[str, Any], world_from_file: Rigid3) -> JointRecord:
+    axis = _vector(entry["axis"])
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        raise ValueError("a joint axis of length 0")
+    return JointRecord(
+        name=str(entry.get("name", "")),
+        type=str(entry["type"]),
+        axis=world_from_file.turn(axis[None] / length)[0],
+        origin=world_from_file.apply(_vector(entry["origin"])[None])[0],
+        lower=float(entry["lower"]),
+        upper=float(entry["upper"]),
+        limit_source=str(entry.get("source", {}).get("limits", "truth")),
+    )
+
+
+def _vector(values: Any) -> Vector3:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"three numbers, found {values!r}")
+    return vector
+
+
+def _matrix(values: Any) -> np.ndarray:
+    matrix = np.asarray(values, dtype=np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise ValueError(f"a 4x4 matrix, found an array of shape {matrix.shape}")
+    return matrix

@@ -1,0 +1,44 @@
+"""How much of the space the two boxes share. Both are solids, so the overlap is a plain intersection over union."""
+
+import numpy as np
+
+from r2c2r_core.evaluate.records import ObjectRecord
+from r2c2r_core.model.report import Metric
+
+_THINNEST_M = 1e-6  # boxes that share less than this count as apart
+
+
+def shape_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
+    """Solid IoU of the boxes, exact (no voxels)."""
+    return (Metric(name="box_iou", value=box_iou(truth, found), unit="share", better="higher", tolerance=0.01),)
+
+
+def box_iou(a: ObjectRecord, b: ObjectRecord) -> float:
+    """Solid intersection over union of two boxes in any pose."""
+    volume_a, volume_b = float(np.prod(a.dimensions_m)), float(np.prod(b.dimensions_m))
+    shared = min(_shared_volume(a, b), volume_a, volume_b)
+    return shared / max(volume_a + volume_b - shared, 1e-12)
+
+
+def _shared_volume(a: ObjectRecord, b: ObjectRecord) -> float:
+    """Volume of the intersection: the convex body behind all twelve faces."""
+    from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    reach = (np.linalg.norm(a.dimensions_m) + np.linalg.norm(b.dimensions_m)) / 2
+    if np.linalg.norm(a.world_from_object.translation - b.world_from_object.translation) >= reach:
+        return 0.0
+    planes = np.vstack([_half_spaces(a), _half_spaces(b)])
+    # The centre of the largest ball inside all half-spaces: maximise r with n @ x + r <= -offset.
+    rows = np.column_stack([planes[:, :3], np.ones(len(planes))])
+    ball = linprog([0, 0, 0, -1], A_ub=rows, b_ub=-planes[:, 3], bounds=[(None, None)] * 3 + [(0, None)])
+    if ball.status != 0 or ball.x[3] < _THINNEST_M:
+        return 0.0
+    return float(ConvexHull(HalfspaceIntersection(planes, ball.x[:3]).intersections).volume)
+
+
+def _half_spaces(thing: ObjectRecord) -> np.ndarray:
+    """(6, 4) rows n, offset with n @ x + offset <= 0 inside the box, world frame."""
+    normals = np.vstack([thing.world_from_object.rotation.T, -thing.world_from_object.rotation.T])
+    half = np.concatenate([thing.dimensions_m, thing.dimensions_m]) / 2
+    return np.column_stack([normals, -(normals @ thing.world_from_object.translation) - half])

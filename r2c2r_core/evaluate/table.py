@@ -1,0 +1,45 @@
+"""The evaluation as text for a terminal."""
+
+from collections.abc import Sequence
+
+from r2c2r_core.model.report import Metric
+
+_COLUMNS = (
+    ("mask_iou", "mask IoU", "{:.3f}"),
+    ("width_error", "w %", "{:.1f}"),
+    ("depth_error", "d %", "{:.1f}"),
+    ("height_error", "h %", "{:.1f}"),
+    ("extents_observed", "observed %", "{:.1f}"),
+    ("centre", "centre mm", "{:.0f}"),
+    ("front_centre", "front mm", "{:.0f}"),
+    ("yaw", "yaw deg", "{:.1f}"),
+    ("joint_type", "type", "{:.2f}"),
+    ("hinge_side", "hinge", "{:.2f}"),
+    ("pivot", "pivot mm", "{:.0f}"),
+    ("range_ratio", "range", "{:.2f}"),
+    ("box_iou", "box IoU", "{:.2f}"),
+)
+
+
+def to_text(rows: Sequence[tuple[str, str, Sequence[Metric]]], scene: Sequence[Metric]) -> str:
+    """A table with one line an object and the means below; rows are (name, category, metrics)."""
+    lines = [("object", "category", *(title for _, title, _ in _COLUMNS))]
+    lines += [(name, category, *_cells(metrics)) for name, category, metrics in rows]
+    lines.append(("mean", "", *_cells(scene)))
+    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column < 2 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    )
+
+
+def _cells(metrics: Sequence[Metric]) -> list[str]:
+    values = {metric.name: metric.value for metric in metrics}
+    cells = []
+    for name, _, form in _COLUMNS:
+        value = values.get(name)
+        cells.append("-" if value is None else form.format(value))
+    return cells

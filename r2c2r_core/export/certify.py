@@ -1,0 +1,75 @@
+"""The certificate: lint, every loader that is installed, every joint swept and pushed, everything left alone."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from r2c2r_core.export.lint import lint
+from r2c2r_core.export.loaders import EVERY_LOADER, try_loaders
+from r2c2r_core.export.reading import read_urdf
+from r2c2r_core.export.rules.table import UNSAFE
+from r2c2r_core.export.simulate import Simulation, simulate
+from r2c2r_core.model.report import Certificate, LoaderResult
+from r2c2r_core.progress import SILENT, Progress
+
+CERTIFICATE_VERSION = 1
+
+_NOT_SIMULATED = Simulation(findings=(), joints=(), rest_penetration_m=math.nan, drift_m=math.nan, realtime_factor=math.nan)
+
+
+def certify(folder: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
+    """Judge a bundle's folder; raises BundleError when it holds no readable scene.urdf.
+
+    `sapien_python` is the interpreter of an environment of SAPIEN's own (it overwrites the headless OpenCV); None reads
+    R2C2R_SAPIEN_PYTHON. A loader that is not installed is reported as not tried.
+    """
+    progress.at(0.0, "reading the bundle")
+    findings = lint(folder)
+    if any(finding.rule in UNSAFE for finding in findings):
+        refused = "not given to it: the bundle names files outside itself"
+        loaders = tuple(LoaderResult(loader=name, state="not tried", detail=refused) for name in EVERY_LOADER)
+        simulation = _NOT_SIMULATED
+    else:
+        urdf = read_urdf(folder / "scene.urdf")
+        loaders = try_loaders(folder, urdf, sapien_python, progress=progress.part(0.05, 0.4))
+        mjcf = folder / "scene.xml"
+        simulation = simulate(mjcf, progress=progress.part(0.4, 1.0)) if mjcf.is_file() else _NOT_SIMULATED
+    findings = (*findings, *simulation.findings)
+    failed = any(f.severity == "error" for f in findings) or any(loader.state == "failed" for loader in loaders)
+    progress.at(1.0, "certificate passed" if not failed else "certificate failed")
+    return Certificate(
+        passed=not failed and simulation is not _NOT_SIMULATED,
+        findings=tuple(sorted(findings, key=lambda f: f.severity)),
+        loaders=loaders,
+        joints=simulation.joints,
+        rest_penetration_m=simulation.rest_penetration_m,
+        drift_m=simulation.drift_m,
+        realtime_factor=simulation.realtime_factor,
+    )
+
+
+def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
+    """The certificate as a versioned JSON document; what was not measured is null."""
+    return {
+        "version": CERTIFICATE_VERSION,
+        "passed": certificate.passed,
+        "findings": [
+            {"rule": f.rule, "severity": f.severity, "where": f.where, "message": f.message} for f in certificate.findings
+        ],
+        "loaders": [{"loader": r.loader, "state": r.state, "detail": r.detail} for r in certificate.loaders],
+        "joints": [
+            {
+                "joint": j.joint,
+                "deepest_penetration_m": _number(j.deepest_penetration_m),
+                "travel_reached": _number(j.travel_reached),
+            }
+            for j in certificate.joints
+        ],
+        "rest_penetration_m": _number(certificate.rest_penetration_m),
+        "drift_m": _number(certificate.drift_m),
+        "realtime_factor": _number(certificate.realtime_factor, digits=1),
+    }
+
+
+def _number(value: float, digits: int = 6) -> float | None:
+    return round(value, digits) + 0.0 if math.isfinite(value) else None

@@ -1,0 +1,155 @@
+"""manifest.json: where every number of the bundle comes from (schema 1)."""
+
+import math
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.model.mesh import CandidateSet
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.reconstruction import Reconstruction
+from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.model.track import MaskTrack
+
+SCHEMA = 1
+
+
+def manifest_of(reconstruction: Reconstruction, plan: Plan, created: str | None) -> dict[str, Any]:
+    """The manifest as a JSON document; `created` is an ISO 8601 time or None where nobody gave one."""
+    capture = reconstruction.capture
+    return {
+        "schema": SCHEMA,
+        "tool_version": tool_version(),
+        "created": created,
+        "capture": {
+            "name": capture.name,
+            "sha256": capture.sha256,
+            "format": capture.format,
+            "frames": len(capture.frames),
+        },
+        "world_from_capture": _plain(capture.world_from_capture.matrix),
+        "objects": [_object_entry(reconstruction, plan, item) for item in reconstruction.scene.objects],
+        "stages": [
+            {"name": run.name, "backend": run.backend, "config": _plain(run.config), "seconds": round(run.seconds, 3)}
+            for run in reconstruction.stages
+        ],
+    }
+
+
+def tool_version() -> str:
+    """The installed version of r2c2r, or "unknown" when it runs without being installed."""
+    try:
+        return version("r2c2r")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject) -> dict[str, Any]:
+    bodies = plan.of(item.name)
+    joints = [_joint_entry(item, body) for body in bodies if body.joint is not None]
+    track = next((t for t in reconstruction.tracks if t.name == item.name), None)
+    candidates = next((c for c in reconstruction.candidates if c.object_name == item.name), None)
+    placement = next((p for p in reconstruction.placements if p.object_name == item.name), None)
+    return {
+        "name": item.name,
+        "category": item.category,
+        "fixture": item.fixture,
+        "dimensions_m": _plain(item.dimensions_m),
+        "world_from_object": _plain(item.world_from_object.matrix),
+        "joint": joints[0] if joints else None,
+        "joints": joints,  # a double door has two
+        "movable": item.movable,
+        "dimension_source": list(item.dimension_sources),
+        "mask": None if track is None else _mask_entry(reconstruction, track),
+        "candidates": [] if candidates is None else _candidate_entries(candidates),
+        "chosen": None if candidates is None else {"candidate": candidates.chosen_id, "by": candidates.chosen_by, "at": None},
+        "placement": None if placement is None else _placement_entry(placement),
+        "warp": {"residual_m": _plain(item.warp_residual_m)},
+        "meshes": {
+            "visual": [body.visual_file for body in bodies if body.visual_file is not None],
+            "collision": [name for body in bodies for name in body.collision_files],
+        },
+        "mass_kg": _plain(sum(body.link.inertial.mass_kg for body in bodies)),
+        "warnings": [*_warnings(item, track, placement, candidates), *plan.notes(item.name)],
+    }
+
+
+def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
+    joint = body.joint
+    assert joint is not None
+    return {
+        "name": body.joint_name,
+        "type": joint.type,
+        "axis": _plain(item.world_from_object.turn(joint.axis_object[None])[0]),
+        "origin": _plain(item.world_from_object.apply(joint.origin_object[None])[0]),
+        "lower": _plain(joint.lower),
+        "upper": _plain(joint.upper),
+        "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
+    }
+
+
+def _mask_entry(reconstruction: Reconstruction, track: MaskTrack) -> dict[str, Any]:
+    areas = [mask.area_px for mask in track.masks.values()]
+    return {
+        "frames": len(areas),
+        "mean_area_px": round(float(np.mean(areas)), 1) if areas else 0.0,
+        "prompts": [
+            {"frame": point.frame, "x": point.x, "y": point.y, "label": point.label}
+            for prompt in reconstruction.prompts.objects
+            if prompt.name == track.name
+            for point in prompt.points
+        ],
+    }
+
+
+def _candidate_entries(candidates: CandidateSet) -> list[dict[str, Any]]:
+    return [
+        {"id": c.candidate_id, "generator": c.generator, "seed": c.seed, "metrics": _plain(c.metrics)}
+        for c in candidates.candidates
+    ]
+
+
+def _placement_entry(placement: Placement) -> dict[str, Any]:
+    pose = placement.world_from_mesh
+    return {
+        "scale": _plain(pose.scale),
+        "rotation": _plain(pose.rotation),
+        "translation": _plain(pose.translation),
+        "inliers": placement.inliers,
+        "rms_m": _plain(placement.rms_m),
+        "mask_iou": _plain(placement.mask_iou),
+        "unsure": placement.unsure,
+    }
+
+
+def _warnings(
+    item: SceneObject, track: MaskTrack | None, placement: Placement | None, candidates: CandidateSet | None
+) -> tuple[str, ...]:
+    """What every stage said about the object, each line once, in the order of the stages."""
+    chosen = candidates.chosen.warnings if candidates is not None else ()
+    lines = [
+        *(track.warnings if track else ()),
+        *chosen,
+        *(placement.warnings if placement else ()),
+        *item.warnings,
+    ]
+    return tuple(dict.fromkeys(lines))
+
+
+def _plain(value: Any) -> Any:
+    """JSON values; numbers with nine digits after the point, what is not finite as null."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return round(value, 9) + 0.0 if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return str(value)

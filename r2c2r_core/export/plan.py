@@ -1,0 +1,202 @@
+"""What goes into a bundle: every link with its unique name, its place in the tree and its files.
+
+All writers read a `Plan`, so a name or a frame is decided once. Link frames of hinged parts are moved onto the hinge here
+when a scene brings them elsewhere, because URDF and MJCF turn a body about its own origin.
+"""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.errors import ExportFailed
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
+
+WORLD = "world"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Body:
+    """One link as it is written; geometry in its own frame."""
+
+    object_name: str
+    name: str  # link name, starts with the object's name, unique in the bundle
+    parent: str  # WORLD or the name of another body
+    parent_from_body: Rigid3  # closed
+    world_from_body: Rigid3  # closed
+    joint_name: str
+    joint: Joint | None  # None: fixed to its parent
+    axis_body: Vector3 | None
+    free: bool  # falls and can be picked up where the format can say so
+    link: Link
+    texture_file: str | None  # relative to the bundle; bodies of one object share equal textures
+    is_support: bool = False  # a plate of support.py, no part of the object
+
+    @property
+    def folder(self) -> str:
+        """Folder of its meshes, relative to the bundle."""
+        return f"meshes/{self.object_name}"
+
+    @property
+    def visual_file(self) -> str | None:
+        """OBJ of the fitted mesh; None where the boxes are the visual."""
+        return None if self.link.visual is None else f"{self.folder}/{self.name}_vis.obj"
+
+    @property
+    def collision_files(self) -> tuple[str, ...]:
+        """OBJ of each convex piece, in order."""
+        return tuple(f"{self.folder}/{self.name}_col_{k}.obj" for k in range(len(self.link.pieces)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """All bodies, parents before children."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    floor_z_m: float
+
+    def of(self, object_name: str) -> tuple[Body, ...]:
+        """The bodies of one object, its base first."""
+        return tuple(body for body in self.bodies if body.object_name == object_name and not body.is_support)
+
+    def notes(self, object_name: str) -> tuple[str, ...]:
+        """What a person should know about how the object is exported."""
+        plate = any(body.is_support and body.object_name == object_name for body in self.bodies)
+        return ("nothing that was named carries it: a thin plate under it does",) if plate else ()
+
+
+def plan_bundle(scene: ArticulatedScene) -> Plan:
+    """Names, tree and files of a scene; raises ExportFailed when it has no object or an object's joints form no tree."""
+    if not scene.objects:
+        raise ExportFailed("the scene has no object", hint="add prompts, or see why the earlier stages failed")
+    taken: set[str] = {WORLD}
+    bodies = tuple(body for item in scene.objects for body in _bodies_of(item, taken))
+    return Plan(name=_clean(scene.name) or "scene", bodies=bodies, floor_z_m=_floor_height(bodies))
+
+
+def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
+    links = {link.name: link for link in item.links}
+    joints = {joint.child: joint for joint in item.joints}
+    for joint in item.joints:
+        if joint.child in links:
+            links[joint.child] = _on_the_hinge(links[joint.child], joint)
+    names = {name: _unique(_starting_with(item.name, name, "body"), taken) for name in links}
+    joint_names: set[str] = set()
+    textures: dict[str, str] = {}
+    bodies = []
+    for link_name in _parents_first(item, joints):
+        link, found = links[link_name], joints.get(link_name)
+        base = link_name == item.links[0].name
+        parent_link = found.parent if found is not None else item.links[0].name
+        object_from_parent = item.world_from_object.inverse if base else links[parent_link].object_from_link
+        name = names[link_name]
+        default_joint = f"{name}_to_{WORLD if base else names[parent_link]}"
+        bodies.append(
+            Body(
+                object_name=item.name,
+                name=name,
+                parent=WORLD if base else names[parent_link],
+                parent_from_body=object_from_parent.inverse @ link.object_from_link,
+                world_from_body=item.world_from_object @ link.object_from_link,
+                joint_name=_unique(_starting_with(item.name, found.name, "joint") if found else default_joint, joint_names),
+                joint=found,
+                axis_body=None if found is None else link.object_from_link.rotation.T @ _unit(found.axis_object),
+                free=item.movable and base,
+                link=link,
+                texture_file=_texture_file(item.name, name, link, textures),
+            )
+        )
+    return bodies
+
+
+def _parents_first(item: SceneObject, joints: dict[str, Joint]) -> list[str]:
+    """Link names in tree order; links without a joint hang on the base."""
+    names = [link.name for link in item.links]
+    base = names[0]
+    ordered = [base]
+    waiting = [n for n in names[1:]]
+    while waiting:
+        ready = [n for n in waiting if n not in joints or joints[n].parent in ordered]
+        if not ready or base in joints or len(set(names)) != len(names):
+            raise ExportFailed(f"{item.name}: its joints form no tree below {base}", hint="report this scene as a defect")
+        ordered += ready
+        waiting = [n for n in waiting if n not in ready]
+    return ordered
+
+
+def _on_the_hinge(link: Link, joint: Joint) -> Link:
+    """The link in a frame whose origin lies on the hinge line; prismatic parts and good frames stay as they are."""
+    offset = link.object_from_link.translation - joint.origin_object
+    axis = _unit(joint.axis_object)
+    if joint.type != "revolute" or np.linalg.norm(offset - (offset @ axis) * axis) < 1e-6:
+        return link
+    object_from_new = Rigid3(link.object_from_link.rotation, np.asarray(joint.origin_object, dtype=np.float64))
+    new_from_old = object_from_new.inverse @ link.object_from_link
+    return replace(
+        link,
+        object_from_link=object_from_new,
+        boxes=tuple(_moved_box(box, new_from_old) for box in link.boxes),
+        pieces=tuple(ConvexPiece(name=p.name, vertices_link=new_from_old.apply(p.vertices_link)) for p in link.pieces),
+        visual=None if link.visual is None else replace(link.visual, vertices=new_from_old.apply(link.visual.vertices)),
+        inertial=_moved_inertial(link.inertial, new_from_old),
+    )
+
+
+def _moved_box(box: Box, new_from_old: Rigid3) -> Box:
+    return Box(name=box.name, size_m=box.size_m, link_from_box=new_from_old @ box.link_from_box)
+
+
+def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:
+    turn = new_from_old.rotation
+    com = new_from_old.apply(inertial.com_link[None])[0]
+    return Inertial(mass_kg=inertial.mass_kg, com_link=com, inertia=turn @ inertial.inertia @ turn.T)
+
+
+def _floor_height(bodies: Sequence[Body]) -> float:
+    """World height of the floor plane: 0, or lower where a collider reaches below it (levelling leaves millimetres)."""
+    return min([0.0, *(float(c[:, 2].min()) for body in bodies for c in collider_corners_world(body))])
+
+
+def collider_corners_world(body: Body) -> list[Points]:
+    """Corners of each collider of a body in the world, joints closed."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    own = [box.link_from_box.apply(corners * box.size_m) for box in body.link.boxes]
+    own += [piece.vertices_link for piece in body.link.pieces]
+    return [body.world_from_body.apply(points) for points in own]
+
+
+def _texture_file(object_name: str, body_name: str, link: Link, textures: dict[str, str]) -> str | None:
+    if link.visual is None:
+        return None
+    texture = np.ascontiguousarray(link.visual.texture)
+    digest = hashlib.sha256(repr(texture.shape).encode() + texture.tobytes()).hexdigest()
+    return textures.setdefault(digest, f"meshes/{object_name}/{body_name}_vis.png")
+
+
+def _starting_with(object_name: str, name: str, bare: str) -> str:
+    name = _clean(name)
+    if name == object_name or not name:
+        return f"{object_name}_{bare}"
+    return name if name.startswith(f"{object_name}_") else f"{object_name}_{name}"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    """The name, or the name with a number where another object's link already has it (`a`+`b_c` and `a_b`+`c`)."""
+    candidate, number = name, 2
+    while candidate in taken:
+        candidate, number = f"{name}_{number}", number + 1
+    taken.add(candidate)
+    return candidate
+
+
+def _clean(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")
+
+
+def _unit(axis: Vector3) -> Vector3:
+    return np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)

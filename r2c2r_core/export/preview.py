@@ -1,0 +1,274 @@
+"""preview.png: the scene closed and open, drawn on the CPU with a sun, its shadow and a floor."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image, Points, Vector3
+from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres
+from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.geometry.texels import texture_colours
+from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+
+OPEN_FRACTION = 0.75
+"""How far joints stand open in the picture: doors at full travel hide behind their own edge."""
+
+_SUPERSAMPLE = 2
+_LONG = 1.9  # width over height, as seen, from which the two pictures go one above the other
+_SUN_FROM = np.array([-0.45, -0.35, 1.0])  # in the view's own right, back, up
+_BACKGROUND = np.array([244.0, 245.0, 247.0])
+_FLOOR = np.array([222.0, 221.0, 218.0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Soup:
+    """Every triangle of the scene with corners of its own, in the world."""
+
+    corners: Points  # (3 m, 3)
+    uv: np.ndarray  # (3 m, 2)
+    normals: np.ndarray  # (3 m, 3), flat
+    ids: np.ndarray  # (3 m,), body number + 1
+    textures: tuple[Image | None, ...]  # by body; None: its colour
+    colours: np.ndarray  # (bodies, 3), 0..255
+
+
+def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> bytes:
+    """PNG of the scene closed and open, side by side or, for a long kitchen, one above the other.
+
+    `seen_from` is a world position the scan was filmed from.
+    """
+    closed, opened = scene_soup(plan, 0.0), scene_soup(plan, OPEN_FRACTION)
+    points, direction = np.concatenate([closed.corners, opened.corners]), _view_from(plan, seen_from)
+    across, high = np.ptp(points @ _view_axes(direction).T, axis=0)[:2]
+    stacked = across > _LONG * high
+    size = (width_px * 3 // 4, round(width_px * 0.32)) if stacked else (width_px // 2, round(width_px * 0.4))
+    camera, camera_from_world = framing(points, direction, size)
+    pictures = [
+        _captioned(draw(soup, plan.floor_z_m, camera, camera_from_world), caption)
+        for soup, caption in ((closed, "closed"), (opened, "open"))
+    ]
+    return png_bytes(np.concatenate(pictures, axis=0 if stacked else 1))
+
+
+def scene_soup(plan: Plan, fraction: float) -> Soup:
+    """The triangles of the scene with every joint at `fraction` of its range."""
+    corners, uvs, ids, textures = [], [], [], []
+    poses = poses_at(plan, fraction)
+    for number, body in enumerate(plan.bodies, start=1):
+        visual = body.link.visual
+        vertices, faces = (visual.vertices, visual.faces) if visual is not None else box_mesh(body)
+        corners.append(poses[body.name].apply(vertices[faces].reshape(-1, 3)))
+        uvs.append(visual.uv[faces].reshape(-1, 2) if visual is not None else np.zeros((3 * len(faces), 2)))
+        ids.append(np.full(3 * len(faces), float(number)))
+        textures.append(None if visual is None else np.ascontiguousarray(visual.texture))
+    all_corners = np.concatenate(corners)
+    a, b, c = all_corners[0::3], all_corners[1::3], all_corners[2::3]
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    return Soup(
+        corners=all_corners,
+        uv=np.concatenate(uvs),
+        normals=np.repeat(normal, 3, axis=0),
+        ids=np.concatenate(ids),
+        textures=tuple(textures),
+        colours=np.array([[255.0 * c for c in body.link.colour] for body in plan.bodies]),
+    )
+
+
+def poses_at(plan: Plan, fraction: float) -> dict[str, Rigid3]:
+    """world_from_body of every body with every joint at `fraction` of its range."""
+    poses = {WORLD: Rigid3()}
+    for body in plan.bodies:
+        poses[body.name] = poses[body.parent] @ body.parent_from_body @ _motion(body, fraction)
+    return poses
+
+
+def framing(points_world: Points, direction: Vector3, size: tuple[int, int]) -> tuple[Intrinsics, Rigid3]:
+    """A camera that looks along -`direction` and holds all points with a margin, and camera_from_world."""
+    width, height = size
+    focal = 1.35 * height
+    camera = Intrinsics(fx=focal, fy=focal, cx=width / 2, cy=height / 2, width=width, height=height)
+    rotation = _view_axes(direction)
+    seen = points_world @ rotation.T
+    centre = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    distance = 0.0
+    for _ in range(4):  # perspective shifts the middle of the picture: re-centre and fit again
+        x, y, z = (seen - centre).T
+        reach = np.maximum(np.abs(x) / (width / 2 * 0.94), np.abs(y) / (height / 2 * 0.9)) * focal
+        distance = float(max((reach - z).max(), 0.4 - z.min()))
+        for axis, values in ((0, x), (1, y)):
+            slopes = values / (z + distance)
+            centre[axis] += (slopes.min() + slopes.max()) / 2 * distance
+    return camera, Rigid3(rotation, np.array([-centre[0], -centre[1], distance - centre[2]]))
+
+
+def _view_axes(direction: Vector3) -> np.ndarray:
+    """Rotation camera_from_world (rows: right, down, forward) of an upright camera that looks along -`direction`."""
+    backward = direction / np.linalg.norm(direction)
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, -np.cross(backward, right), -backward])
+
+
+def draw(soup: Soup, floor_z_m: float, camera: Intrinsics, camera_from_world: Rigid3) -> Image:
+    """The lit scene on its floor."""
+    size = (camera.width * _SUPERSAMPLE, camera.height * _SUPERSAMPLE)
+    large = camera.resized(*size)
+    marks = rasterize(soup.corners, soup_faces(soup), np.column_stack([soup.uv, soup.ids]), large, camera_from_world)
+    normals = rasterize(soup.corners, soup_faces(soup), soup.normals, large, camera_from_world).attributes
+    points, depth = _floor_behind(marks.depth_m, floor_z_m, large, camera_from_world)
+    on_floor = (marks.depth_m == 0) & (depth > 0)
+    colour = albedo(soup, marks.attributes)
+    colour[on_floor] = _FLOOR
+    normals = np.where(on_floor[..., None], np.array([0.0, 0.0, 1.0]), _facing(normals, points, camera_from_world))
+    sun = _sun_direction(camera_from_world)
+    light = _light(normals, sun, _sunlit(soup, points, depth > 0, sun)) * _contact_shade(depth, large)
+    lit = np.where((depth > 0)[..., None], colour * light[..., None], _BACKGROUND)
+    fade = _floor_fade(points, soup, on_floor)[..., None]
+    lit = lit * (1 - fade) + _BACKGROUND * fade
+    image = np.asarray(lit.clip(0, 255), dtype=np.uint8)
+    return np.asarray(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def soup_faces(soup: Soup) -> np.ndarray:
+    """Triangles over the soup's corners."""
+    return np.arange(len(soup.corners)).reshape(-1, 3)
+
+
+def _motion(body: Body, fraction: float) -> Rigid3:
+    joint, axis = body.joint, body.axis_body
+    if joint is None or axis is None:
+        return Rigid3()
+    position = fraction * joint.upper
+    if joint.type == "prismatic":
+        return Rigid3(np.eye(3), axis * position)
+    rotation, _ = cv2.Rodrigues(axis * position)
+    return Rigid3(np.asarray(rotation, dtype=np.float64), np.zeros(3))
+
+
+def _view_from(plan: Plan, seen_from: Vector3 | None) -> Vector3:
+    """Direction from the scene to the eye: from where the fronts face, turned towards where the scan was filmed."""
+    outward = [-body.world_from_body.rotation[:, 1] for body in plan.bodies if body.joint is not None]
+    facing: Vector3 = np.array(outward).sum(axis=0) if outward else np.zeros(3)
+    if seen_from is not None:
+        centre = np.mean([body.world_from_body.translation for body in plan.bodies], axis=0)
+        towards = np.asarray(seen_from, dtype=np.float64) - centre
+        towards[2] = 0.0
+        if np.linalg.norm(towards) > 0.2:
+            facing = facing / max(np.linalg.norm(facing), 1e-9) * 0.5 + towards / np.linalg.norm(towards)
+    facing = np.array([facing[0], facing[1], 0.0])
+    if np.linalg.norm(facing) < 1e-3:
+        facing = np.array([0.0, -1.0, 0.0])
+    facing /= np.linalg.norm(facing)
+    side = np.cross([0.0, 0.0, 1.0], facing)
+    return facing + 0.35 * side + np.array([0.0, 0.0, 0.5])  # three quarters view: depth shows
+
+
+def albedo(soup: Soup, marks: np.ndarray) -> np.ndarray:
+    """Unlit colours (h, w, 3) of the pixels marked with uv and body id."""
+    ids = np.rint(marks[..., 2]).astype(np.int64)
+    colour = np.concatenate([_BACKGROUND[None], soup.colours])[ids.clip(0, len(soup.colours))]
+    for number, texture in enumerate(soup.textures, start=1):
+        rows, columns = np.nonzero(ids == number)
+        if texture is not None and len(rows):
+            colour[rows, columns] = texture_colours(texture, marks[rows, columns, :2])
+    return colour
+
+
+def shaded(colour: np.ndarray, normals: np.ndarray, camera_from_world: Rigid3) -> np.ndarray:
+    """Colours lit from the eye, without shadows: for small pictures."""
+    length = np.maximum(np.linalg.norm(normals, axis=-1), 1e-6)
+    towards_eye = np.abs(normals @ camera_from_world.rotation[2]) / length
+    return np.asarray(colour * (0.6 + 0.4 * towards_eye)[..., None])
+
+
+def _floor_behind(
+    depth: np.ndarray, floor_z_m: float, camera: Intrinsics, camera_from_world: Rigid3
+) -> tuple[np.ndarray, np.ndarray]:
+    """World points (h, w, 3) and depth with the floor plane put where nothing else is seen; 0 is the sky."""
+    world_from_camera = camera_from_world.inverse
+    right, down, forward = world_from_camera.rotation.T.astype(np.float32)
+    uv = ((pixel_centres(camera) - [camera.cx, camera.cy]) / camera.fx).astype(np.float32)
+    rays = uv[..., :1] * right + uv[..., 1:] * down + forward  # in the world, of unit depth
+    slopes = rays[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_floor = (floor_z_m - world_from_camera.translation[2]) / slopes
+    seen_floor = (depth == 0) & (to_floor > 0) & (to_floor < 60)
+    filled = np.where(seen_floor, to_floor, depth).astype(np.float32)
+    return rays * filled[..., None] + world_from_camera.translation.astype(np.float32), filled
+
+
+def _facing(normals: np.ndarray, points: np.ndarray, camera_from_world: Rigid3) -> np.ndarray:
+    """Normals turned towards the eye (fitted meshes may be open) and of unit length."""
+    eye = camera_from_world.inverse.translation
+    away = np.einsum("hwi,hwi->hw", normals, eye - points) < 0
+    length = np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
+    return np.where(away[..., None], -normals, normals) / length
+
+
+def _sun_direction(camera_from_world: Rigid3) -> Vector3:
+    """Towards the sun, in the world: over the viewer's left shoulder."""
+    right, backward = camera_from_world.rotation[0], -camera_from_world.rotation[2]
+    backward = np.array([backward[0], backward[1], 0.0]) / np.linalg.norm(backward[:2])
+    sun = _SUN_FROM[0] * right - _SUN_FROM[1] * 2.2 * backward + _SUN_FROM[2] * np.array([0.0, 0.0, 1.0])
+    return np.asarray(sun / np.linalg.norm(sun))
+
+
+def _sunlit(soup: Soup, points: np.ndarray, valid: np.ndarray, sun: Vector3) -> np.ndarray:
+    """How much of the sun each point sees, 0..1, from a depth picture taken at the sun with soft edges."""
+    low, high = soup.corners.min(axis=0), soup.corners.max(axis=0)
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 + 0.05
+    distance = min(6.0 * radius, 19.5 - radius) if radius < 9.0 else 2.0 * radius
+    size = 1400
+    focal = size / 2 * np.sqrt(max(distance**2 - radius**2, 1e-3)) / radius
+    camera = Intrinsics(fx=focal, fy=focal, cx=size / 2, cy=size / 2, width=size, height=size)
+    rotation = rotation_between(-sun, np.array([0.0, 0.0, 1.0]))
+    sun_from_world = Rigid3(rotation, np.array([0.0, 0.0, distance]) - rotation @ centre)
+    depth = rasterize(soup.corners, soup_faces(soup), soup.normals, camera, sun_from_world).depth_m
+    turn, shift = rotation.astype(np.float32), sun_from_world.translation.astype(np.float32)
+    across, along, z = (
+        points[..., 0] * a[0] + points[..., 1] * a[1] + points[..., 2] * a[2] + b for a, b in zip(turn, shift, strict=True)
+    )
+    z = np.where(valid, z, np.float32(1.0))
+    x, y = np.float32(focal) * across / z + size / 2 - 0.5, np.float32(focal) * along / z + size / 2 - 0.5
+    lit = np.zeros(valid.shape, np.float32)
+    offsets = [(dx, dy) for dx in (-2.5, -0.8, 0.8, 2.5) for dy in (-2.5, -0.8, 0.8, 2.5)]
+    for dx, dy in offsets:
+        nearest = cv2.remap(depth, x + np.float32(dx), y + np.float32(dy), cv2.INTER_NEAREST)
+        lit += (nearest == 0) | (nearest > z - 0.015)
+    return lit / len(offsets)
+
+
+def _light(normals: np.ndarray, sun: Vector3, sunlit: np.ndarray) -> np.ndarray:
+    diffuse = np.maximum(normals @ sun, 0.0) * sunlit
+    sky = 0.5 + 0.5 * normals[..., 2]
+    return np.asarray(0.52 + 0.14 * sky + 0.46 * diffuse)
+
+
+def _contact_shade(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
+    """Darkening 0.78..1 where the surroundings, a few centimetres around, stand nearer: gaps and corners read."""
+    shade = np.ones_like(depth)
+    near = np.where(depth > 0, depth, depth.max())
+    middle = float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0
+    for width_m, strength in ((0.008, 0.16), (0.03, 0.06)):
+        sigma = max(width_m * camera.fx / middle, 0.8)
+        gap = near - cv2.GaussianBlur(near.astype(np.float32), (0, 0), sigma)
+        shade -= strength * (gap / width_m).clip(0.0, 1.0)
+    return shade
+
+
+def _floor_fade(points: np.ndarray, soup: Soup, on_floor: np.ndarray) -> np.ndarray:
+    """How far the floor has faded into the background, 0..1, with the distance from the scene."""
+    low, high = soup.corners.min(axis=0)[:2], soup.corners.max(axis=0)[:2]
+    outside = np.maximum(np.maximum(low - points[..., :2], points[..., :2] - high), 0.0)
+    reach = max(float(np.linalg.norm(high - low)) * 0.5, 0.5)
+    return np.where(on_floor, (np.linalg.norm(outside, axis=-1) / reach).clip(0, 1), 0.0)
+
+
+def _captioned(image: Image, caption: str) -> Image:
+    picture = image.copy()
+    cv2.putText(picture, caption, (22, 40), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (90, 94, 102), 1, cv2.LINE_AA)
+    return picture

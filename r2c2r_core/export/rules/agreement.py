@@ -1,0 +1,168 @@
+"""Whether the manifest and scene.xml tell the same story as scene.urdf."""
+
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.plan import WORLD
+from r2c2r_core.export.reading import MOVING, Urdf, UrdfJoint
+from r2c2r_core.export.rules.files import BundleFiles, is_inside
+from r2c2r_core.export.rules.table import finding
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.report import Finding
+
+REQUIRED_FILES = ("scene.urdf", "scene.xml", "scene.glb", "manifest.json", "preview.png", "README.txt")
+_KEYS = ("schema", "tool_version", "capture", "world_from_capture", "objects", "stages")
+_OBJECT_KEYS = ("name", "category", "dimensions_m", "world_from_object", "joint", "meshes", "mass_kg")
+SUPPORT_SUFFIX = "_support"
+"""Links of this ending hold a free-standing thing up; they belong to no object."""
+
+
+def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
+    """Required files, the manifest against the URDF, scene.xml against the URDF."""
+    for name in REQUIRED_FILES:
+        if not (files.folder / name).is_file():
+            yield finding("file-missing", name, "it is not in the bundle")
+    manifest = files.folder / "manifest.json"
+    if manifest.is_file():
+        yield from _manifest(urdf, manifest.read_bytes())
+    scene = files.folder / "scene.xml"
+    if scene.is_file():
+        yield from _mjcf(urdf, scene.read_bytes())
+
+
+def _manifest(urdf: Urdf, content: bytes) -> Iterator[Finding]:
+    try:
+        document = json.loads(content)
+        missing = [key for key in _KEYS if key not in document]
+        missing += [f"objects[{k}].{key}" for k, o in enumerate(document["objects"]) for key in _OBJECT_KEYS if key not in o]
+        if missing or document["schema"] != 1:
+            what = f"lacks {', '.join(missing)}" if missing else f"schema {document['schema']}, expected 1"
+            yield finding("manifest-schema", "manifest.json", what)
+            return
+        yield from _objects(urdf, document["objects"])
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        yield finding("manifest-schema", "manifest.json", f"cannot be read: {error}")
+
+
+def _objects(urdf: Urdf, objects: list[dict[str, Any]]) -> Iterator[Finding]:
+    poses = urdf.world_poses()
+    joints = {joint.name: joint for joint in urdf.joints}
+    claimed: set[str] = set()
+    for item in objects:
+        links = _links_of(item["name"], urdf, [str(other["name"]) for other in objects])
+        if not links:
+            yield finding("manifest-object", item["name"], "no link of the URDF starts with this name")
+            continue
+        claimed |= links
+        for entry in item.get("joints") or ([item["joint"]] if item["joint"] else []):
+            yield from _joint(entry, joints.get(entry["name"]), poses)
+        listed = {j["name"] for j in item.get("joints") or ([item["joint"]] if item["joint"] else [])}
+        unlisted = {j.name for j in urdf.joints if j.child in links and j.type in MOVING} - listed
+        if unlisted:
+            yield finding("manifest-joint", item["name"], f"joints not in the manifest: {', '.join(sorted(unlisted))}")
+        yield from _meshes_and_mass(item, links, urdf)
+    orphans = {x.name for x in urdf.links} - claimed - {WORLD}
+    orphans = {name for name in orphans if not name.endswith(SUPPORT_SUFFIX)}
+    if orphans:
+        yield finding("manifest-object", sorted(orphans)[0], f"{len(orphans)} links belong to no object of the manifest")
+
+
+def _links_of(name: str, urdf: Urdf, names: list[str]) -> set[str]:
+    """Links that start with the object's name and with no longer object's name; supports are nobody's."""
+    longer = [other for other in names if other != name and other.startswith(f"{name}_")]
+    return {
+        link.name
+        for link in urdf.links
+        if (link.name == name or link.name.startswith(f"{name}_"))
+        and not any(link.name.startswith(f"{other}_") or link.name == other for other in longer)
+        and not link.name.endswith(SUPPORT_SUFFIX)
+    }
+
+
+def _joint(entry: dict[str, Any], joint: UrdfJoint | None, poses: dict[str, Rigid3]) -> Iterator[Finding]:
+    where = str(entry["name"])
+    if joint is None:
+        yield finding("manifest-joint", where, "the URDF has no such joint")
+        return
+    if joint.type != entry["type"]:
+        yield finding("manifest-joint", where, f"type {entry['type']}, the URDF says {joint.type}")
+    for key in ("lower", "upper"):
+        there = (joint.limit or {}).get(key, np.nan)
+        if not abs(there - float(entry[key])) < 1e-5:
+            yield finding("manifest-joint", where, f"{key} {entry[key]}, the URDF says {there:.6g}")
+    pose = poses.get(joint.child)
+    if pose is None:
+        return
+    axis = np.asarray(entry["axis"], dtype=np.float64)
+    turned = pose.turn(joint.axis[None])[0]
+    if not float(np.linalg.norm(axis - turned)) < 1e-3:
+        yield finding("manifest-joint", where, f"its axis differs from the URDF's by {np.linalg.norm(axis - turned):.3g}")
+    offset = np.asarray(entry["origin"], dtype=np.float64) - pose.translation
+    off_line = float(np.linalg.norm(offset - (offset @ turned) * turned))
+    if joint.type == "revolute" and not off_line < 1e-4:
+        yield finding("manifest-joint", where, f"its hinge line is {1000 * off_line:.1f} mm from the URDF's")
+
+
+def _meshes_and_mass(item: dict[str, Any], links: set[str], urdf: Urdf) -> Iterator[Finding]:
+    own = [link for link in urdf.links if link.name in links]
+    for kind in ("visual", "collision"):
+        there = {shape.mesh for link in own for shape in link.shapes if shape.kind == kind and shape.mesh is not None}
+        if there != set(item["meshes"][kind]):
+            differing = sorted(there ^ set(item["meshes"][kind]))
+            yield finding("manifest-mesh", item["name"], f"{kind} meshes differ: {', '.join(differing)}")
+    mass = sum(link.inertial.mass_kg for link in own if link.inertial is not None)
+    if not abs(mass - float(item["mass_kg"])) <= 1e-4 * max(mass, 0.1):
+        yield finding("manifest-mass", item["name"], f"{item['mass_kg']} kg, the URDF's links weigh {mass:.6g} kg")
+
+
+def _mjcf(urdf: Urdf, content: bytes) -> Iterator[Finding]:
+    try:
+        root = ET.fromstring(content)
+    except (ET.ParseError, ValueError) as error:
+        yield finding("mjcf-parse", "scene.xml", f"not XML: {error}")
+        return
+    if root.tag != "mujoco":
+        yield finding("mjcf-parse", "scene.xml", f"holds <{root.tag}>, not <mujoco>")
+        return
+    for element in root.iter():
+        files = [value for key, value in element.attrib.items() if key.startswith("file") or key.endswith("dir")]
+        unsafe = [value for value in files if value and not is_inside(value)]
+        if unsafe or element.tag == "include":
+            yield finding("mjcf-path", "scene.xml", f"<{element.tag}> reads '{(unsafe or files or ['?'])[0]}'")
+    yield from _mjcf_joints(urdf, root)
+    yield from _mjcf_masses(urdf, root)
+
+
+def _mjcf_joints(urdf: Urdf, root: ET.Element) -> Iterator[Finding]:
+    there = {element.get("name"): element for element in root.iter("joint") if element.get("range") is not None}
+    expected = {joint.name: joint for joint in urdf.joints if joint.type in ("revolute", "prismatic")}
+    for name in sorted(set(expected) ^ {str(key) for key in there}):
+        missing = "scene.xml" if name in expected else "scene.urdf"
+        yield finding("mjcf-joint", name, f"{missing} has no such joint")
+    for name, joint in expected.items():
+        element = there.get(name)
+        if element is None:
+            continue
+        kind = {"revolute": "hinge", "prismatic": "slide"}[joint.type]
+        if element.get("type", "hinge") != kind:
+            yield finding("mjcf-joint", name, f"scene.xml says {element.get('type', 'hinge')}, expected {kind}")
+        span = [float(word) for word in element.get("range", "").split()]
+        limits = joint.limit or {}
+        if not np.allclose(span, [limits.get("lower", np.nan), limits.get("upper", np.nan)], atol=1e-5):
+            yield finding("mjcf-joint", name, f"scene.xml has the range {element.get('range')}, not the URDF's")
+
+
+def _mjcf_masses(urdf: Urdf, root: ET.Element) -> Iterator[Finding]:
+    there = {}
+    for body in root.iter("body"):
+        inertial = body.find("inertial")
+        there[body.get("name")] = float(inertial.get("mass", "nan")) if inertial is not None else float("nan")
+    for link in urdf.links:
+        if link.inertial is not None and link.name != WORLD:
+            mass = there.get(link.name, float("nan"))
+            if not abs(mass - link.inertial.mass_kg) <= 1e-5 * max(abs(mass), 1e-3):
+                yield finding("mjcf-mass", link.name, f"scene.xml says {mass:.6g} kg, the URDF {link.inertial.mass_kg:.6g} kg")

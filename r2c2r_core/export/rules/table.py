@@ -1,0 +1,80 @@
+"""Every rule of the linter and of the simulation: its name, how bad a hit is, what it protects from (see sim-ready.md)."""
+
+from typing import Literal, NamedTuple
+
+from r2c2r_core.model.report import Finding
+
+
+class Rule(NamedTuple):
+    """One line of the table."""
+
+    severity: Literal["error", "warning"]
+    protects: str
+
+
+RULES: dict[str, Rule] = {
+    "number": Rule("error", "a number that is missing, not finite or not a number"),
+    "name": Rule("error", "names outside [A-Za-z0-9_]: loaders and ROS refuse or rewrite them"),
+    "duplicate-link": Rule("error", "MuJoCo, PyBullet and SAPIEN refuse it"),
+    "duplicate-joint": Rule("error", "MuJoCo, PyBullet and SAPIEN refuse it"),
+    "root": Rule("error", "two roots: SAPIEN refuses, MuJoCo loses the loose link"),
+    "tree": Rule("error", "a joint to a link that is not there, or a link with two parents"),
+    "joint-type": Rule("error", "floating and planar joints mean something else in every loader"),
+    "mujoco-block": Rule("error", "without it MuJoCo drops visuals and static masses, 3.x also mesh paths"),
+    "limit-missing": Rule("error", "PyBullet and SAPIEN refuse a joint without <limit>; MuJoCo opens it for ever"),
+    "limit-incomplete": Rule("error", "lower, upper, effort and velocity are all needed"),
+    "limit-order": Rule("error", "lower above upper switches the limit off in MuJoCo and turns it round in SAPIEN"),
+    "limit-zero": Rule("error", "a closed pose outside the limits jumps on the first step"),
+    "limit-effort": Rule("warning", "efforts in the hundreds make the limit meaningless for furniture"),
+    "axis-unit": Rule("error", "a joint axis must have length one"),
+    "dynamics-missing": Rule("warning", "without damping and friction doors drift and slam"),
+    "inertial-missing": Rule("error", "loaders invent a mass: 1 kg or 1000 kg/m3"),
+    "mass-positive": Rule("error", "a mass of zero or less: MuJoCo refuses, PyBullet nails it down"),
+    "inertia-positive": Rule("error", "an inertia that is not positive definite"),
+    "inertia-triangle": Rule("error", "A + B < C: no body has such an inertia, MuJoCo refuses"),
+    "inertia-impossible": Rule("error", "more inertia than all the mass at the farthest point of the link"),
+    "com-outside": Rule("warning", "the centre of mass lies outside the link"),
+    "mesh-path": Rule("error", "package://, absolute paths and paths out of the bundle fail elsewhere"),
+    "mesh-spaces": Rule("error", "spaces in a path break MTL and ROS"),
+    "mesh-missing": Rule("error", "some loaders drop it in silence"),
+    "mesh-format": Rule("error", "MuJoCo, PyBullet and the USD converter read OBJ and STL only"),
+    "mesh-scale": Rule("error", "scale belongs into the mesh; a negative one turns it inside out"),
+    "mesh-basename": Rule("error", "MuJoCo 3.x reuses the first mesh of that name in silence"),
+    "mesh-unreadable": Rule("error", "an empty or damaged mesh"),
+    "mesh-size": Rule("warning", "millimetres or inches instead of metres"),
+    "texture-missing": Rule("error", "the material or its picture is not in the bundle"),
+    "collider-missing": Rule("error", "a link that moves and cannot be touched"),
+    "collision-flat": Rule("error", "a flat collision mesh: MuJoCo refuses it as coplanar"),
+    "collision-concave": Rule("error", "every engine fills it to its convex hull"),
+    "collision-parts": Rule("error", "several parts in one OBJ: open in PyBullet, a solid hull elsewhere"),
+    "box-size": Rule("error", "a box without extent"),
+    "file-missing": Rule("error", "a file every bundle has"),
+    "manifest-schema": Rule("error", "the manifest cannot be read by its schema"),
+    "manifest-object": Rule("error", "objects of the manifest and links of the URDF do not pair up"),
+    "manifest-joint": Rule("error", "a joint differs between manifest and URDF"),
+    "manifest-mesh": Rule("error", "meshes of the manifest and of the URDF differ"),
+    "manifest-mass": Rule("error", "masses of the manifest and of the URDF differ"),
+    "mjcf-parse": Rule("error", "scene.xml is not MJCF"),
+    "mjcf-path": Rule("error", "scene.xml reads files from outside the bundle"),
+    "mjcf-joint": Rule("error", "joints of scene.xml and of the URDF differ"),
+    "mjcf-mass": Rule("error", "masses of scene.xml and of the URDF differ"),
+}
+
+SIMULATION_RULES: dict[str, Rule] = {
+    "mjcf-compile": Rule("error", "MuJoCo cannot compile scene.xml, so nothing could be simulated"),
+    "penetration-rest": Rule("error", "bodies overlap while everything is closed: they fly apart or stick"),
+    "penetration-sweep": Rule("error", "a joint moves its part into something"),
+    "travel": Rule("error", "a joint jams under a hand's force"),
+    "drift": Rule("error", "something left alone falls or creeps"),
+    "unstable": Rule("error", "the simulation diverges"),
+    "overlap": Rule("warning", "fixed parts of two objects overlap"),
+    "blocked-by": Rule("warning", "a free-standing thing is in a joint's way"),
+}
+
+UNSAFE = ("mesh-path", "mjcf-path")
+"""With one of these, no loader is given the bundle: it would read files of this machine."""
+
+
+def finding(rule: str, where: str, message: str) -> Finding:
+    """A hit of a rule of either table."""
+    return Finding(rule=rule, severity=(RULES | SIMULATION_RULES)[rule].severity, where=where, message=message)

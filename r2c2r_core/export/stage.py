@@ -1,0 +1,108 @@
+"""Reconstruction → bundle: write it, judge it, pack it; and judge a bundle that somebody brings."""
+
+import json
+import os
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.export.archive import building_folder, explained_io, opened_bundle, replace_folder, write_zip
+from r2c2r_core.export.certify import certificate_to_json, certify
+from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.pictures import write_pictures
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.preview import preview_png
+from r2c2r_core.export.readme import readme_text
+from r2c2r_core.export.report import report_html, report_of
+from r2c2r_core.export.support import supported
+from r2c2r_core.export.writers.meshes import write_meshes
+from r2c2r_core.export.writers.table import FORMATS
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.reconstruction import Reconstruction
+from r2c2r_core.model.report import Certificate
+from r2c2r_core.progress import SILENT, Progress
+
+__all__ = ["ExportConfig", "certificate_to_json", "check_bundle", "write_bundle"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportConfig:
+    """How a bundle is written."""
+
+    texture_max_px: int = 2048  # longest side; WebGL 2 promises no more everywhere
+    keep_folder: bool = False  # leave the unpacked bundle beside the zip, under the zip's name without .zip
+    pictures: bool = True  # a photo beside the model, for each object, in report.html
+
+
+def write_bundle(
+    reconstruction: Reconstruction,
+    destination: Path,
+    config: ExportConfig,
+    *,
+    created: str | None = None,
+    progress: Progress = SILENT,
+) -> Certificate:
+    """Write the certified bundle to `destination` (a .zip) and return its certificate, passed or not.
+
+    The zip appears whole or not at all, and equal inputs give equal bytes: `created` (ISO 8601) is the only time in it, and
+    None leaves it to SOURCE_DATE_EPOCH, or out. Raises ExportFailed on a scene without objects and EnvironmentProblem on a
+    full disk.
+    """
+    plan = supported(plan_bundle(reconstruction.scene))
+    with building_folder(destination) as scratch:
+        folder = scratch / "bundle"
+        folder.mkdir()
+        progress.at(0.0, "writing meshes")
+        write_meshes(plan, folder, config.texture_max_px)
+        for entry in progress.part(0.1, 0.2).each(FORMATS, "writing"):
+            entry.write(plan, folder / entry.file)
+        manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build())
+        _write_json(folder / "manifest.json", manifest)
+        (folder / "README.txt").write_text(readme_text(plan))
+        progress.at(0.2, "drawing the preview")
+        (folder / "preview.png").write_bytes(preview_png(plan, _filmed_from(reconstruction.capture)))
+        pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4)) if config.pictures else {}
+        certificate = certify(folder, progress=progress.part(0.4, 0.9))
+        _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
+        progress.at(0.9, "packing")
+        write_zip(folder, scratch / "bundle.zip")
+        (scratch / "bundle.zip").replace(destination)
+        if config.keep_folder:
+            replace_folder(folder, destination.with_suffix(""))
+    progress.at(1.0, "certified bundle" if certificate.passed else "bundle written, its certificate failed")
+    return certificate
+
+
+def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
+    """Judge a bundle, zip or folder, as it is; raises BundleError on a foreign, truncated or unsafe one."""
+    with opened_bundle(path) as folder, explained_io(path):
+        return certify(folder, sapien_python=sapien_python, progress=progress)
+
+
+def _write_reports(
+    folder: Path, manifest: dict[str, Any], certificate: Certificate, failures: dict[str, str], pictures: dict[str, str]
+) -> None:
+    report = report_of(manifest, certificate, failures)
+    _write_json(folder / "report.json", report)
+    (folder / "report.html").write_text(report_html(manifest, report, pictures), encoding="utf-8")
+
+
+def _write_json(path: Path, document: dict[str, Any]) -> None:
+    path.write_text(json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _filmed_from(capture: Capture) -> Vector3 | None:
+    """The middle of the camera's path, in the world."""
+    if not capture.frames:
+        return None
+    return np.asarray(np.mean([frame.world_from_camera.translation for frame in capture.frames], axis=0))
+
+
+def _epoch_of_the_build() -> str | None:
+    """SOURCE_DATE_EPOCH as ISO 8601 (reproducible-builds.org), or None."""
+    seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
+    return datetime.fromtimestamp(int(seconds), UTC).isoformat() if seconds.isdigit() else None

@@ -1,0 +1,109 @@
+"""What a free-standing thing stands on when nobody named it: a plate of its own foot's size, so that it does not fall.
+
+A mug on a counter that is no object of the scene would drop to the floor in the first second. The scan saw it rest there, so
+the plate stands in for the surface; the manifest says so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.export.plan import WORLD, Body, Plan, collider_corners_world
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.scene import Box, Inertial, Link
+
+PLATE_M = 0.01
+_FOOT_M = 0.02  # colliders are looked at this far above the lowest point
+_GAP_M = 5e-4  # no contact at rest, no visible fall
+_HIGHER_M, _LOWER_M = 0.004, 0.012  # what counts as standing on it: a support this far above or below the foot
+_SHARE = 0.3  # of the foot's corners
+_DENSITY_KG_M3 = 680.0
+
+
+def supported(plan: Plan) -> Plan:
+    """The plan with a plate under every free thing that nothing carries, where a plate has room."""
+    bodies, plates = plan.bodies, []
+    for thing in (body for body in bodies if body.free):
+        points = np.concatenate(collider_corners_world(thing) or [np.zeros((0, 3))])
+        others = [c for body in bodies if body.object_name != thing.object_name for c in collider_corners_world(body)]
+        if len(points) and not _carried(points, others, plan.floor_z_m):
+            plate = _plate(thing, points)
+            if not _in_the_way(plate, [c for b in bodies if _moves(b) for c in collider_corners_world(b)]):
+                plates.append(plate)
+    return replace(plan, bodies=(*bodies, *plates))
+
+
+def _carried(points: Points, others: Sequence[Points], floor_z_m: float) -> bool:
+    """Whether the floor or a collider's top lies under the foot, or under the middle, at its height."""
+    bottom = float(points[:, 2].min())
+    if abs(bottom - floor_z_m) <= _LOWER_M:
+        return True
+    foot = points[points[:, 2] < bottom + _FOOT_M, :2]
+    probes = np.concatenate([foot, points[:, :2].mean(axis=0, keepdims=True)])
+    under = np.zeros(len(probes), dtype=bool)
+    for corners in others:
+        if -_LOWER_M <= corners[:, 2].max() - bottom <= _HIGHER_M:
+            under |= _inside_plan(probes, corners[:, :2])
+    return bool(under[-1] or under[:-1].mean() > _SHARE)
+
+
+def _inside_plan(probes: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        sides = ConvexHull(outline).equations
+    except QhullError:
+        return np.zeros(len(probes), dtype=bool)
+    return np.asarray((probes @ sides[:, :2].T + sides[:, 2] <= 1e-6).all(axis=1))
+
+
+def _plate(thing: Body, points: Points) -> Body:
+    """A box under the thing's foot, turned as the thing is about the vertical."""
+    own = thing.world_from_body.rotation
+    yaw = np.arctan2(own[1, 0], own[0, 0])
+    c, s = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    bottom = float(points[:, 2].min())
+    foot = points[points[:, 2] < bottom + _FOOT_M] @ turn
+    low, high = foot.min(axis=0), foot.max(axis=0)
+    size = np.array([max(high[0] - low[0], 0.02), max(high[1] - low[1], 0.02), PLATE_M])
+    centre = turn @ np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, 0.0])
+    pose = Rigid3(turn, np.array([centre[0], centre[1], bottom - _GAP_M - PLATE_M / 2]))
+    mass = float(np.prod(size)) * _DENSITY_KG_M3
+    name = f"{thing.object_name}_support"
+    link = Link(
+        name=name,
+        object_from_link=Rigid3(),
+        boxes=(Box(name="plate", size_m=size, link_from_box=Rigid3()),),
+        pieces=(),
+        visual=None,
+        colour=(0.82, 0.82, 0.8),
+        inertial=Inertial(mass_kg=mass, com_link=np.zeros(3), inertia=np.diag(mass / 12 * ((size**2).sum() - size**2))),
+    )
+    return Body(
+        object_name=thing.object_name,
+        name=name,
+        parent=WORLD,
+        parent_from_body=pose,
+        world_from_body=pose,
+        joint_name=f"{name}_to_{WORLD}",
+        joint=None,
+        axis_body=None,
+        free=False,
+        link=link,
+        texture_file=None,
+        is_support=True,
+    )
+
+
+def _moves(body: Body) -> bool:
+    return body.free or body.joint is not None
+
+
+def _in_the_way(plate: Body, movers: Sequence[Points]) -> bool:
+    """Whether the plate's bounds meet those of anything that moves."""
+    own = collider_corners_world(plate)[0]
+    low, high = own.min(axis=0), own.max(axis=0)
+    return any(bool(((c.max(axis=0) > low) & (c.min(axis=0) < high)).all()) for c in movers)

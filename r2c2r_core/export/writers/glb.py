@@ -1,0 +1,50 @@
+"""scene.glb: the closed scene for web viewers, one node a link with the link's name. glTF is +Y up: the root node turns it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.meshes import box_mesh
+
+Y_UP_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+def write_glb(plan: Plan, path: Path) -> None:
+    """Write the plan as one binary glTF."""
+    import trimesh
+
+    scene = trimesh.Scene(base_frame="root")
+    scene.graph.update(frame_to=WORLD, frame_from="root", matrix=Y_UP_FROM_WORLD)
+    for body in plan.bodies:
+        scene.graph.update(frame_to=body.name, frame_from=body.parent, matrix=body.parent_from_body.matrix)
+        mesh = _mesh_of(body)
+        if mesh is not None:
+            scene.add_geometry(mesh, node_name=f"{body.name}_vis", geom_name=f"{body.name}_vis", parent_node_name=body.name)
+    path.write_bytes(scene.export(file_type="glb"))
+
+
+def _mesh_of(body: Body) -> Any:
+    import trimesh
+    from PIL import Image
+    from trimesh.visual.material import PBRMaterial
+    from trimesh.visual.texture import TextureVisuals
+
+    visual = body.link.visual
+    if visual is not None:
+        picture = Image.fromarray(np.ascontiguousarray(visual.texture))
+        material = PBRMaterial(
+            name=f"{body.name}_vis", baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True
+        )
+        dressed = TextureVisuals(uv=visual.uv, material=material)
+        return trimesh.Trimesh(visual.vertices, visual.faces, visual=dressed, process=False)
+    vertices, faces = box_mesh(body)
+    if len(faces) == 0:
+        return None
+    colour = [*(round(255 * c) for c in body.link.colour), 255]
+    material = PBRMaterial(name=f"{body.name}_vis", baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.9)
+    # flat shading: every triangle has corners of its own
+    mesh = trimesh.Trimesh(vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3), process=False)
+    mesh.visual = TextureVisuals(material=material)
+    return mesh

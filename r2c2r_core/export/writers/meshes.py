@@ -1,0 +1,112 @@
+"""Meshes as files: OBJ + MTL + PNG for visuals (the one textured format every loader reads), plain OBJ for convex pieces."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Image, Points
+from r2c2r_core.errors import ExportFailed
+from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.model.mesh import TexturedMesh
+
+
+def write_meshes(plan: Plan, folder: Path, texture_max_px: int) -> None:
+    """Write every body's meshes under `folder`; basenames are unique in the bundle, scale is baked in."""
+    for body in plan.bodies:
+        if body.visual_file is not None or body.collision_files:
+            (folder / body.folder).mkdir(parents=True, exist_ok=True)
+        if body.link.visual is not None and body.visual_file is not None and body.texture_file is not None:
+            _write_visual(folder / body.visual_file, body.link.visual, Path(body.texture_file).name)
+            texture = folder / body.texture_file
+            if not texture.exists():
+                texture.write_bytes(png_bytes(_bounded(body.link.visual.texture, texture_max_px)))
+        for piece, name in zip(body.link.pieces, body.collision_files, strict=True):
+            vertices, faces = convex_hull(piece.vertices_link, f"{body.name}: collider {piece.name}")
+            (folder / name).write_text(_obj_lines(vertices, faces))
+
+
+def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:
+    """Vertices and outward faces of the convex hull; raises ExportFailed on flat points, which no engine can use."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise ExportFailed(f"{where} is flat or empty ({len(points)} points)", hint="give it a thickness") from error
+    corner_of = {int(v): k for k, v in enumerate(hull.vertices)}
+    vertices = hull.points[hull.vertices]
+    faces = np.array([[corner_of[int(v)] for v in simplex] for simplex in hull.simplices])
+    a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return vertices, faces
+
+
+def box_mesh(body: Body) -> tuple[Points, Faces]:
+    """All boxes of a body as one triangle mesh in the body's frame."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    if not body.link.boxes:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    vertices = [box.link_from_box.apply(corners * box.size_m) for box in body.link.boxes]
+    faces = [_BOX_FACES + 8 * k for k in range(len(vertices))]
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def png_bytes(image: Image) -> bytes:
+    """An RGB image as PNG."""
+    _, encoded = cv2.imencode(".png", image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 6])
+    return encoded.tobytes()
+
+
+def _write_visual(path: Path, mesh: TexturedMesh, texture_name: str) -> None:
+    material = path.stem
+    head = f"mtllib {path.stem}.mtl\n"
+    path.write_text(head + _obj_lines(mesh.vertices, mesh.faces, mesh.uv, material))
+    path.with_suffix(".mtl").write_text(
+        f"newmtl {material}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\nmap_Kd {texture_name}\n"
+    )
+
+
+def _obj_lines(vertices: Points, faces: Faces, uv: np.ndarray | None = None, material: str = "") -> str:
+    lines = _rows("v %.6f %.6f %.6f", vertices)
+    if uv is not None:
+        lines += _rows("vt %.6f %.6f", uv)
+        lines.append(f"usemtl {material}")
+        lines += ["f %d/%d %d/%d %d/%d" % (a, a, b, b, c, c) for a, b, c in (faces + 1).tolist()]  # noqa: UP031  (fast)
+    else:
+        lines += _rows("f %d %d %d", faces + 1)
+    return "\n".join(lines) + "\n"
+
+
+def _rows(pattern: str, values: np.ndarray) -> list[str]:
+    tidy = np.round(values, 6) + 0.0  # no negative zeros
+    return [pattern % tuple(row) for row in tidy.tolist()]
+
+
+def _bounded(texture: Image, longest_px: int) -> Image:
+    height, width = texture.shape[:2]
+    if max(height, width) <= longest_px:
+        return texture
+    factor = longest_px / max(height, width)
+    size = (max(1, round(width * factor)), max(1, round(height * factor)))
+    return np.asarray(cv2.resize(texture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+_BOX_FACES = np.array(
+    [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ]
+)
+"""Twelve outward triangles over corners ordered x, y, z from minus to plus."""

@@ -1,0 +1,124 @@
+"""scene.xml: MuJoCo's own format, with what URDF cannot say: textures, free things, a floor, contact exclusions.
+
+Visual geoms are in group 2 and collide with nothing; colliders are in group 3. Inertials are explicit, angles are radians.
+"""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.text import numbers, quat_wxyz_of
+from r2c2r_core.geometry.transforms import Rigid3
+
+ARMATURE = {"revolute": 0.005, "prismatic": 0.02}
+"""kg m^2 and kg added to a joint for the solver's sake: under 2 % of a cabinet door's or a drawer's own."""
+
+
+def write_mjcf(plan: Plan, path: Path) -> None:
+    """Write the plan as one MJCF document with paths relative to its folder."""
+    path.write_text(mjcf_text(plan))
+
+
+def mjcf_text(plan: Plan) -> str:
+    """The MJCF document."""
+    root = ET.Element("mujoco", model=plan.name)
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(root, "option", timestep="0.002", integrator="implicitfast")
+    _add_defaults(root)
+    _add_assets(root, plan)
+    worldbody = ET.SubElement(root, "worldbody")
+    ET.SubElement(worldbody, "light", name="sun", pos="0 0 4", dir="0.3 0.4 -1", type="directional", diffuse="0.7 0.7 0.7")
+    floor = {"name": "floor", "type": "plane", "size": "0 0 0.05", "material": "floor", "pos": numbers([0, 0, plan.floor_z_m])}
+    ET.SubElement(worldbody, "geom", {"class": "collision", "group": "1", **floor})
+    elements = {WORLD: worldbody}
+    for body in plan.bodies:
+        elements[body.name] = _add_body(elements[body.parent], body)
+    contact = ET.SubElement(root, "contact")
+    for body in plan.bodies:
+        if body.parent != WORLD:
+            ET.SubElement(contact, "exclude", name=f"{body.name}_parent", body1=body.parent, body2=body.name)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_defaults(root: ET.Element) -> None:
+    visual = ET.SubElement(root, "visual")
+    ET.SubElement(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.4 0.4 0.4", specular="0 0 0")
+    default = ET.SubElement(root, "default")
+    seen = ET.SubElement(default, "default", {"class": "visual"})
+    ET.SubElement(seen, "geom", group="2", contype="0", conaffinity="0", mass="0")
+    touched = ET.SubElement(default, "default", {"class": "collision"})
+    ET.SubElement(touched, "geom", group="3", friction="0.7 0.01 0.001", rgba="0.5 0.6 0.7 0.4")
+
+
+def _add_assets(root: ET.Element, plan: Plan) -> None:
+    asset = ET.SubElement(root, "asset")
+    sky = {"type": "skybox", "builtin": "gradient", "rgb1": "0.93 0.94 0.96", "rgb2": "0.7 0.75 0.8"}
+    ET.SubElement(asset, "texture", {"name": "sky", "width": "64", "height": "64", **sky})
+    checker = {"type": "2d", "builtin": "checker", "rgb1": "0.78 0.77 0.75", "rgb2": "0.72 0.71 0.69"}
+    ET.SubElement(asset, "texture", {"name": "floor", "width": "256", "height": "256", **checker})
+    ET.SubElement(asset, "material", name="floor", texture="floor", texrepeat="2 2", texuniform="true", reflectance="0")
+    textures: dict[str, str] = {}
+    for body in plan.bodies:
+        if body.visual_file is not None and body.texture_file is not None:
+            texture = textures.setdefault(body.texture_file, f"{body.name}_tex")
+            if texture == f"{body.name}_tex":
+                ET.SubElement(asset, "texture", name=texture, type="2d", file=body.texture_file)
+                ET.SubElement(asset, "material", name=texture, texture=texture, specular="0.1", shininess="0.1")
+            # inertia="shell": a fitted visual may be open or thin, which a volume integral rejects
+            ET.SubElement(asset, "mesh", name=f"{body.name}_vis", file=body.visual_file, inertia="shell")
+        for number, name in enumerate(body.collision_files):
+            ET.SubElement(asset, "mesh", name=f"{body.name}_col_{number}", file=name)
+
+
+def _add_body(parent: ET.Element, body: Body) -> ET.Element:
+    element = ET.SubElement(parent, "body", {"name": body.name, **_pose(body.parent_from_body)})
+    inertial = body.link.inertial
+    full = [inertial.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    mass = {"pos": numbers(inertial.com_link), "mass": numbers(inertial.mass_kg), "fullinertia": numbers(full)}
+    ET.SubElement(element, "inertial", mass)
+    if body.free:
+        ET.SubElement(element, "freejoint", name=f"{body.name}_free")
+    if body.joint is not None:
+        _add_joint(element, body)
+    _add_visuals(element, body)
+    for number, _ in enumerate(body.collision_files):
+        name = f"{body.name}_col_{number}"
+        ET.SubElement(element, "geom", {"class": "collision", "name": name, "type": "mesh", "mesh": name})
+    for number, box in enumerate(body.link.boxes, start=len(body.collision_files)):
+        shape = {"name": f"{body.name}_col_{number}", "type": "box", "size": numbers(box.size_m / 2)}
+        ET.SubElement(element, "geom", {"class": "collision", **shape, **_pose(box.link_from_box)})
+    return element
+
+
+def _add_visuals(element: ET.Element, body: Body) -> None:
+    if body.visual_file is not None:
+        material = f"{Path(body.texture_file or '').stem.removesuffix('_vis')}_tex"
+        shape = {"name": f"{body.name}_vis", "type": "mesh", "mesh": f"{body.name}_vis", "material": material}
+        ET.SubElement(element, "geom", {"class": "visual", **shape})
+        return
+    for number, box in enumerate(body.link.boxes):
+        shape = {"name": f"{body.name}_vis_{number}", "type": "box", "size": numbers(box.size_m / 2)}
+        colour = {"rgba": numbers([*body.link.colour, 1.0])}
+        ET.SubElement(element, "geom", {"class": "visual", **shape, **colour, **_pose(box.link_from_box)})
+
+
+def _add_joint(element: ET.Element, body: Body) -> None:
+    joint = body.joint
+    assert joint is not None
+    ET.SubElement(
+        element,
+        "joint",
+        name=body.joint_name,
+        type="hinge" if joint.type == "revolute" else "slide",
+        axis=numbers(body.axis_body),
+        range=numbers([joint.lower, joint.upper]),
+        damping=numbers(joint.damping),
+        frictionloss=numbers(joint.friction),
+        armature=numbers(ARMATURE[joint.type]),
+        actuatorfrcrange=numbers([-joint.effort, joint.effort]),
+    )
+
+
+def _pose(pose: Rigid3) -> dict[str, str]:
+    return {"pos": numbers(pose.translation), "quat": numbers(quat_wxyz_of(pose.rotation))}

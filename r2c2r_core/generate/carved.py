@@ -1,0 +1,267 @@
+"""Free-standing things: a prior solid, carved by free space and silhouettes, with the fused surface where it was seen.
+
+Recipe of backends.md §2.6 and stack.md §8. Every field is a distance in metres, positive outside, on a grid in the thing's
+own gravity-aligned frame, so the zero level is a closed surface whatever was not seen.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.errors import GenerationFailed
+from r2c2r_core.generate.consistency import self_consistency, silhouette_iou
+from r2c2r_core.generate.evidence import Evidence, masked_points
+from r2c2r_core.generate.lathe import fit_lathe, is_round, lathe_mesh
+from r2c2r_core.generate.shape import Shape
+from r2c2r_core.generate.symmetry import Revolution, best_mirror, fit_revolution, is_rounder_than_box
+from r2c2r_core.generate.variation import Variation
+from r2c2r_core.generate.votes import collect_votes
+from r2c2r_core.geometry.meshes import largest_component, simplify, volume
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+
+_MOST_VOXELS = 1_000_000
+_MOST_CELLS = 160  # along the longest side: 6 mm on a chair
+_TRUNCATION_VOXELS = 3.0
+_LEAST_TRUNCATION_M = 0.012  # LiDAR noise and pose error together
+_LEVELS_M = (-0.004, -0.002, 0.0, 0.002, 0.004)
+_MOST_FACES = 6000
+_LEAST_POINTS = 60
+_COMPONENT_CELL_M = 0.03
+_LATHE_FIT = 0.75
+
+
+class Grid(NamedTuple):
+    """Voxel centres low + (i + 0.5) * voxel in the local frame."""
+
+    low: Vector3
+    shape: tuple[int, int, int]
+    voxel_m: float
+
+    def centres(self) -> Points:
+        """All voxel centres (n, 3), last axis fastest."""
+        axes = [self.low[k] + (np.arange(self.shape[k]) + 0.5) * self.voxel_m for k in range(3)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def carved_shape(evidence: Evidence, variation: Variation) -> Shape:
+    """A thing's solid from its views; frame: its box's, gravity-aligned, origin at the box's centre."""
+    world_from_local = _local_frame(evidence)
+    points = _object_points(evidence, variation, world_from_local)
+    low, high, floor = _prior_box(evidence, variation, points, world_from_local)
+    revolution = fit_revolution(points)
+    lathe = None
+    if revolution is not None:
+        span_m = (float(low[2]), float(high[2]))
+        lathe, certain = _lathe_shape(variation, revolution, points, span_m, world_from_local)
+        if lathe is not None and certain and _fit(lathe, evidence) > _LATHE_FIT:
+            return lathe
+        revolution = revolution if is_rounder_than_box(points, revolution) else None
+    if revolution is not None:
+        low, high = _around(revolution, low, high)
+    margin = max(0.006, 1.5 * variation.voxel_m)
+    grid = _grid(low, high, variation.voxel_m, margin)
+    field, mirrored = _solid_field(grid, low - margin, high + margin, revolution, variation, world_from_local)
+    vertices, faces, level = _best_level(grid, field, floor, evidence, variation, world_from_local)
+    parameters = {"revolved": float(revolution is not None), "mirrored": float(mirrored), "level_m": level}
+    carved = _thing(vertices, faces, world_from_local, parameters)
+    return lathe if lathe is not None and _fit(lathe, evidence) > _fit(carved, evidence) else carved
+
+
+def _thing(vertices: Points, faces: Faces, world_from_local: Rigid3, parameters: dict[str, float]) -> Shape:
+    return Shape(
+        vertices_local=vertices,
+        faces=faces,
+        world_from_local=world_from_local,
+        front_y_m=None,
+        maskable=np.ones(len(faces), dtype=bool),
+        parameters=parameters,
+        warnings=(),
+    )
+
+
+def _fit(shape: Shape, evidence: Evidence) -> float:
+    """Mask IoU less twice the depth residual in metres (backends.md §2.7), over the best frames."""
+    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:8])
+    return fit["mask_iou"] - 2.0 * fit.get("depth_residual_m", 0.0)
+
+
+def _lathe_shape(
+    variation: Variation, revolution: Revolution, points: Points, span_m: tuple[float, float], world_from_local: Rigid3
+) -> tuple[Shape | None, bool]:
+    """A clean body of revolution, None where masks do not give one, and whether the depth points lie on it too."""
+    measured = fit_lathe(points, revolution, *span_m, variation.views, world_from_local)
+    if measured is None:
+        return None, False
+    shape = _thing(*lathe_mesh(measured), world_from_local, {"revolved": 1.0, "mirrored": 0.0})
+    return shape, is_round(points, measured)
+
+
+def _local_frame(evidence: Evidence) -> Rigid3:
+    """The track's box frame; without one, a frame along the room's dominant directions at the middle of the points."""
+    if evidence.track.box is not None:
+        return evidence.track.box.world_from_object
+    points = np.concatenate([masked_points(v) for v in evidence.pool])
+    if len(points) < _LEAST_POINTS:
+        raise GenerationFailed(
+            f"{evidence.track.name}: {len(points)} depth points inside its masks", hint="scan it from nearer"
+        )
+    return Rigid3(rotation_about_z(evidence.capture.room.manhattan_yaw_rad), np.median(points, axis=0))
+
+
+def _object_points(evidence: Evidence, variation: Variation, world_from_local: Rigid3) -> Points:
+    """Depth points of the object in the local frame: its largest connected piece."""
+    found = [masked_points(view, variation.erosion_px) for view in variation.views]
+    points = world_from_local.inverse.apply(np.concatenate(found))
+    if len(points) < _LEAST_POINTS:
+        raise GenerationFailed(
+            f"{evidence.track.name}: {len(points)} depth points inside its masks, {_LEAST_POINTS} needed",
+            hint="scan it from nearer, or upload a mesh",
+        )
+    return _largest_cluster(points)
+
+
+def _largest_cluster(points: Points) -> Points:
+    """The points of the largest component of coarse occupied cells: what shines through slats or past edges falls off."""
+    from scipy import ndimage
+
+    cell = np.floor((points - points.min(axis=0)) / _COMPONENT_CELL_M).astype(int)
+    counts = np.zeros(cell.max(axis=0) + 1, dtype=np.int64)
+    np.add.at(counts, tuple(cell.T), 1)
+    labels, count = ndimage.label(counts >= 2, structure=np.ones((3, 3, 3)))
+    if count <= 1:
+        return points
+    sizes = ndimage.sum(counts, labels, index=np.arange(1, count + 1))
+    return points[labels[tuple(cell.T)] == 1 + int(np.argmax(sizes))]
+
+
+def _prior_box(
+    evidence: Evidence, variation: Variation, points: Points, world_from_local: Rigid3
+) -> tuple[Vector3, Vector3, float | None]:
+    """Corners of the solid that is carved, and the height it stands on (local), None where unknown."""
+    percentile = variation.bbox_percentile
+    low, high = np.percentile(points, percentile, axis=0), np.percentile(points, 100 - percentile, axis=0)
+    box = evidence.track.box
+    if box is None:
+        return low, high, None
+    half = np.asarray(box.dimensions_m) / 2
+    eyes = world_from_local.inverse.apply(np.array([v.eye_world for v in variation.views]))
+    for axis in (0, 1):  # a side no camera looks at keeps the track's box, when that reaches further
+        if not (eyes[:, axis] > half[axis]).any():
+            high[axis] = max(high[axis], half[axis] * variation.depth_scale)
+        if not (eyes[:, axis] < -half[axis]).any():
+            low[axis] = min(low[axis], -half[axis] * variation.depth_scale)
+    floor = box.support_z_m - float(world_from_local.translation[2])
+    if low[2] - floor > 0.5 * (high[2] - low[2]):  # hangs or stands on something else
+        return low, high, None
+    low[2] = floor
+    return low, high, floor
+
+
+def _around(revolution: Revolution, low: Vector3, high: Vector3) -> tuple[Vector3, Vector3]:
+    """The box of a body of revolution, at the heights of the points."""
+    radius = float(revolution.radii_m.max())
+    low, high = low.copy(), high.copy()
+    low[:2], high[:2] = revolution.centre - radius, revolution.centre + radius
+    return low, high
+
+
+def _grid(low: Vector3, high: Vector3, voxel_m: float, margin_m: float) -> Grid:
+    """A grid over the box with a margin and two voxels of air."""
+    start, size = low - margin_m - 2 * voxel_m, high - low + 2 * margin_m + 4 * voxel_m
+    voxel_m = max(voxel_m, float(size.max()) / _MOST_CELLS, float(np.cbrt(np.prod(size) / _MOST_VOXELS)))
+    counts = np.ceil(size / voxel_m).astype(int) + 1
+    return Grid(start, (int(counts[0]), int(counts[1]), int(counts[2])), voxel_m)
+
+
+def _solid_field(
+    grid: Grid,
+    low: Vector3,
+    high: Vector3,
+    revolution: Revolution | None,
+    variation: Variation,
+    world_from_local: Rigid3,
+) -> tuple[np.ndarray, bool]:
+    """Distance field (positive outside) of the completed solid, and whether a mirror completed it."""
+    from scipy import ndimage
+
+    centres = grid.centres()
+    truncation = max(_TRUNCATION_VOXELS * grid.voxel_m, _LEAST_TRUNCATION_M)
+    votes = collect_votes(world_from_local.apply(centres), variation, truncation)
+    bounds = np.maximum(low - centres, centres - high).max(axis=1)
+    prior = np.maximum(bounds, revolution.signed_distance(centres)) if revolution is not None else bounds
+    prior = np.clip(prior, -truncation, truncation)
+    seen = np.isfinite(votes.distance_m)
+    free = votes.free_m > 0
+    # what lies in no mask, but behind another thing in every frame, is nobody's guess: leave it out
+    field = np.where(seen, votes.distance_m, np.maximum(prior, votes.outside_m))
+    field = np.where(free, np.maximum(field, np.minimum(votes.free_m, truncation)), field)
+    field = np.maximum(field, np.clip(bounds, -truncation, truncation))
+    volume_field = field.reshape(grid.shape)
+    mirrored = revolution is None and _mirror_unseen(
+        volume_field,
+        (seen | free).reshape(grid.shape),
+        free.reshape(grid.shape),
+        (~seen & ~free & (votes.outside_m > 0)).reshape(grid.shape),
+    )
+    solid = volume_field < 0
+    slivers = solid & ~ndimage.binary_opening(solid, iterations=2) & ~seen.reshape(grid.shape)
+    volume_field[slivers] = grid.voxel_m  # what is left between two silhouettes and was never seen as a surface
+    return ndimage.gaussian_filter(volume_field, 0.7), mirrored
+
+
+def _mirror_unseen(field: np.ndarray, seen: np.ndarray, free: np.ndarray, hidden: np.ndarray) -> bool:
+    """Give voxels that nobody saw, in place, what their mirror twins were seen to be; the middle is the grid's own.
+
+    Free twins carve; solid twins fill only what is `hidden` behind other things.
+    """
+    from scipy import ndimage
+
+    axis = best_mirror(field < 0, seen, free)
+    if axis is None:
+        return False
+    twin, twin_seen, twin_free = (np.flip(values, axis).copy() for values in (field, seen, free))
+    filled = ndimage.binary_opening(hidden & twin_seen & (twin < 0), iterations=2)  # slivers are masks that disagree
+    changed = (~seen & twin_free) | filled
+    field[changed] = twin[changed]
+    return bool(changed.any())
+
+
+def _best_level(
+    grid: Grid, field: np.ndarray, floor: float | None, evidence: Evidence, variation: Variation, world_from_local: Rigid3
+) -> tuple[Points, Faces, float]:
+    """The surface at the level, within ±4 mm, whose silhouettes agree best with the masks: masks and votes err to one side."""
+    best: tuple[float, float, Points, Faces] | None = None
+    views = variation.views[:: max(len(variation.views) // 5, 1)]
+    for level in _LEVELS_M:
+        extracted = _extract(grid, field, level, floor)
+        if extracted is None:
+            continue
+        vertices, faces = extracted
+        score = silhouette_iou(world_from_local.apply(vertices), faces, views)
+        if best is None or score > best[0]:
+            best = (score, level, vertices, faces)
+    if best is None:
+        raise GenerationFailed(f"{evidence.track.name}: carving left nothing", hint="its masks disagree; add a click")
+    _, level, vertices, faces = best
+    try:
+        return *simplify(vertices, faces, 0.25 * grid.voxel_m, _MOST_FACES), level
+    except ValueError as error:
+        raise GenerationFailed(f"{evidence.track.name}: {error}") from error
+
+
+def _extract(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces] | None:
+    """Largest closed surface field = level, in the local frame; None where the field nowhere goes below it."""
+    from skimage.measure import marching_cubes
+
+    shifted = field - level
+    if floor is not None:  # the level must not lift the thing off its support
+        shifted = np.maximum(shifted, floor - (grid.low[2] + (np.arange(grid.shape[2]) + 0.5) * grid.voxel_m))
+    padded = np.pad(shifted, 1, constant_values=grid.voxel_m)
+    padded[np.abs(padded) < 1e-7] = 1e-7  # a vertex exactly on a voxel centre would be duplicated
+    if not (padded < 0).any():
+        return None
+    vertices, faces, _, _ = marching_cubes(padded, 0.0)
+    local = grid.low + (vertices.astype(np.float64) - 0.5) * grid.voxel_m
+    local, joined = largest_component(local, faces.astype(np.int64))
+    return local, joined if volume(local, joined) > 0 else joined[:, ::-1]

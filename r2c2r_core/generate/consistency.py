@@ -1,0 +1,78 @@
+"""How well a mesh, where its generator believes it is, reproduces the masks and the depth it came from."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Faces, Mask, Points
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.geometry.camera import sample_nearest
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.geometry.raster import rasterize
+
+_RENDER_PX = 240  # long side of the view; finer changes the IoU by less than its noise
+_OCCLUDER_GAP_M = 0.05
+_WORST_DEPTH_M = 0.2  # backends.md §2.7
+
+
+def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray, views: Sequence[View]) -> dict[str, float]:
+    """`mask_iou` of the visible silhouette and `depth_residual_m`, means over the views.
+
+    A front's mask leaves its carcass out, except where a bare side shows: the better of both silhouettes counts.
+    """
+    overlaps, residuals = [], []
+    for view in views:
+        depth = render_depth(vertices_world, faces[maskable], view)
+        sensor = sensor_depth(view, depth.shape)
+        mask = mask_at(view, depth.shape)
+        overlap = _visible_iou(depth, sensor, mask)
+        if not maskable.all():
+            whole = render_depth(vertices_world, faces, view)
+            overlap = max(overlap, _visible_iou(whole, sensor, mask))
+        overlaps.append(overlap)
+        both = (depth > 0) & (sensor > 0) & mask
+        if both.sum() >= 20:
+            residuals.append(float(np.minimum(np.abs(depth - sensor)[both], _WORST_DEPTH_M).mean()))
+    metrics = {"mask_iou": float(np.mean(overlaps))} if overlaps else {}
+    return {**metrics, "depth_residual_m": float(np.mean(residuals))} if residuals else metrics
+
+
+def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) -> float:
+    """Mean IoU of the visible silhouette with the masks."""
+    scores = []
+    for view in views:
+        depth = render_depth(vertices_world, faces, view)
+        scores.append(_visible_iou(depth, sensor_depth(view, depth.shape), mask_at(view, depth.shape)))
+    return float(np.mean(scores))
+
+
+def render_depth(vertices_world: Points, faces: Faces, view: View) -> DepthMetres:
+    """The mesh's depth in the view's crop, at a small size."""
+    camera = view.rgb_camera
+    scale = min(1.0, _RENDER_PX / max(camera.width, camera.height))
+    small = camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
+    return rasterize(vertices_world, faces, np.ones((len(vertices_world), 3)), small, view.world_from_camera.inverse).depth_m
+
+
+def mask_at(view: View, shape: tuple[int, ...]) -> Mask:
+    """The view's mask at another size of its crop."""
+    small = cv2.resize(view.mask.astype(np.uint8) * 255, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+    return np.asarray(small > 127)
+
+
+def sensor_depth(view: View, shape: tuple[int, ...]) -> DepthMetres:
+    """The measured depth at the pixels of the view's colour crop resized to `shape`; 0 where unknown."""
+    rgb = view.rgb_camera.resized(shape[1], shape[0])
+    depth = view.depth_camera
+    u = (np.arange(shape[1]) + 0.5 - rgb.cx) / rgb.fx * depth.fx + depth.cx
+    v = (np.arange(shape[0]) + 0.5 - rgb.cy) / rgb.fy * depth.fy + depth.cy
+    uv = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    values, inside = sample_nearest(view.depth_m, uv)
+    return np.where(inside, values, 0.0).reshape(shape).astype(np.float32)
+
+
+def _visible_iou(depth: DepthMetres, sensor: DepthMetres, mask: Mask) -> float:
+    """IoU of the silhouette with the mask, leaving out pixels where something nearer hides the mesh."""
+    hidden = (sensor > 0) & (depth > 0) & (sensor < depth - _OCCLUDER_GAP_M) & ~mask
+    return mask_iou((depth > 0) & ~hidden, mask)

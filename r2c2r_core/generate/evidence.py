@@ -1,0 +1,177 @@
+"""What is known about one object before a mesh is made: its good frames, cropped to it, with mask and depth."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Image, Mask, Points, Vector3
+from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.camera import Intrinsics, depth_points, pixel_centres, sample_nearest
+from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.track import MaskTrack
+
+_AZIMUTH_BINS = 12
+_EDGE_STEP = 0.06  # of the depth within 3x3 pixels: the object's outline, where depth mixes (backends.md 2.7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """One frame, cropped to the object with a margin; colour, mask and depth keep their own resolutions."""
+
+    frame_index: int
+    rgb: Image
+    mask: Mask
+    rgb_camera: Intrinsics
+    depth_m: DepthMetres
+    depth_camera: Intrinsics
+    world_from_camera: Rigid3
+    sharpness: float  # rank among the pool, 0..1
+    is_cropped: bool  # the mask touches the image border
+
+    @property
+    def eye_world(self) -> Vector3:
+        """Where the camera stands."""
+        return self.world_from_camera.translation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """One object's capture, track and pool of good frames, best first."""
+
+    capture: Capture
+    track: MaskTrack
+    pool: tuple[View, ...]
+
+
+def gather_evidence(capture: Capture, track: MaskTrack, pool_size: int) -> Evidence:
+    """Load the object's good frames: large, whole, sharp masks, spread in azimuth (method.md row 14); raises ObjectNotSeen."""
+    frames = [frame for frame in capture.frames if frame.index in track.masks and track.masks[frame.index].area_px > 0]
+    if not frames:
+        raise ObjectNotSeen(f"{track.name}: its masks are empty in all frames", hint="click it in a frame that shows it")
+    quality = _qualities(frames, track)
+    centre = object_centre(capture, track, frames[int(np.argmax(quality))])
+    chosen = _spread_choice(frames, quality, centre, pool_size)
+    order = np.argsort(np.argsort([frame.sharpness for frame in chosen])) / max(len(chosen) - 1, 1)
+    pool = tuple(_load_view(capture, track.masks[f.index], f, float(rank)) for f, rank in zip(chosen, order, strict=True))
+    return Evidence(capture=capture, track=track, pool=pool)
+
+
+def object_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
+    """Where the object is, in the world: from what the segmenter measured, else the median depth point of `frame`."""
+    if track.box is not None:
+        return track.box.world_from_object.translation
+    if track.front is not None:
+        return track.front.world_from_front.translation
+    view = _load_view(capture, track.masks[frame.index], frame, 1.0)
+    points = masked_points(view)
+    if len(points) == 0:
+        return frame.world_from_camera.apply(np.array([[0.0, 0.0, 1.5]]))[0]
+    return np.median(points, axis=0)
+
+
+def masked_points(view: View, erosion_px: float = 1.0) -> Points:
+    """World points of the depth pixels well inside the mask; `erosion_px` in depth pixels."""
+    inside = depth_mask(view, erosion_px) & (view.depth_m > 0) & ~depth_edges(view.depth_m)
+    return view.world_from_camera.apply(depth_points(view.depth_m, view.depth_camera)[inside])
+
+
+def depth_mask(view: View, erosion_px: float = 0.0) -> Mask:
+    """The mask at depth resolution, eroded by depth pixels (dilated where negative)."""
+    ratio = view.rgb_camera.fx / view.depth_camera.fx
+    mask = moved_edge(view.mask, -erosion_px * ratio)
+    values, inside = sample_nearest(mask, _rgb_pixels_of_depth(view))
+    return (values & inside).reshape(view.depth_m.shape)
+
+
+def moved_edge(mask: Mask, outwards_px: float) -> Mask:
+    """The mask with its edge moved outwards by pixels (inwards where negative); the image border does not erode it."""
+    radius = round(abs(outwards_px))
+    if radius == 0:
+        return mask
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    change = cv2.dilate if outwards_px > 0 else cv2.erode
+    return np.asarray(change(mask.astype(np.uint8), kernel), dtype=bool)
+
+
+def depth_edges(depth_m: DepthMetres) -> Mask:
+    """Pixels whose neighbourhood steps in depth."""
+    filled = np.where(depth_m > 0, depth_m, np.nan).astype(np.float32)
+    near = cv2.erode(np.where(np.isnan(filled), np.float32(1e3), filled), np.ones((3, 3), np.uint8))
+    far = cv2.dilate(np.where(np.isnan(filled), np.float32(0), filled), np.ones((3, 3), np.uint8))
+    return np.asarray((depth_m > 0) & (far - near > _EDGE_STEP * near))
+
+
+def _rgb_pixels_of_depth(view: View) -> np.ndarray:
+    uv = pixel_centres(view.depth_camera).reshape(-1, 2)
+    rgb, depth = view.rgb_camera, view.depth_camera
+    x = (uv[:, 0] - depth.cx) / depth.fx * rgb.fx + rgb.cx
+    y = (uv[:, 1] - depth.cy) / depth.fy * rgb.fy + rgb.cy
+    return np.column_stack([x, y])
+
+
+def _qualities(frames: list[Frame], track: MaskTrack) -> np.ndarray:
+    """How good each frame is to make a mesh from: area, wholeness, sharpness, confidence (paper §4.2)."""
+    area = np.array([track.masks[f.index].area_px for f in frames], dtype=np.float64)
+    whole = np.array([0.4 if _touches_border(track.masks[f.index]) else 1.0 for f in frames])
+    sharp = np.argsort(np.argsort([f.sharpness for f in frames])) / max(len(frames) - 1, 1)
+    confidence = np.array([track.confidence.get(f.index, 0.5) for f in frames])
+    return np.asarray(np.sqrt(area / area.max()) * whole * (0.4 + 0.6 * sharp) * (0.2 + 0.8 * confidence))
+
+
+def _touches_border(mask: PackedMask) -> bool:
+    right, bottom = mask.left + mask.box_width, mask.top + mask.box_height
+    return mask.left <= 1 or mask.top <= 1 or right >= mask.width - 1 or bottom >= mask.height - 1
+
+
+def _spread_choice(frames: list[Frame], quality: np.ndarray, centre: Vector3, count: int) -> list[Frame]:
+    """The best frame of each azimuth bin in turn, until `count` are chosen; best first."""
+    offsets = np.array([f.world_from_camera.translation - centre for f in frames])
+    azimuth = np.unwrap(np.sort(np.arctan2(offsets[:, 1], offsets[:, 0])))
+    order = np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]))
+    position = np.zeros(len(frames))
+    position[order] = (azimuth - azimuth[0]) / max(float(np.ptp(azimuth)), 1e-6)
+    bins = np.minimum((position * _AZIMUTH_BINS).astype(int), _AZIMUTH_BINS - 1)
+    turn = np.zeros(len(frames), dtype=int)
+    for b in range(_AZIMUTH_BINS):
+        members = np.flatnonzero(bins == b)
+        turn[members[np.argsort(-quality[members])]] = np.arange(len(members))
+    poor = quality < 0.25 * quality.max()
+    chosen = np.lexsort((-quality, turn, poor))[:count]
+    return [frames[i] for i in chosen[np.argsort(-quality[chosen])]]
+
+
+def _load_view(capture: Capture, packed: PackedMask, frame: Frame, sharpness: float) -> View:
+    rgb = capture.images.rgb(frame.index)
+    depth = capture.images.depth(frame.index)
+    margin = 0.2 * max(packed.box_width, packed.box_height) + 0.02 * packed.width
+    box = (packed.left - margin, packed.top - margin)
+    end = (packed.left + packed.box_width + margin, packed.top + packed.box_height + margin)
+    scale = np.array([frame.depth_camera.fx / frame.rgb_camera.fx, frame.depth_camera.fy / frame.rgb_camera.fy])
+    offset = np.array([frame.depth_camera.cx, frame.depth_camera.cy]) - scale * [frame.rgb_camera.cx, frame.rgb_camera.cy]
+    rgb_window, rgb_camera = _window(frame.rgb_camera, np.array(box), np.array(end))
+    depth_window, depth_camera = _window(frame.depth_camera, scale * box + offset, scale * end + offset)
+    return View(
+        frame_index=frame.index,
+        rgb=np.ascontiguousarray(rgb[rgb_window]),
+        mask=np.ascontiguousarray(unpack_mask(packed)[rgb_window]),
+        rgb_camera=rgb_camera,
+        depth_m=np.where(depth.valid, depth.metres, 0.0).astype(np.float32)[depth_window],
+        depth_camera=depth_camera,
+        world_from_camera=frame.world_from_camera,
+        sharpness=sharpness,
+        is_cropped=_touches_border(packed),
+    )
+
+
+def _window(camera: Intrinsics, start: np.ndarray, end: np.ndarray) -> tuple[tuple[slice, slice], Intrinsics]:
+    """The image window between two corners, clipped to the image, and its camera."""
+    left, top = (int(max(np.floor(v), 0)) for v in start)
+    right, bottom = int(min(np.ceil(end[0]), camera.width)), int(min(np.ceil(end[1]), camera.height))
+    right, bottom = max(right, left + 1), max(bottom, top + 1)
+    cropped = Intrinsics(
+        fx=camera.fx, fy=camera.fy, cx=camera.cx - left, cy=camera.cy - top, width=right - left, height=bottom - top
+    )
+    return (slice(top, bottom), slice(left, right)), cropped

@@ -1,0 +1,200 @@
+"""Round things (bottles, cans, vases): one clean body of revolution whose profile is read off the masks.
+
+A LiDAR pixel is a fifth of a bottle; a colour pixel is a fortieth. So depth says where the axis is and that the thing is
+round, and the silhouettes say how wide it is at each height.
+"""
+
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.generate.symmetry import Revolution
+from r2c2r_core.geometry.camera import project, sample_nearest, unproject
+from r2c2r_core.geometry.transforms import Rigid3
+
+_RINGS = 40
+_SEGMENTS = 40
+_STEP_PX = 0.25
+_SAME_WIDTH = 0.08
+_BITTEN = 0.88  # one side this much narrower than the other: the mask, not the thing
+_MASK_WEIGHT = 0.3
+_LEAST_VIEWS = 3
+_ROBUST_SCALES_M = (0.04, 0.02, 0.01, 0.01)  # of the depth residuals, round by round: the first axis may be 2 cm off
+
+
+def fit_lathe(
+    points: Points, start: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
+) -> Revolution | None:
+    """The body of revolution that fits masks and depth best, or None where too few masks show the thing whole.
+
+    The rays through the mask's two edges at a height touch the circle there, which gives the radius; with the radii known,
+    the axis is where the depth points lie on them and the masks are balanced about it. (A circle fitted to depth alone is
+    too small and too near: noise along the rays looks like curvature.)
+    """
+    whole = tuple(view for view in views if not view.is_cropped)
+    if len(whole) < _LEAST_VIEWS:
+        return None
+    current = start
+    for scale_m in _ROBUST_SCALES_M:
+        top_m = _silhouette_top(current, bottom_m, top_m, whole, world_from_local)
+        measured = _silhouette_profile(current, bottom_m, top_m, whole, world_from_local)
+        if measured is None:
+            return None
+        profile, balance = measured
+        current = profile._replace(centre=_balanced_centre(points, profile, balance, scale_m))
+    return current
+
+
+def is_round(points: Points, revolution: Revolution) -> bool:
+    """Whether the points lie on the revolution within LiDAR noise: a carton's flat side and a mug's handle do not."""
+    off = np.abs(revolution.signed_distance(points))
+    radius = np.interp(points[:, 2], revolution.heights_m, revolution.radii_m)
+    near = off < np.maximum(0.01, 0.3 * radius)
+    return bool(np.median(off) < max(0.006, 0.12 * float(revolution.radii_m.max())) and near.mean() > 0.8)
+
+
+def _silhouette_profile(
+    revolution: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
+) -> tuple[Revolution, np.ndarray] | None:
+    """Radii at `_RINGS` heights, and each view's equation (sideways x, y, metres): how far its mask is off the axis."""
+    from scipy import ndimage
+
+    heights = bottom_m + (np.arange(_RINGS) + 0.5) / _RINGS * (top_m - bottom_m)
+    edges = np.array([_half_widths(revolution, heights, view, world_from_local) for view in views])  # (view, 2, height)
+    widths = _full_halves(edges)
+    counts = np.isfinite(widths).sum(axis=0)
+    known = counts >= _LEAST_VIEWS
+    if known.mean() < 0.7:
+        return None
+    radii = np.array([np.median(column[np.isfinite(column)]) for column in widths.T[known]])
+    radii = np.interp(heights, heights[known], radii)
+    smooth = ndimage.gaussian_filter1d(ndimage.median_filter(radii, 5, mode="nearest"), 1.0, mode="nearest")
+    step = (top_m - bottom_m) / _RINGS
+    ends = np.concatenate([[bottom_m], heights, [heights[-1] + step / 2]])
+    # a mask narrower than the others ends at something in front, not at the thing's own outline
+    own = [k for k in range(len(views)) if abs(_middle(widths[k] / radii) - 1.0) < _SAME_WIDTH]
+    balance = np.array([_balance(revolution, edges[k], views[k], world_from_local) for k in own]).reshape(-1, 3)
+    profile = Revolution(revolution.centre, ends, np.concatenate([smooth[:1], smooth, smooth[-1:]]))
+    return profile, balance
+
+
+def _full_halves(edges: np.ndarray) -> np.ndarray:
+    """Half-widths (view, height) from both edges; where one side is bitten out, the other one, for the thing is symmetric."""
+    shift = np.array([_middle((view[0] - view[1]) / 2) for view in edges])
+    centred = edges - np.where(np.isfinite(shift), shift, 0.0)[:, None, None] * np.array([1.0, -1.0])[None, :, None]
+    narrow, wide = centred.min(axis=1), centred.max(axis=1)
+    return np.asarray(np.where(narrow < _BITTEN * wide, wide, centred.mean(axis=1)))
+
+
+def _middle(values: np.ndarray) -> float:
+    """Median of the numbers among the values; infinite where there are none."""
+    numbers = values[np.isfinite(values)]
+    return float(np.median(numbers)) if len(numbers) else np.inf
+
+
+def _balance(revolution: Revolution, edges: np.ndarray, view: View, world_from_local: Rigid3) -> np.ndarray:
+    """(sideways x, sideways y, metres the mask's middle lies that way); nan where the axis is hidden."""
+    shift = (edges[0] - edges[1]) / 2
+    seen = np.isfinite(shift)
+    if not seen.any():
+        return np.full(3, np.nan)
+    forward = _forward(revolution, view, world_from_local)
+    return np.array([forward[1], -forward[0], np.median(shift[seen]) * np.linalg.norm(forward)]) / np.linalg.norm(forward)
+
+
+def _forward(revolution: Revolution, view: View, world_from_local: Rigid3) -> np.ndarray:
+    """From the camera to the axis, level, local frame."""
+    return np.asarray(revolution.centre - world_from_local.inverse.apply(view.eye_world[None])[0, :2])
+
+
+def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, scale_m: float) -> np.ndarray:
+    """The axis' place after one Gauss-Newton step: points on the radii (robust), masks balanced."""
+    offset = points[:, :2] - profile.centre
+    distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
+    body = (points[:, 2] > profile.heights_m[0]) & (points[:, 2] < profile.heights_m[-1])
+    residual = distance - np.interp(points[:, 2], profile.heights_m, profile.radii_m)
+    weight = np.where(body, 1.0 / (1.0 + (residual / scale_m) ** 2), 0.0)
+    rows = (offset / distance[:, None]) * weight[:, None]
+    # masks fix the axis sideways; how far away it is they only tell through pose errors, so depth weighs more
+    share = _MASK_WEIGHT * weight.sum() / max(len(balance), 1) / (1.0 + (balance[:, 2:] / scale_m) ** 2)
+    system = np.concatenate([rows, balance[:, :2] * share])
+    target = np.concatenate([residual * weight, balance[:, 2] * share[:, 0]])
+    step = np.linalg.lstsq(system, target, rcond=None)[0]
+    return np.asarray(profile.centre + np.clip(step, -0.03, 0.03))
+
+
+def lathe_mesh(revolution: Revolution) -> tuple[Points, Faces]:
+    """The closed, outward surface of a body of revolution with flat ends."""
+    angle = np.arange(_SEGMENTS) / _SEGMENTS * 2 * np.pi
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    rings = len(revolution.heights_m)
+    vertices = np.zeros((rings * _SEGMENTS + 2, 3))
+    vertices[:-2, :2] = (revolution.centre + revolution.radii_m[:, None, None] * circle).reshape(-1, 2)
+    vertices[:-2, 2] = np.repeat(revolution.heights_m, _SEGMENTS)
+    vertices[-2:, :2] = revolution.centre
+    vertices[-2:, 2] = revolution.heights_m[[0, -1]]
+    here = np.arange(_SEGMENTS)
+    following = np.roll(here, -1)
+    faces = []
+    for ring in range(rings - 1):
+        low, high = ring * _SEGMENTS, (ring + 1) * _SEGMENTS
+        faces.append(np.column_stack([low + here, low + following, high + following]))
+        faces.append(np.column_stack([low + here, high + following, high + here]))
+    last = (rings - 1) * _SEGMENTS
+    faces.append(np.column_stack([following, here, np.full(_SEGMENTS, len(vertices) - 2)]))
+    faces.append(np.column_stack([last + here, last + following, np.full(_SEGMENTS, len(vertices) - 1)]))
+    return vertices, np.concatenate(faces)
+
+
+def _half_widths(revolution: Revolution, heights: np.ndarray, view: View, world_from_local: Rigid3) -> np.ndarray:
+    """(2, n) metres from the axis to the mask's right and left edge at each height; nan where the axis itself is hidden."""
+    axis = _axis_points(revolution, heights)
+    camera_from_local = view.world_from_camera.inverse @ world_from_local
+    in_camera = camera_from_local.apply(axis)
+    pixel = project(in_camera, view.rgb_camera)
+    along = pixel[-1] - pixel[0]
+    across = np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)  # to the right: heights run up
+    reach = int(np.ceil(2.5 * revolution.radii_m.max() * view.rgb_camera.fx / in_camera[:, 2].min() / _STEP_PX))
+    offsets = (np.arange(-reach, reach + 1) * _STEP_PX)[None, :, None] * across
+    values, inside = sample_nearest(view.mask, (pixel[:, None, :] + offsets).reshape(-1, 2))
+    row = (values & inside).reshape(len(heights), -1)
+    right, left = row[:, reach:], row[:, reach::-1]
+    shown = row[:, reach] & ~right.all(axis=1) & ~left.all(axis=1)
+    forward = _forward(revolution, view, world_from_local)
+    local_from_camera = world_from_local.inverse.rotation @ view.world_from_camera.rotation
+    edges = []
+    for sign, run in ((1.0, right), (-1.0, left)):
+        edge = pixel + sign * (_run_length(run) - 0.5)[:, None] * _STEP_PX * across
+        ray = (unproject(edge, np.ones(len(edge)), view.rgb_camera) @ local_from_camera.T)[:, :2]
+        # seen from above, the ray touches the circle: its distance from the axis is the radius
+        edges.append(sign * (ray[:, 0] * forward[1] - ray[:, 1] * forward[0]) / np.linalg.norm(ray, axis=1))
+    return np.where(shown, np.stack(edges), np.nan)
+
+
+def _run_length(rows: np.ndarray) -> np.ndarray:
+    """How many leading entries of each row are true."""
+    return np.asarray(np.where(rows.all(axis=1), rows.shape[1], np.argmin(rows, axis=1)))
+
+
+def _silhouette_top(
+    revolution: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
+) -> float:
+    """The height at which the far rim leaves the masks, median over the views (from above, the far rim is what shows)."""
+    heights = np.linspace(bottom_m + 0.5 * (top_m - bottom_m), bottom_m + 2.0 * (top_m - bottom_m), 400)
+    rim = float(revolution.radii_m[-1])
+    tops = []
+    for view in views:
+        eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+        away = np.append(revolution.centre - eye[:2], 0.0)
+        points = _axis_points(revolution, heights) + rim * away / max(float(np.linalg.norm(away)), 1e-9)
+        pixel = project((view.world_from_camera.inverse @ world_from_local).apply(points), view.rgb_camera)
+        values, inside = sample_nearest(view.mask, pixel)
+        shown = values & inside
+        if shown[0] and not shown.all():
+            tops.append(heights[int(np.argmin(shown))])
+    return float(np.median(tops)) if len(tops) >= _LEAST_VIEWS else top_m
+
+
+def _axis_points(revolution: Revolution, heights: np.ndarray) -> Points:
+    centre: Vector3 = np.array([revolution.centre[0], revolution.centre[1], 0.0])
+    return centre + heights[:, None] * np.array([0.0, 0.0, 1.0])

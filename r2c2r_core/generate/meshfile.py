@@ -1,0 +1,132 @@
+"""Reading a mesh file (GLB, OBJ, PLY, STL) into plain parts with their colours."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Colours, Faces, Image, Points, TextureCoords
+from r2c2r_core.errors import OverrideError
+from r2c2r_core.geometry.meshes import sample_surface
+from r2c2r_core.geometry.raster import sample_texture
+
+SUFFIXES = (".glb", ".obj", ".ply", ".stl")
+
+_MOST_BYTES = 300_000_000
+_MOST_FACES = 2_000_000
+_PLAIN = 160  # grey of a mesh without colours
+
+
+class MeshPart(NamedTuple):
+    """One geometry of a file, in the file's frame and unit."""
+
+    vertices: Points
+    faces: Faces
+    uv: TextureCoords | None  # v = 0 is the bottom row
+    texture: Image | None
+    vertex_colours: Colours  # used where there is no texture
+
+    @property
+    def keeps_its_texture(self) -> bool:
+        """Whether uv and texture can be used as they are: no tiling beyond 0..1."""
+        return self.uv is not None and self.texture is not None and bool((self.uv > -1e-3).all() and (self.uv < 1.001).all())
+
+
+def read_parts(path: Path) -> list[MeshPart]:
+    """The file's geometries with their placements applied; raises OverrideError when it cannot be read."""
+    import trimesh
+
+    if path.suffix.lower() not in SUFFIXES:
+        raise OverrideError(f"{path.name}: a mesh file expected", hint=f"give one of {', '.join(SUFFIXES)}")
+    if not path.is_file():
+        raise OverrideError(f"{path}: no such file", hint="check the path of the uploaded mesh")
+    if path.stat().st_size > _MOST_BYTES:
+        raise OverrideError(
+            f"{path.name}: {path.stat().st_size // 1_000_000} MB, at most {_MOST_BYTES // 1_000_000} MB expected"
+        )
+    try:
+        scene = trimesh.load_scene(path)
+        geometries = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+    # the parsers behind trimesh raise whatever the broken bytes make them raise
+    except Exception as error:
+        raise OverrideError(
+            f"{path.name}: not a readable {path.suffix[1:].upper()} mesh ({error})", hint="export it again"
+        ) from error
+    if not geometries:
+        raise OverrideError(f"{path.name}: no triangles found", hint="export the mesh with faces")
+    count = sum(len(g.faces) for g in geometries)
+    if count > _MOST_FACES:
+        raise OverrideError(f"{path.name}: {count} triangles, at most {_MOST_FACES} expected", hint="simplify the mesh first")
+    if not all(np.isfinite(g.vertices).all() for g in geometries):
+        raise OverrideError(f"{path.name}: vertices that are not numbers", hint="export it again")
+    return [_part(geometry) for geometry in geometries]
+
+
+def sample_colours(parts: list[MeshPart], count: int, rng: np.random.Generator) -> tuple[Points, Colours]:
+    """Points spread over all parts' surfaces, and the colour at each."""
+    points, colours = [], []
+    faces_total = sum(len(part.faces) for part in parts)
+    for part in parts:
+        share = max(int(count * len(part.faces) / faces_total), 500)
+        on_surface, face = sample_surface(part.vertices, part.faces, share, rng)
+        points.append(on_surface)
+        colours.append(_colours_at(part, on_surface, face))
+    return np.concatenate(points), np.concatenate(colours)
+
+
+def _colours_at(part: MeshPart, points: Points, face: np.ndarray) -> Colours:
+    corners = part.vertices[part.faces[face]]
+    weights = _barycentric(points, corners)
+    if part.uv is not None and part.texture is not None:
+        uv = (part.uv[part.faces[face]] * weights[..., None]).sum(axis=1) % 1.0
+        rows = -(-len(uv) // 1024)
+        padded = np.zeros((rows * 1024, 2))
+        padded[: len(uv)] = uv
+        return sample_texture(part.texture, padded.reshape(rows, 1024, 2)).reshape(-1, 3)[: len(uv)]
+    blended = (part.vertex_colours[part.faces[face]] * weights[..., None]).sum(axis=1)
+    return np.asarray(np.round(blended).clip(0, 255).astype(np.uint8))
+
+
+def _barycentric(points: Points, corners: np.ndarray) -> np.ndarray:
+    """Barycentric weights (n, 3) of points in their triangles (n, 3, 3)."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    square = np.maximum((normal**2).sum(axis=1), 1e-300)
+    wa = (np.cross(c - b, points - b) * normal).sum(axis=1) / square
+    wb = (np.cross(a - c, points - c) * normal).sum(axis=1) / square
+    return np.stack([wa, wb, 1.0 - wa - wb], axis=1)
+
+
+def _part(geometry: Any) -> MeshPart:
+    """A trimesh geometry as arrays."""
+    vertices = np.asarray(geometry.vertices, dtype=np.float64)
+    texture = _texture(geometry)
+    uv = getattr(geometry.visual, "uv", None)
+    has_picture = texture is not None and uv is not None and len(uv) == len(vertices)
+    return MeshPart(
+        vertices=vertices,
+        faces=np.asarray(geometry.faces, dtype=np.int64),
+        uv=np.asarray(uv, dtype=np.float64) if has_picture else None,
+        texture=texture if has_picture else None,
+        vertex_colours=_vertex_colours(geometry, len(vertices)),
+    )
+
+
+def _texture(geometry: Any) -> Image | None:
+    material = getattr(geometry.visual, "material", None)
+    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    return None if picture is None else np.asarray(picture.convert("RGB"), dtype=np.uint8)
+
+
+def _vertex_colours(geometry: Any, count: int) -> Colours:
+    """Vertex colours, else the material's colour, else grey."""
+    plain = np.full((count, 3), _PLAIN, np.uint8)
+    visual = geometry.visual
+    if visual.kind == "vertex" or visual.kind == "face":
+        return np.asarray(visual.to_color().vertex_colors if visual.kind == "face" else visual.vertex_colors)[:, :3].astype(
+            np.uint8
+        )
+    main = getattr(getattr(visual, "material", None), "main_color", None)
+    if main is not None and visual.kind == "texture":
+        plain[:] = np.asarray(main)[:3]
+    return plain

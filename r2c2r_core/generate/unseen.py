@@ -1,0 +1,89 @@
+"""Colours for the texels that no frame shows."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Colours, Image, Points, Vector3
+from r2c2r_core.generate.charts import FRONT, Atlas
+
+_LEAST_SHARE = 0.15  # of a side that must be seen before its own colours are used
+_BEFORE_FACE_M = 0.002
+_NEIGHBOURS = 4
+_MOST_KNOWN = 12_000
+_REACH = 0.15  # of the mesh's size: further from anything seen, the median colour is as good a guess
+
+
+def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.ndarray:
+    """Texels that may keep what was seen: on a side of which little was seen, texels along its edge show the neighbour."""
+    if front_y_m is None:
+        return np.ones(len(seen), dtype=bool)
+    total = np.bincount(atlas.chart, minlength=6)
+    share = np.bincount(atlas.chart[seen], minlength=6) / np.maximum(total, 1)
+    return np.asarray((share > _LEAST_SHARE)[atlas.chart] | (atlas.chart == FRONT) | _stands_out(atlas, front_y_m))
+
+
+def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: float | None, eye_local: Vector3) -> Colours:
+    """Colours for unseen texels: gaps from what was seen nearest on the surface, the rest from the median colour.
+
+    Neighbours are found in space, so charts that were cut apart continue each other. The back of a thing is taken for the
+    mirror image of the front that `eye_local` (the cameras' mean place) sees; but a side of furniture of which nothing was
+    seen gets the plain tint, for its material does not follow the front's pattern round the corner.
+    """
+    if seen.all() or not seen.any():
+        return np.where(seen[:, None], colours, np.uint8(160))
+    on_front = seen & (atlas.chart == FRONT)
+    filled = colours.copy()
+    filled[~seen] = np.round(np.median(colours[on_front if on_front.any() else seen], axis=0)).astype(np.uint8)
+    missing = ~seen
+    if front_y_m is not None:
+        outside = _stands_out(atlas, front_y_m)
+        shown = np.bincount(atlas.chart[seen & ~outside], minlength=6) > 0
+        missing &= shown[atlas.chart] | outside
+    known, gaps = np.flatnonzero(seen), np.flatnonzero(missing)
+    if front_y_m is None:
+        _blend_neighbours(filled, known, gaps, atlas.points, _mirrored(atlas.points[gaps], atlas.points, eye_local))
+    _blend_neighbours(filled, known, gaps, atlas.points, atlas.points[gaps])
+    return filled
+
+
+def spread_colours(texture: Image, atlas: Atlas) -> Image:
+    """Fill the gutters between charts with the nearest chart colour, so that no viewer's filtering bleeds black."""
+    covered = np.zeros(atlas.size, np.uint8)
+    covered.ravel()[atlas.texel] = 1
+    if covered.all() or not covered.any():
+        return texture
+    _, label = cv2.distanceTransformWithLabels(1 - covered, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    lookup = np.zeros((int(label.max()) + 1, 3), np.uint8)
+    lookup[label[covered == 1]] = texture[covered == 1]
+    return lookup[label]
+
+
+def _stands_out(atlas: Atlas, front_y_m: float) -> np.ndarray:
+    """Texels before the front face: a handle's sides go with the handle, not with the carcass."""
+    return np.asarray(atlas.points[:, 1] < front_y_m - _BEFORE_FACE_M)
+
+
+def _mirrored(chosen: Points, points: Points, eye_local: Vector3) -> Points:
+    """The chosen points' mirror images about the upright plane through the middle that faces the cameras."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    towards = (eye_local - middle) * [1.0, 1.0, 0.0]
+    towards /= max(float(np.linalg.norm(towards)), 1e-9)
+    return chosen - 2.0 * ((chosen - middle) @ towards)[:, None] * towards
+
+
+def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, points: Points, places: Points) -> None:
+    """Fade the missing texels, in place, from the colours known nearest to their `places` to what they hold."""
+    from scipy.spatial import cKDTree
+
+    if len(missing) == 0:
+        return
+    known = known[:: max(len(known) // _MOST_KNOWN, 1)]
+    reach = _REACH * float(np.linalg.norm(np.ptp(points, axis=0)))
+    distance, neighbour = cKDTree(points[known]).query(places, k=min(_NEIGHBOURS, len(known)), distance_upper_bound=reach)
+    distance, neighbour = distance.reshape(len(missing), -1), neighbour.reshape(len(missing), -1)
+    near = np.isfinite(distance)
+    weight = np.where(near, 1.0 / np.maximum(distance, 1e-4), 0.0)
+    samples = filled[known[np.where(near, neighbour, 0)]]
+    nearby = (samples * weight[..., None]).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)[:, None]
+    trust = np.where(near[:, :1], np.exp(-((2.0 * distance[:, :1] / reach) ** 2)), 0.0)
+    filled[missing] = np.round(trust * nearby + (1 - trust) * filled[missing]).clip(0, 255).astype(np.uint8)

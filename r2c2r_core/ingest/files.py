@@ -1,0 +1,167 @@
+"""The files of a recording, whether it came as a folder or as a zip; nothing is ever unpacked onto the disk."""
+
+import hashlib
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+from typing import Protocol
+
+from r2c2r_core.errors import CaptureError
+
+_MAX_MEMBERS = 400_000  # three files a frame, 60 frames/s: 37 minutes
+_MAX_MEMBER_BYTES = 256 * 2**20  # the largest honest member is a 12-megapixel PNG
+_MAX_RATIO, _RATIO_MATTERS_BYTES = 300, 256 * 2**20  # deflate reaches 1000 on zeros only
+
+
+class Files(Protocol):
+    """Read-only files with `/`-separated names relative to the recording's root."""
+
+    @property
+    def source(self) -> Path:
+        """The folder or the zip, for messages."""
+
+    def names(self) -> frozenset[str]:
+        """All file names."""
+
+    def read(self, name: str) -> bytes:
+        """The content; raises CaptureError when it cannot be read."""
+
+    def sha256(self, names: Iterable[str]) -> str:
+        """Identity of the recording: of the zip itself, or of the named files with their sizes and content."""
+
+
+def open_files(source: Path) -> Files:
+    """The files of a recording given as a folder or a zip (.r3d is one); raises CaptureError when it is neither."""
+    if source.is_dir():
+        return FolderFiles(source)
+    if not source.exists():
+        raise CaptureError(f"{source}: no such file or folder", hint="check the path of the recording")
+    return ZipFiles(source)
+
+
+class FolderFiles:
+    """The files below a folder; links that leave it are refused."""
+
+    def __init__(self, source: Path) -> None:
+        self.source = source
+        self._root = source.resolve()
+        self._names = frozenset(
+            path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file() and not _is_clutter(path.name)
+        )
+
+    def names(self) -> frozenset[str]:
+        """All file names."""
+        return self._names
+
+    def read(self, name: str) -> bytes:
+        """The content; raises CaptureError when it cannot be read."""
+        path = self.source / name
+        if not path.resolve().is_relative_to(self._root):
+            raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
+        try:
+            return path.read_bytes()
+        except OSError as problem:
+            raise CaptureError(f"{path}: {problem.strerror or problem}", hint="check that the file can be read") from problem
+
+    def sha256(self, names: Iterable[str]) -> str:
+        """Digest of the sorted names with sizes and content."""
+        digest = hashlib.sha256()
+        for name in sorted(names):
+            content = self.read(name)
+            digest.update(f"{name}\0{len(content)}\0".encode())
+            digest.update(content)
+        return digest.hexdigest()
+
+
+class ZipFiles:
+    """The members of a zip, read in memory one at a time."""
+
+    def __init__(self, source: Path) -> None:
+        self.source = source
+        try:
+            self._zip = zipfile.ZipFile(source)
+        except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, EOFError) as problem:
+            raise CaptureError(
+                f"{source}: not a readable zip ({problem}); a recording is a folder, a .r3d or a zip of a folder",
+                hint="export or copy the recording again; it may have been cut off in transfer",
+            ) from problem
+        except OSError as problem:
+            raise CaptureError(f"{source}: {problem.strerror or problem}", hint="check that the file can be read") from problem
+        self._refuse_hostile()
+        self._names = frozenset(
+            info.filename for info in self._zip.infolist() if not info.is_dir() and not _is_clutter(info.filename)
+        )
+
+    def names(self) -> frozenset[str]:
+        """All file names."""
+        return self._names
+
+    def read(self, name: str) -> bytes:
+        """The content; raises CaptureError when the member is damaged."""
+        try:
+            return self._zip.read(name)
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as problem:
+            raise CaptureError(
+                f"{self.source}: member '{name}' is damaged ({problem or type(problem).__name__})",
+                hint="copy the recording again",
+            ) from problem
+
+    def sha256(self, names: Iterable[str]) -> str:
+        """Digest of the zip file itself."""
+        with self.source.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+
+    def _refuse_hostile(self) -> None:
+        members = self._zip.infolist()
+        if len(members) > _MAX_MEMBERS:
+            raise self._hostile(f"{len(members)} members, at most {_MAX_MEMBERS} are expected")
+        for info in members:
+            path = PurePosixPath(info.filename.replace("\\", "/"))
+            if path.is_absolute() or ".." in path.parts or ":" in info.filename.split("/")[0]:
+                raise self._hostile(f"member '{info.filename}' points outside the archive")
+            if stat.S_ISLNK(info.external_attr >> 16):
+                raise self._hostile(f"member '{info.filename}' is a symbolic link")
+            if info.flag_bits & 0x1:
+                raise self._hostile(f"member '{info.filename}' is encrypted")
+            if info.file_size > _MAX_MEMBER_BYTES:
+                raise self._hostile(
+                    f"member '{info.filename}' unpacks to {info.file_size >> 20} MiB, 256 MiB at most are expected"
+                )
+        unpacked, packed = sum(i.file_size for i in members), sum(i.compress_size for i in members)
+        if unpacked > _RATIO_MATTERS_BYTES and unpacked > _MAX_RATIO * max(packed, 1):
+            raise self._hostile(f"unpacks to {unpacked >> 20} MiB from {packed >> 10} KiB, a recording never packs that well")
+
+    def _hostile(self, found: str) -> CaptureError:
+        return CaptureError(f"{self.source}: {found}", hint="export the recording again from the app that made it")
+
+
+class SubFiles:
+    """A folder of other files, seen as a root of its own (a zip of a folder has one on top)."""
+
+    def __init__(self, files: Files, folder: str) -> None:
+        self._files, self._prefix = files, f"{folder}/"
+        self.source = files.source
+        self._names = frozenset(n[len(self._prefix) :] for n in files.names() if n.startswith(self._prefix))
+
+    def names(self) -> frozenset[str]:
+        """All file names below the folder."""
+        return self._names
+
+    def read(self, name: str) -> bytes:
+        """The content."""
+        return self._files.read(self._prefix + name)
+
+    def sha256(self, names: Iterable[str]) -> str:
+        """Digest of the underlying files."""
+        return self._files.sha256([self._prefix + n for n in names])
+
+
+def top_folders(files: Files) -> tuple[str, ...]:
+    """Names of the folders at the top, sorted."""
+    return tuple(sorted({n.split("/", 1)[0] for n in files.names() if "/" in n}))
+
+
+def _is_clutter(name: str) -> bool:
+    return name.startswith("__MACOSX/") or PurePosixPath(name).name in {".DS_Store", "Thumbs.db"} or "/._" in f"/{name}"

@@ -1,0 +1,228 @@
+"""Which way is up, where the floor lies, how the room is turned, and its walls."""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.errors import OverrideError
+from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+from r2c2r_core.ingest.planes import Plane, SurfaceSample, find_planes
+from r2c2r_core.model.capture import Room, Wall
+from r2c2r_core.model.inputs import Overrides
+
+_UP = np.array([0.0, 0.0, 1.0])
+_MOST_CORRECTION_DEG = 3.0  # of a file's gravity: the real kitchen's is off by 1.5 deg
+_LEAST_CORRECTION_DEG = 1.0  # a phone's gravity is better than fitted planes below this
+_FLOOR_BELOW_CAMERA_M = 0.75  # nobody films from lower; keeps a table top from being the floor
+
+
+class Levelled(NamedTuple):
+    """The room, and how the recording's own world leads to it."""
+
+    world_from_capture: Rigid3
+    room: Room
+    notices: tuple[str, ...]
+
+
+def level_room(
+    sample: SurfaceSample,
+    cameras: Sequence[Rigid3],
+    file_up: Vector3 | None,
+    overrides: Overrides | None,
+    rng: np.random.Generator,
+) -> Levelled:
+    """Level a recording: `sample` and `cameras` (capture_from_camera) are in its own world, and so is `file_up`."""
+    planes = find_planes(sample, rng)
+    up, up_source, notices = _choose_up(planes, cameras, file_up, overrides)
+    turn = Rigid3(rotation_between(up, _UP), np.zeros(3))
+    turned = [_turned(p, turn) for p in planes]
+    centres = np.array([c.translation for c in cameras]) @ turn.rotation.T
+    points = turn.apply(sample.points)
+    floor_z = (
+        overrides.floor_m if overrides is not None and overrides.floor_m is not None else find_floor(turned, points, centres)
+    )
+    if floor_z is None:
+        notices.append("no floor was found; heights start at the recording's own origin")
+    shift = np.array([0.0, 0.0, -(floor_z or 0.0)])
+    levelled = [_turned(p, Rigid3(np.eye(3), shift)) for p in turned]
+    yaw = _chosen_yaw(overrides, turn.turn(sample.normals), levelled)
+    room = Room(
+        up_source=up_source,
+        floor_found=floor_z is not None,
+        manhattan_yaw_rad=yaw,
+        walls=find_walls(levelled, points + shift, centres + shift),
+    )
+    return Levelled(Rigid3(turn.rotation, shift), room, tuple(notices))
+
+
+def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple[Vector3, float] | None:
+    """The direction that makes planes horizontal or vertical, near `guess`, and the rms angle (deg) by which they disagree.
+
+    None when the planes do not settle it: no level plane, and no two upright ones that face differently.
+    """
+    up = guess / np.linalg.norm(guess)
+    for reach_deg in (within_deg + 5.0, within_deg + 2.0, 4.0, 4.0, 4.0):
+        matrix, weight_sum, miss = np.zeros((3, 3)), 0.0, 0.0
+        for plane in planes:
+            cosine = float(plane.normal @ up)
+            off_level = np.degrees(np.arccos(min(abs(cosine), 1.0)))
+            off_deg, sign = (off_level, 1.0) if off_level < 45.0 else (90.0 - off_level, -1.0)
+            if off_deg > reach_deg:
+                continue
+            weight = plane.area_m2 / (1.0 + (off_deg / 1.5) ** 2)
+            matrix += sign * weight * np.outer(plane.normal, plane.normal)
+            weight_sum += weight
+            miss += weight * off_deg**2
+        values, vectors = np.linalg.eigh(matrix)
+        # The winner must stand clear of the runner-up: one wall alone leaves a circle of directions
+        if weight_sum < 0.5 or values[2] - values[1] < 0.15:
+            return None
+        found = vectors[:, 2]
+        up = found if found @ up > 0 else -found
+    return up, float(np.sqrt(miss / weight_sum))
+
+
+def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> float | None:
+    """Height of the floor: the lowest level plane under the cameras with next to nothing beneath it."""
+    camera_z = float(np.median(centres[:, 2]))
+    level = [(float(np.median(p.points[:, 2])), p.area_m2) for p in planes if p.normal[2] > np.cos(np.radians(8.0))]
+    for z, _ in sorted(level):
+        # A floor bent by far, biased depth falls apart into several planes: the largest of them speaks for all
+        height = max((other for other in level if abs(other[0] - z) < 0.06), key=lambda other: other[1])[0]
+        beneath = float((points[:, 2] < height - 0.08).mean())
+        if camera_z - height > _FLOOR_BELOW_CAMERA_M and beneath < 0.03:
+            return height
+    return None
+
+
+def find_yaw(normals: Points, planes: Sequence[Plane]) -> float:
+    """Yaw in [0, pi/2) of one of the two dominant horizontal directions.
+
+    The upright surface's normals vote in a histogram of 1 deg, which is robust; the large planes near the winner then say it
+    exactly, as a plane's direction is far surer than a patch's.
+    """
+    upright = normals[np.abs(normals[:, 2]) < 0.2]
+    fitted = [p for p in planes if abs(p.normal[2]) < 0.15]
+    votes = np.mod(np.arctan2(upright[:, 1], upright[:, 0]), np.pi / 2)
+    if not len(votes):
+        return 0.0
+    histogram = np.histogram(votes, bins=90, range=(0.0, np.pi / 2))[0]
+    smooth = sum(np.roll(histogram, shift) * share for shift, share in ((-2, 1), (-1, 2), (0, 3), (1, 2), (2, 1)))
+    yaw = (int(np.argmax(smooth)) + 0.5) * np.pi / 180.0
+    for reach_deg in (10.0, 6.0, 4.0):
+        off = _off_axis(votes, yaw)
+        yaw += float(off[np.abs(off) < np.radians(reach_deg)].mean())
+    directions = np.array([np.arctan2(p.normal[1], p.normal[0]) for p in fitted])
+    leverage = np.array([p.area_m2 * np.ptp(p.points @ np.cross(_UP, p.normal)) for p in fitted])
+    off = _off_axis(directions, yaw)
+    near = np.abs(off) < np.radians(4.0)
+    if near.any():
+        order = np.argsort(off[near])
+        half = np.cumsum(leverage[near][order]) >= leverage[near].sum() / 2
+        yaw += float(off[near][order][int(np.argmax(half))])  # a median: two fronts taken for one plane give a wrong direction
+    return float(np.mod(yaw, np.pi / 2))
+
+
+def _off_axis(directions: np.ndarray, yaw: float) -> np.ndarray:
+    """Angle from the nearest of the four directions yaw + k * 90 deg, in [-45, 45) deg as radians."""
+    return np.asarray(np.mod(directions - yaw + np.pi / 4, np.pi / 2) - np.pi / 4)
+
+
+def find_walls(planes: Sequence[Plane], points: Points, centres: Points) -> tuple[Wall, ...]:
+    """Large upright planes with next to nothing behind them; fronts of furniture have a wall or a worktop behind."""
+    walls: list[Wall] = []
+    for plane in planes:
+        if abs(plane.normal[2]) > np.sin(np.radians(8.0)):
+            continue
+        normal = np.array([plane.normal[0], plane.normal[1], 0.0])
+        normal /= np.linalg.norm(normal)
+        offset = float(np.median(plane.points @ normal))
+        if np.median(centres @ normal) < offset:
+            normal, offset = -normal, -offset
+        along = np.cross(_UP, normal)
+        left, right = np.quantile(plane.points @ along, (0.02, 0.98))
+        low, high = np.quantile(plane.points[:, 2], (0.02, 0.98))
+        if plane.area_m2 < 0.8 or right - left < 1.0 or high - low < 0.8:
+            continue
+        beside = (points @ along > left) & (points @ along < right)
+        behind = int((beside & (points @ normal < offset - 0.12)).sum())
+        if behind > 0.1 * len(plane.points):
+            continue
+        if all(normal @ w.normal < 0.97 or abs(offset - w.offset_m) > 0.1 for w in walls):
+            walls.append(Wall(normal=normal, offset_m=offset, area_m2=plane.area_m2))
+    return tuple(walls)
+
+
+def _choose_up(
+    planes: Sequence[Plane], cameras: Sequence[Rigid3], file_up: Vector3 | None, overrides: Overrides | None
+) -> tuple[Vector3, Literal["file", "floor", "person", "assumed"], list[str]]:
+    if overrides is not None and overrides.up_capture is not None:
+        length = float(np.linalg.norm(overrides.up_capture))
+        if not np.isfinite(length) or length < 1e-6:
+            raise OverrideError("overrides: 'up' has no direction", hint="give three numbers, such as [0, 1, 0]")
+        return np.asarray(overrides.up_capture) / length, "person", []
+    if file_up is not None:
+        return _corrected_up(planes, file_up)
+    best = _up_from_planes(planes, _mean_camera_up(cameras))
+    if best is not None:
+        return best, "floor", ["the recording does not know gravity; up was taken from its level and upright planes"]
+    return _mean_camera_up(cameras), "assumed", ["neither the recording nor its planes tell which way is up; check it"]
+
+
+def _corrected_up(planes: Sequence[Plane], file_up: Vector3) -> tuple[Vector3, Literal["file"], list[str]]:
+    """The file's gravity, corrected a little where level planes agree on it."""
+    found = find_up(planes, file_up, _MOST_CORRECTION_DEG)
+    level_m2 = sum(p.area_m2 for p in planes if abs(p.normal @ file_up) > np.cos(np.radians(8.0)))
+    if found is None or found[1] > 1.5 or level_m2 < 0.3:
+        return file_up, "file", []
+    off_deg = float(np.degrees(np.arccos(np.clip(found[0] @ file_up, -1.0, 1.0))))
+    if not _LEAST_CORRECTION_DEG < off_deg <= _MOST_CORRECTION_DEG:
+        return file_up, "file", []
+    return found[0], "file", [f"the recording's gravity was corrected by {off_deg:.1f} deg, as its level planes agree"]
+
+
+def _up_from_planes(planes: Sequence[Plane], camera_up: Vector3) -> Vector3 | None:
+    """The direction near the cameras' own up that makes most area level or upright."""
+    candidates = [s * p.normal for p in planes for s in (1.0, -1.0)]
+    large = planes[:6]
+    candidates += [s * np.cross(a.normal, b.normal) for i, a in enumerate(large) for b in large[:i] for s in (1.0, -1.0)]
+    best, best_score = None, 0.0
+    for candidate in candidates:
+        length = float(np.linalg.norm(candidate))
+        if length < 0.5 or candidate @ camera_up < length * np.cos(np.radians(60.0)):
+            continue
+        found = find_up(planes, candidate / length, 4.0)
+        if found is None:
+            continue
+        up = found[0]
+        cosines = np.array([float(p.normal @ up) for p in planes])
+        areas = np.array([p.area_m2 for p in planes])
+        # What faces up counts double: floors and worktops are seen from above, ceilings and undersides rarely
+        share = areas @ ((np.abs(cosines) < 0.1) + 2.0 * (cosines > 0.995) + 0.5 * (cosines < -0.995))
+        score = float(share) * (0.5 + float(up @ camera_up))
+        if score > best_score:
+            best, best_score = up, score
+    return best
+
+
+def _mean_camera_up(cameras: Sequence[Rigid3]) -> Vector3:
+    total = -np.array([c.rotation[:, 1] for c in cameras]).mean(axis=0)
+    return np.asarray(total / max(float(np.linalg.norm(total)), 1e-9))
+
+
+def _chosen_yaw(overrides: Overrides | None, normals: Points, planes: Sequence[Plane]) -> float:
+    if overrides is not None and overrides.manhattan_yaw_rad is not None:
+        return float(np.mod(overrides.manhattan_yaw_rad, np.pi / 2))
+    return find_yaw(normals, planes)
+
+
+def _turned(plane: Plane, destination_from_source: Rigid3) -> Plane:
+    normal = destination_from_source.rotation @ plane.normal
+    return Plane(
+        normal=normal,
+        offset_m=plane.offset_m + float(normal @ destination_from_source.translation),
+        area_m2=plane.area_m2,
+        points=destination_from_source.apply(plane.points),
+    )

@@ -1,0 +1,66 @@
+"""What every reader returns: an opened recording in our conventions, its pixels still in its own files."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Vector3
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.files import Files
+
+
+class RawDepth(NamedTuple):
+    """Depth as recorded: metres, 0, NaN or inf where unknown; confidence 0..2 (2 = high) where the format has one."""
+
+    metres: DepthMetres
+    confidence: np.ndarray | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RawFrame:
+    """One frame of a recording, converted to OpenCV camera axes and pixel centres at i + 0.5."""
+
+    index: int  # the frame's number in the recording
+    timestamp_s: float | None
+    rgb_camera: Intrinsics
+    depth_camera: Intrinsics
+    capture_from_camera: Rigid3
+    rgb_name: str
+    depth_name: str
+    confidence_name: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """An opened recording."""
+
+    format: str
+    files: Files
+    frames: tuple[RawFrame, ...]  # sorted by index
+    depth_of: Callable[[RawFrame], RawDepth]  # raises UnreadableFrame
+    up_capture: Vector3 | None  # unit, in the recording's own world, when the file knows gravity
+    notices: tuple[str, ...] = ()
+    other_names: tuple[str, ...] = ()  # metadata files that are part of the recording's identity
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All files the recording is made of."""
+        of_frames = (n for f in self.frames for n in (f.rgb_name, f.depth_name, f.confidence_name) if n)
+        return tuple(sorted({*of_frames, *self.other_names}))
+
+
+class UnreadableFrame(Exception):
+    """One frame cannot be used; the others may. Handled inside ingest: callers see CaptureError."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reader:
+    """One recording format."""
+
+    name: str
+    expects: str  # what a folder of this format holds, for the message when nothing matches
+    recognise: Callable[[frozenset[str]], bool]  # from the file names alone
+    open: Callable[[Files], Recording]

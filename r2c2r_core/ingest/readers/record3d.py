@@ -1,0 +1,145 @@
+"""Record3D `.r3d`: a zip (or its folder) of `metadata` and rgbd/N.jpg, N.depth, N.conf.
+
+.depth is LZFSE of little-endian float32 metres, row-major (some writers store it raw); .conf is LZFSE of uint8 0..2, LiDAR
+only.
+Colour, depth, calibration and pose all belong to the portrait image. Depth may contain NaN.
+"""
+
+from collections.abc import Iterable
+from functools import partial
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.images import first_size, numbered
+from r2c2r_core.ingest.readers.lzfse_blocks import unpacked, unpacked_size
+from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
+
+_METADATA = "metadata"
+
+
+def open_record3d(files: Files) -> Recording:
+    """The recording in a .r3d; raises CaptureError."""
+    metadata = parse_metadata(files.read(_METADATA), f"{files.source}, member '{_METADATA}'")
+    names = files.names()
+    colour = numbered(names, r"rgbd/(\d+)\.(?:jpe?g|png)")
+    depth = numbered(names, r"rgbd/(\d+)\.depth")
+    confidence = numbered(names, r"rgbd/(\d+)\.conf")
+    if not colour and not depth:
+        raise CaptureError(
+            f"{files.source}: metadata for {len(metadata.poses)} frames but no rgbd/N.jpg and rgbd/N.depth",
+            hint="share the .r3d from the app again; this one was stripped",
+        )
+    if not depth:
+        raise CaptureError(
+            f"{files.source}: {len(colour)} colour images but no depth, rgbd/N.depth were expected",
+            hint="record with the LiDAR camera, not the video mode",
+        )
+    shared = colour.keys() & depth.keys()
+    if not shared:
+        raise CaptureError(f"{files.source}: no colour image has a depth image of the same number", hint="export it again")
+    posed, notices = metadata.posed(shared)
+    if alone := len(colour.keys() ^ depth.keys()):
+        notices.append(f"{alone} frames lack their colour or their depth and were left out")
+    frames = record3d_frames(files, metadata, posed, colour, depth, confidence, _depth_size(files, metadata, depth, posed))
+    return Recording(
+        format="Record3D .r3d",
+        files=files,
+        frames=frames,
+        depth_of=partial(_depth_of, files),
+        up_capture=metadata.up_capture,
+        notices=tuple(notices),
+        other_names=(_METADATA,),
+    )
+
+
+def record3d_frames(
+    files: Files,
+    metadata: Record3DMetadata,
+    numbers: Iterable[int],
+    colour: dict[int, str],
+    depth: dict[int, str],
+    confidence: dict[int, str],
+    depth_size: tuple[int, int],
+) -> tuple[RawFrame, ...]:
+    """The frames with those numbers; cameras scaled to the sizes the images really have."""
+    chosen = list(numbers)
+    width, height = first_size(((colour[n], files.read(colour[n])) for n in chosen), "colour image", files.source)
+    _same_shape((width, height), (metadata.width, metadata.height), f"{files.source}: colour images are", "the metadata says")
+    _same_shape(depth_size, (width, height), f"{files.source}: depth images are", "colour images are")
+    frames = []
+    for number in chosen:
+        pose = metadata.poses[number]
+        assert pose is not None, "posed() chose the numbers"
+        camera = metadata.camera(number).resized(width, height)
+        frames.append(
+            RawFrame(
+                index=number,
+                timestamp_s=metadata.timestamp(number),
+                rgb_camera=camera,
+                depth_camera=camera.resized(*depth_size),
+                capture_from_camera=pose,
+                rgb_name=colour[number],
+                depth_name=depth[number],
+                confidence_name=confidence.get(number),
+            )
+        )
+    return tuple(frames)
+
+
+def _depth_size(files: Files, metadata: Record3DMetadata, depth: dict[int, str], numbers: list[int]) -> tuple[int, int]:
+    if metadata.depth_size is not None:
+        return metadata.depth_size
+    found = 0
+    for number in numbers[:5]:
+        try:
+            found = unpacked_size(files.read(depth[number]), depth[number]) // 4
+        except UnreadableFrame:
+            continue
+        # The depth image has the shape of the colour image: w/h is known, w*h was just counted
+        height = round((found * metadata.height / metadata.width) ** 0.5)
+        if height and found % height == 0:
+            return found // height, height
+    raise CaptureError(
+        f"{files.source}: depth images of {found} values have no size of the shape {metadata.width}x{metadata.height}",
+        hint="the metadata lacks 'dw' and 'dh'; export the recording with a newer app",
+    )
+
+
+def _depth_of(files: Files, frame: RawFrame) -> RawDepth:
+    width, height = frame.depth_camera.width, frame.depth_camera.height
+    metres = _values(files, frame.depth_name, np.dtype("<f4"), width, height)
+    name = frame.confidence_name
+    if name is None or unpacked_size(files.read(name), name) == 0:  # FaceID recordings have none, or an empty one
+        return RawDepth(metres, None)
+    return RawDepth(metres, _values(files, name, np.dtype(np.uint8), width, height))
+
+
+def _values(files: Files, name: str, dtype: np.dtype, width: int, height: int) -> np.ndarray:
+    content, expected = files.read(name), width * height * dtype.itemsize
+    found = len(content) if len(content) == expected else unpacked_size(content, name)
+    if found != expected:
+        raise UnreadableFrame(f"{name}: {found} bytes of {dtype.name}, {width}x{height} needs {expected}")
+    raw = content if len(content) == expected else unpacked(content, name)
+    if len(raw) != expected:
+        raise UnreadableFrame(f"{name}: damaged LZFSE data, {len(raw)} of {expected} bytes")
+    return np.frombuffer(raw, dtype).reshape(height, width)
+
+
+def _same_shape(found: tuple[int, int], expected: tuple[int, int], found_is: str, expected_is: str) -> None:
+    if abs(found[0] * expected[1] / (found[1] * expected[0]) - 1.0) > 0.03:
+        raise CaptureError(
+            f"{found_is} {found[0]}x{found[1]} (width x height), {expected_is} {expected[0]}x{expected[1]}: another shape",
+            hint="were the images rotated or cropped after the export? use the untouched recording",
+        )
+
+
+def _recognise(names: frozenset[str]) -> bool:
+    return _METADATA in names
+
+
+READER = Reader(
+    name="Record3D .r3d", expects="a zip of metadata and rgbd/N.jpg, N.depth, N.conf", recognise=_recognise, open=open_record3d
+)

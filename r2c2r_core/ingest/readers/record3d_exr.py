@@ -1,0 +1,85 @@
+"""Record3D's "EXR + JPG" export: metadata.json, rgb/N.jpg, depth/N.exr (one channel 'R', HALF or FLOAT metres); no confidence.
+
+Colour and depth share a frame's number; numbers may be missing, so nothing is matched by position.
+"""
+
+import io
+from functools import partial
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.images import numbered
+from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.record3d import record3d_frames
+from r2c2r_core.ingest.readers.record3d_metadata import parse_metadata
+
+_METADATA = "metadata.json"
+
+
+def open_record3d_exr(files: Files) -> Recording:
+    """The recording in an EXR+JPG export; raises CaptureError."""
+    metadata = parse_metadata(files.read(_METADATA), f"{files.source}, file '{_METADATA}'")
+    colour = numbered(files.names(), r"rgb/(\d+)\.(?:jpe?g|png)")
+    depth = numbered(files.names(), r"depth/(\d+)\.exr")
+    shared = colour.keys() & depth.keys()
+    if not shared:
+        raise CaptureError(
+            f"{files.source}: {len(colour)} colour images and {len(depth)} depth images, none with the same number",
+            hint="rgb/N.jpg and depth/N.exr share N; export the recording again",
+        )
+    posed, notices = metadata.posed(shared)
+    if alone := len(colour.keys() ^ depth.keys()):
+        notices.append(f"{alone} frames lack their colour or their depth and were left out")
+    size = metadata.depth_size or _first_size(files, [depth[n] for n in posed])
+    return Recording(
+        format="Record3D EXR+JPG",
+        files=files,
+        frames=record3d_frames(files, metadata, posed, colour, depth, {}, size),
+        depth_of=partial(_depth_of, files),
+        up_capture=metadata.up_capture,
+        notices=tuple(notices),
+        other_names=(_METADATA,),
+    )
+
+
+def _depth_of(files: Files, frame: RawFrame) -> RawDepth:
+    metres = _channel(files.read(frame.depth_name), frame.depth_name)
+    expected = (frame.depth_camera.height, frame.depth_camera.width)
+    if metres.shape != expected:
+        found = "x".join(str(n) for n in metres.shape[::-1])
+        raise UnreadableFrame(f"{frame.depth_name}: {found} pixels, {expected[1]}x{expected[0]} expected")
+    return RawDepth(metres.astype(np.float32), None)
+
+
+def _first_size(files: Files, names: list[str]) -> tuple[int, int]:
+    problem: UnreadableFrame | None = None
+    for name in names[:5]:
+        try:
+            height, width = _channel(files.read(name), name).shape
+            return width, height
+        except UnreadableFrame as failure:
+            problem = failure
+    raise CaptureError(f"{files.source}: no readable depth image: {problem}", hint="export the recording again")
+
+
+def _channel(content: bytes, name: str) -> np.ndarray:
+    import OpenEXR
+
+    try:
+        channels = OpenEXR.File(io.BytesIO(content), separate_channels=True, num_threads=0).channels()
+    except (RuntimeError, ValueError, TypeError) as problem:
+        raise UnreadableFrame(f"{name}: not a readable OpenEXR image ({len(content)} bytes)") from problem
+    if "R" not in channels:
+        raise UnreadableFrame(f"{name}: channels {', '.join(sorted(channels)) or 'none'}, depth in 'R' was expected")
+    return np.asarray(channels["R"].pixels)
+
+
+def _recognise(names: frozenset[str]) -> bool:
+    return _METADATA in names and any(n.startswith("depth/") and n.endswith(".exr") for n in names)
+
+
+READER = Reader(
+    name="Record3D EXR+JPG", expects="metadata.json, rgb/N.jpg and depth/N.exr", recognise=_recognise, open=open_record3d_exr
+)

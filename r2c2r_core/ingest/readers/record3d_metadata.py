@@ -1,0 +1,166 @@
+"""Record3D's metadata, shared by its .r3d and its EXR+JPG export; every generation of the app.
+
+Facts: K is column-major at RGB resolution; perFrameIntrinsicCoeffs [[fx, fy, cx, cy], ...] is preferred where it exists;
+poses are [qx, qy, qz, qw, x, y, z], camera-to-world, OpenGL camera axes; the newer app's world is gravity-aligned with +y up,
+the older app's starts at the first camera (poses[0] is the identity) and knows no gravity; pixel centres lie at integers.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3, nearest_rotation
+
+_TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Record3DMetadata:
+    """What the metadata says, in our conventions."""
+
+    source: str
+    width: int  # of the RGB images
+    height: int
+    depth_size: tuple[int, int] | None  # width, height; older apps do not say
+    cameras: tuple[Intrinsics, ...]  # one, or one for each frame
+    poses: tuple[Rigid3 | None, ...]  # capture_from_camera; None where tracking was lost
+    timestamps_s: tuple[float, ...] | None
+    fps: float | None
+    up_capture: Vector3 | None
+
+    def camera(self, number: int) -> Intrinsics:
+        """The RGB camera of a frame."""
+        return self.cameras[number] if len(self.cameras) > 1 else self.cameras[0]
+
+    def timestamp(self, number: int) -> float | None:
+        """Seconds from the start, where known."""
+        if self.timestamps_s is not None and number < len(self.timestamps_s):
+            return self.timestamps_s[number]
+        return number / self.fps if self.fps else None
+
+    def posed(self, numbers: Iterable[int]) -> tuple[list[int], list[str]]:
+        """The frame numbers that have a pose, and what to tell about the others; raises CaptureError on a mismatch."""
+        wanted = sorted(numbers)
+        beyond = [n for n in wanted if n >= len(self.poses)]
+        if len(beyond) > max(1, _TOLERATED_WITHOUT_POSE * len(wanted)):
+            raise CaptureError(
+                f"{self.source}: {len(wanted)} frames up to number {wanted[-1]}, but {len(self.poses)} poses",
+                hint="the metadata belongs to another recording; export this one again",
+            )
+        posed = [n for n in wanted if n < len(self.poses) and self.poses[n] is not None]
+        if not posed:
+            raise CaptureError(f"{self.source}: no frame has a usable pose", hint="record again with tracking")
+        notices = []
+        if beyond:
+            notices.append(f"{len(beyond)} frames at the end have no pose and were left out")
+        if lost := len(wanted) - len(beyond) - len(posed):
+            notices.append(f"{lost} frames have an unusable pose and were left out")
+        if missing := sum(1 for n in range(wanted[-1] + 1) if n not in set(wanted)):
+            notices.append(
+                f"{missing} of {wanted[-1] + 1} frame numbers are missing; the others are matched to poses by number"
+            )
+        return posed, notices
+
+
+def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
+    """Read the JSON; `source` names it in messages. Raises CaptureError."""
+    try:
+        metadata = json.loads(content)
+    except ValueError as problem:
+        raise CaptureError(f"{source}: not JSON ({problem})", hint="export the recording again") from problem
+    if not isinstance(metadata, dict):
+        raise CaptureError(
+            f"{source}: a JSON {type(metadata).__name__}, an object was expected", hint="export the recording again"
+        )
+    width, height = _positive(metadata, "w", source), _positive(metadata, "h", source)
+    raw_poses = _table(metadata, "poses", 7, source)
+    if raw_poses is None or not len(raw_poses):
+        raise CaptureError(f"{source}: no poses", hint="record with the LiDAR camera and tracking switched on")
+    has_depth_size = bool(metadata.get("dw")) and bool(metadata.get("dh"))
+    times = metadata.get("frameTimestamps")
+    return Record3DMetadata(
+        source=source,
+        width=width,
+        height=height,
+        depth_size=(_positive(metadata, "dw", source), _positive(metadata, "dh", source)) if has_depth_size else None,
+        cameras=_cameras(metadata, width, height, len(raw_poses), source),
+        poses=tuple(_pose(row) for row in raw_poses),
+        timestamps_s=tuple(float(t) for t in times) if isinstance(times, list) and _all_numbers(times) else None,
+        fps=float(metadata["fps"]) if isinstance(metadata.get("fps"), int | float) and metadata["fps"] > 0 else None,
+        up_capture=_up(metadata, raw_poses),
+    )
+
+
+def _cameras(metadata: dict[str, Any], width: int, height: int, count: int, source: str) -> tuple[Intrinsics, ...]:
+    rows = _table(metadata, "perFrameIntrinsicCoeffs", 4, source)
+    if rows is None or len(rows) < count:
+        k = metadata.get("K")
+        if not isinstance(k, list) or len(k) != 9 or not _all_numbers(k):
+            raise CaptureError(f"{source}: key 'K' should hold 9 numbers, found {_brief(k)}", hint="export the recording again")
+        matrix = np.array(k, dtype=np.float64).reshape(3, 3).T  # column-major
+        rows = np.array([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]])
+    if not (np.isfinite(rows).all() and (rows[:, :2] > 0).all()):
+        raise CaptureError(f"{source}: a focal length is not a positive number", hint="export the recording again")
+    return tuple(
+        Intrinsics(fx=float(fx), fy=float(fy), cx=float(cx) + 0.5, cy=float(cy) + 0.5, width=width, height=height)
+        for fx, fy, cx, cy in rows
+    )
+
+
+def _pose(row: np.ndarray) -> Rigid3 | None:
+    from scipy.spatial.transform import Rotation
+
+    if not np.isfinite(row).all() or not 0.5 < np.linalg.norm(row[:4]) < 2.0:
+        return None
+    world_from_gl = Rotation.from_quat(row[:4]).as_matrix()
+    return Rigid3(nearest_rotation(world_from_gl @ CAMERA_CV_FROM_GL), row[4:].copy())
+
+
+def _up(metadata: dict[str, Any], poses: np.ndarray) -> Vector3 | None:
+    """+y of ARKit's world; in the recording's world when initPose leads from one to the other. None for the older app."""
+    from scipy.spatial.transform import Rotation
+
+    up = np.array([0.0, 1.0, 0.0])
+    first = metadata.get("initPose")
+    if isinstance(first, list) and len(first) == 7 and _all_numbers(first) and np.linalg.norm(first[:4]) > 0.5:
+        turn = Rotation.from_quat(np.array(first[:4], dtype=np.float64))
+        if turn.magnitude() > 1e-4:
+            return np.asarray(turn.inv().apply(up))
+    starts_at_camera = abs(abs(poses[0, 3]) - 1.0) < 1e-5 and np.linalg.norm(poses[0, 4:]) < 1e-6
+    return None if starts_at_camera else up
+
+
+def _table(metadata: dict[str, Any], key: str, columns: int, source: str) -> np.ndarray | None:
+    value = metadata.get(key)
+    if value is None:
+        return None
+    try:
+        table = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        table = np.zeros((0, 0))
+    if not (isinstance(value, list) and (not value or (table.ndim == 2 and table.shape[1] == columns))):
+        raise CaptureError(f"{source}: key '{key}' should hold rows of {columns} numbers", hint="export the recording again")
+    return table.reshape(-1, columns)
+
+
+def _positive(metadata: dict[str, Any], key: str, source: str) -> int:
+    value = metadata.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 100_000:
+        raise CaptureError(
+            f"{source}: key '{key}' should be a positive number, found {_brief(value)}", hint="is this a Record3D export?"
+        )
+    return int(value)
+
+
+def _all_numbers(values: list[Any]) -> bool:
+    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+
+
+def _brief(value: object) -> str:
+    return "nothing" if value is None else repr(value)[:60]

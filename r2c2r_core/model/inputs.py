@@ -1,0 +1,62 @@
+"""What people give: prompts and overrides. They are inputs, so a re-run flows forward and never back."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from r2c2r_core.arrays import Matrix4, Vector3
+
+HingeSide = Literal["left", "right", "top", "bottom"]  # as seen by a person facing the front
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PromptPoint:
+    """One click, in pixels of the stored RGB frame (continuous: pixel centres at i + 0.5)."""
+
+    frame: int
+    x: float
+    y: float
+    label: Literal[0, 1]  # 1 on the object, 0 off it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectPrompt:
+    """One object a person named and clicked."""
+
+    name: str  # unique, [A-Za-z0-9_]+ (scene_synthesizer and simulators accept no more)
+    category: str
+    points: tuple[PromptPoint, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prompts:
+    """prompts.json."""
+
+    objects: tuple[ObjectPrompt, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ObjectOverride:
+    """What a person corrected about one object; None is computed."""
+
+    candidate: str | None = None  # a candidate id, or a mesh file
+    hinge: HingeSide | None = None
+    dimensions_m: Vector3 | None = None  # width, depth, height
+    pose: Matrix4 | None = None  # world_from_object
+    joint_lower: float | None = None
+    joint_upper: float | None = None
+    front_world: Vector3 | None = None  # direction the front faces, in the world
+    rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Overrides:
+    """overrides.json."""
+
+    objects: dict[str, ObjectOverride]
+    up_capture: Vector3 | None = None  # in the capture frame
+    floor_m: float | None = None  # height of the floor along up_capture, in the capture frame
+    manhattan_yaw_rad: float | None = None
+
+    def of(self, name: str) -> ObjectOverride:
+        """The object's corrections; empty when there are none."""
+        return self.objects.get(name, ObjectOverride())

@@ -1,0 +1,24 @@
+"""Where a candidate stands in the world."""
+
+from dataclasses import dataclass
+
+from r2c2r_core.geometry.transforms import Similarity3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Placement:
+    """A candidate's pose and scale, with the evidence for them."""
+
+    object_name: str
+    candidate_id: str
+    world_from_mesh: Similarity3
+    matches: int  # keypoint correspondences over all frames
+    inliers: int
+    votes: dict[int, int]  # Frame.index -> inliers of that frame's hypothesis over all frames
+    rms_m: float  # observed points to the placed mesh, after ICP
+    mask_iou: float  # rendered silhouette against the visible masks, mean over the frames used
+    condition: float  # of the ICP normal matrix; large = the surface slides in some direction
+    unsure: bool
+    runner_up: float | None  # score of the best different hypothesis over the winner's, 0..1
+    method: str
+    warnings: tuple[str, ...]

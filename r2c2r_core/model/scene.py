@@ -1,0 +1,98 @@
+"""An articulated scene: fixtures made of panels, then dressed in the fitted meshes."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.mesh import TexturedMesh
+
+Source = Literal["measured", "inferred", "default", "person"]
+JointType = Literal["revolute", "prismatic"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Box:
+    """A panel or a handle piece: a box in its link's frame."""
+
+    name: str
+    size_m: Vector3
+    link_from_box: Rigid3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ConvexPiece:
+    """A convex collider in its link's frame."""
+
+    name: str
+    vertices_link: Points
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inertial:
+    """Mass properties in the link frame; inertia about the centre of mass, link axes."""
+
+    mass_kg: float
+    com_link: Vector3
+    inertia: Matrix3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Link:
+    """One rigid body. Link frame: at the hinge for hinged parts, at the object's origin otherwise; axes as the object's."""
+
+    name: str
+    object_from_link: Rigid3  # at joint position 0
+    boxes: tuple[Box, ...]  # colliders, and the visual where `visual` is None
+    pieces: tuple[ConvexPiece, ...]
+    visual: TexturedMesh | None  # in the link frame
+    colour: tuple[float, float, float]  # RGB 0..1 of the primitive where no mesh covers it
+    inertial: Inertial
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joint:
+    """Moves `child` in `parent`. 0 is closed, positive opens."""
+
+    name: str
+    type: JointType
+    parent: str
+    child: str
+    origin_object: Vector3
+    axis_object: Vector3  # unit; right-hand rule for opening
+    lower: float  # rad or m
+    upper: float
+    effort: float  # N m or N
+    velocity: float
+    damping: float
+    friction: float
+    sources: dict[str, Source]  # axis, origin, limits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SceneObject:
+    """One fixture or free-standing thing."""
+
+    name: str
+    category: str  # as the person wrote it
+    fixture: str  # the fixture that built it ("drawer", "object" …)
+    dimensions_m: Vector3  # width, depth, height, without the handle
+    dimension_sources: tuple[Source, Source, Source]
+    world_from_object: Rigid3
+    links: tuple[Link, ...]  # links[0] is the base
+    joints: tuple[Joint, ...]
+    movable: bool  # a free body in simulation (bottle, chair) rather than fixed to the world
+    front_texture: Image | None
+    warp_residual_m: float | None  # front corners, after the fit; None before warp
+    warnings: tuple[str, ...]
+    final_from_placed: Rigid3 = field(default_factory=Rigid3)  # how layout and person moved it: a world motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ArticulatedScene:
+    """Everything that stands in the world frame."""
+
+    name: str
+    objects: tuple[SceneObject, ...]
+    layout_moves_m: dict[str, float]  # how far the layout moved each object
+    warnings: tuple[str, ...]

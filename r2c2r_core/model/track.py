@@ -1,0 +1,67 @@
+"""Where an object is seen."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.geometry.transforms import Rigid3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrontHandle:
+    """A handle on a front, as a box in the front frame: x to the right, z up, both from the front's centre."""
+
+    left_m: float
+    right_m: float
+    bottom_m: float
+    top_m: float
+    protrusion_m: float  # how far it stands out of the front
+    confidence: float  # 0..1
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """(x, z) of its middle, metres."""
+        return (self.left_m + self.right_m) / 2, (self.bottom_m + self.top_m) / 2
+
+    @property
+    def is_vertical(self) -> bool:
+        """Whether it is taller than wide."""
+        return self.top_m - self.bottom_m > self.right_m - self.left_m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrontPanel:
+    """The rectangle of a flat front, measured over all frames. `world_from_front` is the `front` frame of transforms.py."""
+
+    world_from_front: Rigid3
+    width_m: float
+    height_m: float
+    handle: FrontHandle | None
+    confidence: float  # 0..1
+    roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ThingBox:
+    """A free-standing thing's gravity-aligned box, measured on its visible points. Frame: `object` (transforms.py)."""
+
+    world_from_object: Rigid3
+    dimensions_m: Vector3  # width, depth, height
+    support_z_m: float  # world height of what it stands on
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MaskTrack:
+    """An object's masks at RGB resolution, and what the segmenter measured while finding them."""
+
+    name: str
+    category: str
+    masks: dict[int, PackedMask]  # by Frame.index; only frames that see the object
+    confidence: dict[int, float]  # 0..1, same keys
+    front: FrontPanel | None  # set for furniture fronts and, where found, for appliances
+    box: ThingBox | None  # set for appliances and free-standing things
+    kind: Literal["front", "appliance", "thing"]
+    backend: str
+    prompt_count: int
+    warnings: tuple[str, ...]

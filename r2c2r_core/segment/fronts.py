@@ -1,0 +1,261 @@
+"""Engine A, furniture fronts: the panel under a click, its rectangle and its pixels in every frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Frame, Room
+from r2c2r_core.model.track import FrontHandle, FrontPanel
+from r2c2r_core.segment.cut import Cell, joined
+from r2c2r_core.segment.edges import as_lab, panel_edges
+from r2c2r_core.segment.handles import GridHandle
+from r2c2r_core.segment.mosaic import PlaneGrid
+from r2c2r_core.segment.occlusion import Facet, visible_mask
+from r2c2r_core.segment.runs import Run
+from r2c2r_core.segment.scene import Scene
+
+_USUAL_PROTRUSION_M = 0.035
+_PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
+_SUPPORTED_SHARE = 0.25  # of a column or row of cells, for it to belong to the panel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Front:
+    """A panel on a run, with the sides of its carcass that the scan shows."""
+
+    run: Run
+    cell: Cell
+    handle: GridHandle | None
+    depth_m: float  # to the wall behind, or the usual depth
+    sides: tuple[str, ...] = ()  # of left, right, bottom, top: faces of the carcass in view
+
+
+def find_front(run: Run, positives: Points, negatives: Points, *, pair: bool) -> Front | None:
+    """The panel under the clicks (world points); None when they miss the run's panels."""
+    cells = []
+    for column, row in run.grid.cells_of(positives):
+        cell = run.cell_at(float(column), float(row))
+        if cell is None:
+            return None
+        if cell not in cells:
+            cells.append(cell)
+    handles = [run.handles[run.cells.index(cell)] for cell in cells]
+    if pair and len(cells) == 1:
+        partner = _partner(run, cells[0])
+        if partner is not None:
+            cells.append(partner)
+    cell = joined(cells)
+    for column, row in run.grid.cells_of(negatives):
+        cell = _without(cell, float(column), float(row), run, run.grid.cells_of(positives))
+    handle = next((handle for handle in handles if handle is not None), None)
+    lab, seen = as_lab(run.mosaic)
+    return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
+
+
+def front_panel(front: Front) -> FrontPanel:
+    """The measured rectangle in the `front` frame."""
+    grid, cell = front.run.grid, front.cell
+    centre = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+    rotation = front.run.region.world_from_plane.rotation
+    width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
+    handle = _handle_in_front(front, cell) if front.handle is not None else None
+    return FrontPanel(
+        world_from_front=Rigid3(rotation, centre),
+        width_m=width,
+        height_m=height,
+        handle=handle,
+        confidence=_edge_confidence(front),
+        roll_rad=front.run.roll_rad,
+    )
+
+
+def front_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, float]:
+    """The front's visible pixels in a frame, and the share of its projection that is visible."""
+    grid = front.run.grid
+    if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
+        return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
+    slide = front.run.slide_of(frame.index, scene)
+    facets = [Facet(front_corners(front.cell, grid, slide))]
+    facets += [
+        Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
+        for side in front.sides
+        if side_faces(front.cell, grid, side, frame.world_from_camera.translation)
+    ]
+    return visible_mask(facets, scene, frame)
+
+
+def wall_behind(run: Run, cell: Cell, room: Room, usual_m: float) -> float | None:
+    """Distance from the front to the wall behind it; None where none is near the usual depth."""
+    middle = run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+    distances = []
+    for wall in room.walls:
+        facing = float(wall.normal @ run.grid.outward)
+        distance = float(wall.normal @ middle - wall.offset_m)
+        if facing > 0.95 and 0.6 * usual_m < distance < 1.6 * usual_m:
+            distances.append(distance)
+    return min(distances, default=None)
+
+
+def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
+    """Faces of the carcass that depth confirms over most of their area, away from the front's own edge."""
+    found = []
+    for side in ("left", "right", "bottom"):
+        agree = total = 0
+        points = _side_samples(front, side)
+        for frame in scene.frames[:: max(1, len(scene.frames) // 40)]:
+            if not side_faces(front.cell, front.run.grid, side, frame.world_from_camera.translation):
+                continue
+            camera = frame.depth_camera
+            local = frame.world_from_camera.inverse.apply(points)
+            z = np.maximum(local[:, 2], 1e-3)
+            u, v = camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy
+            inside = (local[:, 2] > 0.2) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+            depth = scene.depth(frame.index)[np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
+            known = inside & (depth > 0) & (depth > z - 0.05 - 0.01 * z - 0.25)  # far occluders say nothing
+            agree += int((known & (np.abs(depth - z) < 0.03 + 0.01 * z)).sum())
+            total += int(known.sum())
+        if total > 200 and agree > 0.5 * total:
+            found.append(side)
+    return tuple(found)
+
+
+def _partner(run: Run, cell: Cell) -> Cell | None:
+    """The other door of a pair: beside it, as high and as wide, preferably where the handle points."""
+    slack = 0.02 / run.grid.cell_m
+    beside = [
+        other
+        for other in run.cells
+        if abs(other.top - cell.top) < slack
+        and abs(other.bottom - cell.bottom) < slack
+        and min(abs(other.left - cell.right), abs(other.right - cell.left)) < slack
+        and abs(other.width - cell.width) < _PAIR_WIDTH_SHARE * cell.width
+    ]
+    if not beside:
+        return None
+    return max(beside, key=lambda other: (_pair_score(run, cell, other), -abs(other.width - cell.width)))
+
+
+def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
+    """Handles of a pair stand beside the shared seam."""
+    score = 0.0
+    for door, mate in ((cell, other), (other, cell)):
+        handle = run.handles[run.cells.index(door)]
+        if handle is not None:
+            offset = ((handle.left + handle.right) / 2 - door.left) / door.width
+            towards = offset if mate.left > door.left else 1 - offset
+            score += handle.confidence * (towards - 0.5)
+    return score
+
+
+def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The cell cut along the clearest line between a click off it and the clicks on it."""
+    if not cell.contains(column, row):
+        return cell
+    options: list[tuple[float, Cell]] = []
+    for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
+        profile = _profile(run, cell, axis)
+        low, high = (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
+        below, above = on[on < off], on[on > off]
+        if len(below) and len(above):
+            continue  # a click off it between two on it: no straight cut along this axis
+        start, stop = (float(below.max()), off) if len(below) else (off, float(above.min())) if len(above) else (off, off)
+        window = profile[max(round(start - low), 0) : max(round(stop - low), 0) + 1]
+        if len(window) < 2:
+            continue
+        position = low + max(round(start - low), 0) + int(np.argmax(window)) + 0.5
+        first = Cell(low, cell.top, position, cell.bottom) if axis == 0 else Cell(cell.left, low, cell.right, position)
+        second = Cell(position, cell.top, high, cell.bottom) if axis == 0 else Cell(cell.left, position, cell.right, high)
+        options.append((float(window.max()), first if len(below) else second))
+    return max(options, key=lambda option: option[0])[1] if options else cell
+
+
+def _profile(run: Run, cell: Cell, axis: int) -> np.ndarray:
+    """Mean line evidence across a cell, at each of its positions along an axis."""
+    evidence = run.vertical if axis == 0 else run.horizontal
+    low, high, across = (
+        (cell.left, cell.right, (cell.top, cell.bottom)) if axis == 0 else (cell.top, cell.bottom, (cell.left, cell.right))
+    )
+    first = int(across[0] // evidence.block)
+    last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
+    return np.asarray(evidence.score[first:last, round(low) : round(high)].mean(axis=0))
+
+
+def _supported(cell: Cell, run: Run) -> Cell:
+    """The cell without margins the scan never saw as part of the plane."""
+    rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
+    seen = run.seen[rows, columns]
+    across = np.flatnonzero(seen.mean(axis=0) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
+    down = np.flatnonzero(seen.mean(axis=1) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
+    if len(across) == 0 or len(down) == 0:
+        return cell
+    slack = 0.03 / run.grid.cell_m  # seen depth stops short of an edge by about its own resolution
+    left = cell.left if across[0] < slack else cell.left + float(across[0])
+    right = cell.right if cell.width - across[-1] < slack else cell.left + float(across[-1]) + 1
+    top = cell.top if down[0] < slack else cell.top + float(down[0])
+    bottom = cell.bottom if cell.height - down[-1] < slack else cell.top + float(down[-1]) + 1
+    return Cell(left, top, right, bottom)
+
+
+def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
+    assert front.handle is not None
+    cell_m, handle = front.run.grid.cell_m, front.handle
+    middle_x, middle_z = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
+    return FrontHandle(
+        left_m=(handle.left - middle_x) * cell_m,
+        right_m=(handle.right - middle_x) * cell_m,
+        bottom_m=(middle_z - handle.bottom) * cell_m,
+        top_m=(middle_z - handle.top) * cell_m,
+        protrusion_m=handle.protrusion_m or _USUAL_PROTRUSION_M,
+        confidence=handle.confidence,
+    )
+
+
+def _edge_confidence(front: Front) -> float:
+    """How clearly the four edges show, 0..1."""
+    cell, values = front.cell, []
+    for axis, position in ((0, cell.left), (0, cell.right), (1, cell.top), (1, cell.bottom)):
+        evidence = front.run.vertical if axis == 0 else front.run.horizontal
+        across = (cell.top, cell.bottom) if axis == 0 else (cell.left, cell.right)
+        first = int(across[0] // evidence.block)
+        last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
+        at = min(max(round(position), 1), evidence.score.shape[1] - 2)
+        values.append(float(np.clip(evidence.score[first:last, at - 1 : at + 2].max(axis=1).mean() / 4, 0, 1)))
+    return float(np.mean(values))
+
+
+def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:
+    """World corners of a panel as a frame shows it: top left, then clockwise."""
+    corners = np.array([[cell.left, cell.top], [cell.right, cell.top], [cell.right, cell.bottom], [cell.left, cell.bottom]])
+    return grid.points_at(corners - np.array(slide))
+
+
+_SIDE_EDGES = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}
+
+
+def side_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float], side: str, depth_m: float) -> Points:
+    """World corners of the carcass face that starts at one edge of a panel."""
+    corners = front_corners(cell, grid, slide)[list(_SIDE_EDGES[side])]
+    back = corners - grid.outward * depth_m
+    return np.stack([corners[0], corners[1], back[1], back[0]])
+
+
+def side_faces(cell: Cell, grid: PlaneGrid, side: str, camera_world: Vector3) -> bool:
+    """Whether a camera is on the outer side of a carcass face."""
+    local = grid.cells_of(camera_world[None])[0]
+    return bool(
+        {
+            "left": local[0] < cell.left,
+            "right": local[0] > cell.right,
+            "top": local[1] < cell.top,
+            "bottom": local[1] > cell.bottom,
+        }[side]
+    )
+
+
+def _side_samples(front: Front, side: str) -> Points:
+    corners = side_corners(front.cell, front.run.grid, (0.0, 0.0), side, front.depth_m)
+    along, deep = np.meshgrid(np.linspace(0.1, 0.9, 9), np.linspace(min(0.10 / max(front.depth_m, 0.11), 0.5), 0.9, 9))
+    a, d = along.ravel()[:, None], deep.ravel()[:, None]
+    return (1 - d) * ((1 - a) * corners[0] + a * corners[1]) + d * ((1 - a) * corners[3] + a * corners[2])

@@ -1,0 +1,175 @@
+"""The weight-free segmenter: fronts cut on ortho mosaics, things cut from the fused surface."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import PackedMask, pack_mask
+from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.categories import Kind, hint_for
+from r2c2r_core.segment.finders import find_object
+from r2c2r_core.segment.planes import PlaneRegion, find_planes
+from r2c2r_core.segment.prompts import check_prompt
+from r2c2r_core.segment.runs import Run, load_run
+from r2c2r_core.segment.scene import Scene, prepare_scene
+from r2c2r_core.segment.stage import SegmentConfig
+
+_VERSION = 1  # of what lies in the cache
+
+
+class Found(Protocol):
+    """An object found from its clicks: what it is, and its pixels in any frame."""
+
+    @property
+    def kind(self) -> Kind:
+        """What it turned out to be."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One line each, for a person."""
+
+    def mask(self, frame: Frame) -> tuple[Mask, float]:
+        """Visible pixels, and how far to trust them (0..1)."""
+
+    def panel(self) -> FrontPanel | None:
+        """Its flat front, measured."""
+
+    def box(self) -> ThingBox | None:
+        """Its box, measured."""
+
+
+class GeometricSegmenter:
+    """Needs no weights and no extra."""
+
+    def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
+        """Prepare a capture: see the surface from every frame, find its vertical planes, cut the furniture runs."""
+        folder = cache / f"geometric-{_cache_key(capture, config)}"
+        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.9))
+        centres = np.stack([frame.world_from_camera.translation for frame in capture.frames])
+        planes = find_planes(capture.surface, centres)
+        progress.at(1.0, f"{len(planes)} flat upright parts found")
+        return GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
+
+
+@dataclass(slots=True, eq=False)
+class GeometricSession:
+    """Clicks on one capture. Runs are keyed by plane and objects by prompt, so answers never depend on their order."""
+
+    scene: Scene
+    planes: tuple[PlaneRegion, ...]
+    config: SegmentConfig
+    folder: Path
+    _runs: dict[str, Run | None] = field(default_factory=dict)
+    _found: dict[ObjectPrompt, Found] = field(default_factory=dict)
+
+    def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
+        """The object's mask in one frame; empty when that frame does not show it."""
+        known = {frame.index for frame in self.scene.frames}
+        if frame_index not in known:
+            raise PromptError(
+                f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
+                hint="choose another",
+            )
+        return self.find(prompt).mask(self.scene.frame(frame_index))[0]
+
+    def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
+        """The object in every frame that sees it; raises ObjectNotSeen when none does."""
+        progress.at(0.0, f"{prompt.name}: finding it")
+        found = self.find(prompt)
+        masks: dict[int, PackedMask] = {}
+        confidence: dict[int, float] = {}
+        total = len(self.scene.frames)
+        for position, (index, packed, trust) in enumerate(self.stream(prompt)):
+            masks[index], confidence[index] = packed, trust
+            progress.at(min(0.1 + 0.9 * position / total, 0.99), f"{prompt.name}: seen in {position + 1} frames")
+        if not masks:
+            raise ObjectNotSeen(
+                f"{prompt.name}: seen in 0 of {total} frames, at least 1 expected", hint="click where it is in plain view"
+            )
+        progress.at(1.0, f"{prompt.name}: {len(masks)} frames")
+        return MaskTrack(
+            name=prompt.name,
+            category=prompt.category,
+            masks=dict(sorted(masks.items())),
+            confidence=dict(sorted(confidence.items())),
+            front=found.panel(),
+            box=found.box(),
+            kind=found.kind,
+            backend="geometric",
+            prompt_count=len(prompt.points),
+            warnings=found.warnings,
+        )
+
+    def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
+        """Frame, mask, confidence: the clicked frame first, then outwards both ways."""
+        found = self.find(prompt)
+        for frame in _outwards(self.scene.frames, prompt.points[0].frame):
+            mask, trust = found.mask(frame)
+            if np.count_nonzero(mask) >= self.config.least_area_px:
+                yield frame.index, pack_mask(mask), trust
+
+    def find(self, prompt: ObjectPrompt) -> Found:
+        """What the clicks mean, computed once a prompt."""
+        if prompt not in self._found:
+            check_prompt(self.scene.capture, prompt)
+            hint = hint_for(prompt.category)
+            positives = self._points(prompt, 1, must_hit=hint.kind != "appliance")
+            negatives = self._points(prompt, 0, must_hit=False)
+            self._found[prompt] = find_object(self, prompt, hint, positives, negatives)
+        return self._found[prompt]
+
+    def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
+        """The furniture run on a plane, and this far around it; computed once."""
+        key = f"run{self.planes.index(region)}-{round(margin_m * 1000)}"
+        if key not in self._runs:
+            path = self.folder / f"{key}.bin"
+            self._runs[key] = load_run(region, self.scene, self.config.cell_m, self.config.mosaic_frames, path, margin_m)
+        return self._runs[key]
+
+    def _points(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Points:
+        """World points under the clicks of one label; raises PromptError where one must hit a surface and does not."""
+        points = []
+        for click in prompt.points:
+            if click.label != label:
+                continue
+            point = self.scene.pick(click.frame, click.x, click.y)
+            if point is not None:
+                points.append(point)
+            elif must_hit:
+                raise PromptError(
+                    _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
+                )
+        return np.array(points).reshape(-1, 3)
+
+
+def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:
+    return (
+        f"{prompt.name}: the click at ({click.x:g}, {click.y:g}) on frame {click.frame} hits no surface, "
+        "a point with depth expected"
+    )
+
+
+def _outwards(frames: tuple[Frame, ...], start: int) -> list[Frame]:
+    return sorted(frames, key=lambda frame: (abs(frame.index - start), frame.index))
+
+
+def _cache_key(capture: Capture, config: SegmentConfig) -> str:
+    parts = (
+        _VERSION,
+        capture.sha256,
+        config,
+        capture.world_from_capture.matrix.round(9).tolist(),
+        len(capture.surface.vertices_world),
+        len(capture.surface.faces),
+        [frame.index for frame in capture.frames],
+    )
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

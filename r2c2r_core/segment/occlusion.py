@@ -1,0 +1,180 @@
+"""Which pixels of a projected surface a frame really shows: depth decides, colour draws the border of an occluder."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
+from r2c2r_core.geometry.camera import Intrinsics, project
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.scene import Scene
+
+_NEAR_M = 0.08
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerance:
+    """How far measured depth may lie from the model, metres plus a share of the distance."""
+
+    front_m: float = 0.06  # handles stand out by up to 5 cm
+    front_share: float = 0.012
+    behind_m: float = 0.06
+    behind_share: float = 0.03
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Facet:
+    """A flat convex polygon in the world. A facet to `confirm` is drawn only where depth agrees with it."""
+
+    corners_world: Points
+    confirm: bool = False
+
+    @property
+    def normal(self) -> Vector3:
+        """Unit normal."""
+        normal = np.cross(self.corners_world[1] - self.corners_world[0], self.corners_world[2] - self.corners_world[0])
+        return np.asarray(normal / np.linalg.norm(normal))
+
+
+def visible_mask(facets: list[Facet], scene: Scene, frame: Frame, tolerance: Tolerance | None = None) -> tuple[Mask, float]:
+    """The facets' pixels that nothing hides, at RGB resolution, and the share of their projection that is visible."""
+    tolerance = tolerance or Tolerance()
+    camera = frame.rgb_camera
+    total = np.zeros((camera.height, camera.width), bool)
+    projected = visible = 0
+    for facet in facets:
+        outline = project_polygon(facet.corners_world, frame, camera)
+        if outline is None:
+            continue
+        box = _bounds(outline, camera, margin=8)
+        if box is None:
+            continue
+        inside = fill_polygon(outline, box)
+        if not inside.any():
+            continue
+        shown = _shown(inside, box, facet, scene, frame, tolerance)
+        projected += int(inside.sum()) if not facet.confirm else 0
+        visible += int(shown.sum()) if not facet.confirm else 0
+        left, top, right, bottom = box
+        total[top:bottom, left:right] |= shown
+    return total, visible / projected if projected else float(total.any())
+
+
+def _shown(
+    inside: Mask, box: tuple[int, int, int, int], facet: Facet, scene: Scene, frame: Frame, tolerance: Tolerance
+) -> Mask:
+    model = _plane_depth(frame, frame.rgb_camera, box, facet.corners_world[0], facet.normal)
+    sensor, seen = _crop_depths(scene, frame, box)
+    front = tolerance.front_m + tolerance.front_share * model
+    behind = tolerance.behind_m + tolerance.behind_share * model
+    if facet.confirm:
+        agrees = (seen > 0) & (np.abs(seen - model) < 0.03 + 0.015 * model)
+        return inside & _smoothed(agrees, scene, frame)
+    # Glass and gloss leave holes through which the fused surface shows what is behind: only the sensor may say "behind".
+    hidden = ((seen > 0) & (seen < model - front)) | (sensor > model + behind)
+    hidden = _smoothed(hidden, scene, frame)
+    if not (hidden & inside).any():
+        return inside
+    if (hidden | ~inside).all():
+        return np.zeros_like(inside)
+    left, top, right, bottom = box
+    band = max(2, round(1.5 * frame.rgb_camera.width / frame.depth_camera.width))
+    refined = refine_border(scene.rgb(frame.index)[top:bottom, left:right], inside & ~hidden, band, within=inside)
+    return refined
+
+
+def refine_border(
+    rgb: Image, mask: Mask, band_px: int, *, within: Mask | None = None, gradient_depth: np.ndarray | None = None
+) -> Mask:
+    """Move a mask's border onto the strongest colour edge within `band_px`; outside `within` nothing is added."""
+    from skimage.segmentation import watershed
+
+    solid = mask.astype(np.uint8)
+    element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * band_px + 1, 2 * band_px + 1))
+    outer = np.ones_like(mask) if within is None else within
+    # Beyond the outline belongs to neither side: it must not erode the mask there.
+    padded = np.where(outer, solid, 1).astype(np.uint8) if within is not None else solid
+    sure = cv2.erode(padded, element, borderType=cv2.BORDER_REPLICATE) > 0
+    sure &= mask
+    not_sure = cv2.dilate(solid, element) > 0
+    markers = np.zeros(mask.shape, np.int32)
+    markers[sure] = 1
+    markers[outer & ~not_sure] = 2
+    if not (markers == 1).any() or not (markers == 2).any():
+        return mask
+    ridges = colour_gradient(rgb)
+    if gradient_depth is not None:
+        ridges = ridges + gradient_depth
+    return np.asarray((watershed(ridges, markers, mask=outer) == 1) & outer)
+
+
+def colour_gradient(rgb: Image, sigma: float = 1.0) -> np.ndarray:
+    """The largest Sobel magnitude over the Lab channels."""
+    lab = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), (0, 0), sigma).astype(np.float32)
+    dx, dy = cv2.Sobel(lab, cv2.CV_32F, 1, 0), cv2.Sobel(lab, cv2.CV_32F, 0, 1)
+    return np.asarray(np.sqrt(dx**2 + dy**2).max(axis=2))
+
+
+def project_polygon(corners_world: Points, frame: Frame, camera: Intrinsics) -> Pixels | None:
+    """Outline in continuous pixels of a world polygon, clipped at the near plane; None when it is behind."""
+    corners = frame.world_from_camera.inverse.apply(corners_world)
+    clipped = []
+    for current, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if current[2] >= _NEAR_M:
+            clipped.append(current)
+        if (current[2] >= _NEAR_M) != (following[2] >= _NEAR_M):
+            t = (_NEAR_M - current[2]) / (following[2] - current[2])
+            clipped.append(current + t * (following - current))
+    if len(clipped) < 3:
+        return None
+    return project(np.stack(clipped), camera)
+
+
+def fill_polygon(outline_px: Pixels, box: tuple[int, int, int, int]) -> Mask:
+    """Pixels of the box (left, top, right, bottom) inside an outline given in continuous coordinates."""
+    left, top, right, bottom = box
+    canvas = np.zeros((bottom - top, right - left), np.uint8)
+    points = np.clip((outline_px - [left + 0.5, top + 0.5]) * 16, -(2**20), 2**20)
+    cv2.fillPoly(canvas, [np.round(points).astype(np.int32)], 1, shift=4)
+    return canvas > 0
+
+
+def _bounds(outline_px: Pixels, camera: Intrinsics, margin: int) -> tuple[int, int, int, int] | None:
+    low, high = outline_px.min(axis=0), outline_px.max(axis=0)
+    left, top = max(int(max(low[0], 0)) - margin, 0), max(int(max(low[1], 0)) - margin, 0)
+    right = min(int(min(high[0], camera.width)) + margin + 1, camera.width)
+    bottom = min(int(min(high[1], camera.height)) + margin + 1, camera.height)
+    if high[0] <= 0 or high[1] <= 0 or low[0] >= camera.width or low[1] >= camera.height or right <= left or bottom <= top:
+        return None
+    return left, top, right, bottom
+
+
+def _plane_depth(
+    frame: Frame, camera: Intrinsics, box: tuple[int, int, int, int], point: Vector3, normal: Vector3
+) -> np.ndarray:
+    left, top, right, bottom = box
+    seen = frame.world_from_camera.inverse
+    local_normal, local_point = seen.rotation @ normal, seen.apply(point[None])[0]
+    x = (np.arange(left, right) + 0.5 - camera.cx) / camera.fx
+    y = (np.arange(top, bottom) + 0.5 - camera.cy) / camera.fy
+    slope = x[None] * local_normal[0] + y[:, None] * local_normal[1] + local_normal[2]
+    with np.errstate(divide="ignore"):
+        z = (local_point @ local_normal) / slope
+    return np.where(np.isfinite(z) & (z > 0), z, 1e3).astype(np.float32)
+
+
+def _crop_depths(scene: Scene, frame: Frame, box: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Sensor depth, and the same filled from the fused surface, at the colour pixels of a box."""
+    left, top, right, bottom = box
+    sensor, filled = scene.depth(frame.index), scene.filled_depth(frame.index)
+    column = ((np.arange(left, right) + 0.5) * filled.shape[1] / frame.rgb_camera.width).astype(int)
+    row = ((np.arange(top, bottom) + 0.5) * filled.shape[0] / frame.rgb_camera.height).astype(int)
+    area = np.ix_(row, column)
+    return sensor[area], filled[area]
+
+
+def _smoothed(flags: Mask, scene: Scene, frame: Frame) -> Mask:
+    """Round off the stairs of coarse depth pixels, and drop single ones."""
+    size = max(3, 2 * round(frame.rgb_camera.width / scene.depth(frame.index).shape[1]) + 1)
+    return np.asarray(cv2.blur(flags.astype(np.float32), (size, size)) > 0.5)

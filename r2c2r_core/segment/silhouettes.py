@@ -1,0 +1,172 @@
+"""Silhouettes of small things: a hull drawn into a frame, moved by that frame's pose error, snapped to colour edges."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Pixels, Points, Vector3
+from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.occlusion import colour_gradient
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things import Thing
+
+_POSE_ERROR_M = 0.04  # of the height of a support between frames, at most
+
+
+def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None) -> tuple[Mask, float]:
+    """The visible pixels of a small thing, its border on the colour edge nearest to its hull's outline."""
+    camera = frame.rgb_camera
+    empty = np.zeros((camera.height, camera.width), bool)
+    view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
+    if view is None:
+        return empty, 0.0
+    hull, hidden, area, scale = view
+    share = 1 - float((hull & hidden).sum() / max(hull.sum(), 1))
+    if share < 0.08:
+        return empty, 0.0
+    rgb = scene.rgb(frame.index)[area]
+    gradient = colour_gradient(rgb)
+    shift = _best_shift(hull, gradient, reach_px=round(thing.pose_error_m * scale))
+    hull = _moved(hull, shift)
+    band_m = band_m or (0.006 if len(thing.faces) else 0.010)  # a mere cylinder says little about the outline
+    mask = _snapped(hull, hidden | _behind(thing, scene, frame)[area], gradient, max(1.5, band_m * scale))
+    empty[area] = mask & ~hidden
+    return empty, share
+
+
+def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
+    """How much higher than it stands one frame's depth shows the support around the thing: that frame's pose error."""
+    if support_z_m is None:
+        return 0.0
+    depth = scene.depth(frame.index)
+    camera = frame.depth_camera
+    local = frame.world_from_camera.inverse.apply(centre[None])[0]
+    if local[2] < 0.2:
+        return 0.0
+    u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
+    reach = 0.22 * camera.fx / local[2]
+    rows = slice(int(np.clip(v - reach, 0, camera.height)), int(np.clip(v + reach, 0, camera.height)), 2)
+    columns = slice(int(np.clip(u - reach, 0, camera.width)), int(np.clip(u + reach, 0, camera.width)), 2)
+    patch = depth[rows, columns]
+    if not (patch > 0).any():
+        return 0.0
+    row, column = np.nonzero(patch > 0)
+    uv = np.stack([columns.start + 2 * column + 0.5, rows.start + 2 * row + 0.5], axis=1)
+    heights = frame.world_from_camera.apply(unproject(uv, patch[row, column].astype(np.float64), camera))[:, 2] - support_z_m
+    near = heights[np.abs(heights) < _POSE_ERROR_M]
+    if len(near) < 60:
+        return 0.0
+    counts, edges = np.histogram(near, bins=round(2 * _POSE_ERROR_M / 0.004), range=(-_POSE_ERROR_M, _POSE_ERROR_M))
+    peak = float(edges[int(np.argmax(np.convolve(counts, [1, 2, 1], mode="same")))] + 0.002)
+    return float(np.median(near[np.abs(near - peak) < 0.008]))
+
+
+def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
+    """How far the hull's outline lies from the colour edges it belongs to, metres, in the middle of the frames."""
+    shifts = []
+    for frame in views:
+        view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
+        if view is not None:
+            hull, _, area, scale = view
+            gradient = colour_gradient(scene.rgb(frame.index)[area])
+            shifts.append(float(np.hypot(*_best_shift(hull, gradient, round(thing.pose_error_m * scale)))) / scale)
+    return float(np.median(shifts)) if shifts else 0.0
+
+
+def raised(points: Points, lift_m: float) -> Points:
+    """World points lifted by a height."""
+    return points + np.array([0.0, 0.0, lift_m])
+
+
+def hull_view(thing: Thing, scene: Scene, frame: Frame, pad_m: float) -> tuple[Mask, Mask, tuple[slice, slice], float] | None:
+    """The hull's projection and the occluders in the crop around it, the crop, and pixels a metre."""
+    camera = frame.rgb_camera
+    offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
+    local = frame.world_from_camera.inverse.apply(raised(thing.vertices, offset))
+    if local[:, 2].min() < 0.15:
+        return None
+    uv = np.stack(
+        [camera.fx * local[:, 0] / local[:, 2] + camera.cx, camera.fy * local[:, 1] / local[:, 2] + camera.cy], axis=1
+    )
+    scale = camera.fx / float(np.median(local[:, 2]))
+    pad = pad_m * scale + 6
+    left, top = int(max(uv[:, 0].min() - pad, 0)), int(max(uv[:, 1].min() - pad, 0))
+    right, bottom = int(min(uv[:, 0].max() + pad, camera.width)), int(min(uv[:, 1].max() + pad, camera.height))
+    if right - left < 6 or bottom - top < 6:
+        return None
+    hull = _splat(uv - [left, top], (bottom - top, right - left), thing.spacing_m * scale)
+    if hull.sum() < 8:
+        return None
+    area = (slice(top, bottom), slice(left, right))
+    return hull > 0, occluders(thing, scene, frame)[area], area, scale
+
+
+def occluders(thing: Thing, scene: Scene, frame: Frame) -> Mask:
+    """Colour pixels where something stands clearly nearer than the thing."""
+    nearest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].min())
+    depth = scene.filled_depth(frame.index)
+    hidden = (depth > 0) & (depth < nearest - 0.03 - 0.01 * nearest)
+    size = (frame.rgb_camera.width, frame.rgb_camera.height)
+    return np.asarray(cv2.resize(hidden.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
+
+
+def _behind(thing: Thing, scene: Scene, frame: Frame) -> Mask:
+    """Colour pixels where the sensor saw something clearly farther than the thing."""
+    farthest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].max())
+    farther = scene.depth(frame.index) > farthest + 0.02 + 0.01 * farthest
+    size = (frame.rgb_camera.width, frame.rgb_camera.height)
+    return np.asarray(cv2.resize(farther.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
+
+
+def _splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
+    """The filled outline of points that are about `spacing_px` apart."""
+    height, width = shape
+    pad = int(spacing_px) + 2
+    canvas = np.zeros((height + 2 * pad, width + 2 * pad), np.uint8)
+    column, row = np.floor(uv_px[:, 0]).astype(int) + pad, np.floor(uv_px[:, 1]).astype(int) + pad
+    inside = (column >= 0) & (row >= 0) & (column < canvas.shape[1]) & (row < canvas.shape[0])
+    canvas[row[inside], column[inside]] = 1
+    size = 2 * max(1, round(0.8 * spacing_px)) + 1
+    element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.morphologyEx(canvas, cv2.MORPH_CLOSE, element)[pad:-pad, pad:-pad])
+
+
+def _best_shift(hull: Mask, gradient: np.ndarray, reach_px: int) -> tuple[int, int]:
+    """The small move of the outline that lies on the strongest edges: pose error, nought where poses are right."""
+    contours, _ = cv2.findContours(hull.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = np.concatenate(contours)[:, 0]
+    outline = outline[:: max(1, len(outline) // 160)]
+    limited = np.minimum(cv2.GaussianBlur(gradient, (0, 0), 1.0), np.quantile(gradient, 0.97) + 1e-6)
+    height, width = hull.shape
+    best, best_shift = -1.0, (0, 0)
+    for dy in range(-reach_px, reach_px + 1, max(1, reach_px // 10)):
+        for dx in range(-reach_px, reach_px + 1, max(1, reach_px // 10)):
+            x, y = outline[:, 0] + dx, outline[:, 1] + dy
+            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+            if inside.sum() < 0.5 * len(outline):
+                continue
+            value = float(limited[y[inside], x[inside]].mean()) * (1 - 0.35 * np.hypot(dx, dy) / max(reach_px, 1))
+            if value > best:
+                best, best_shift = value, (dx, dy)
+    return best_shift
+
+
+def _moved(hull: Mask, shift: tuple[int, int]) -> Mask:
+    move = np.array([[1, 0, shift[0]], [0, 1, shift[1]]], np.float32)
+    return np.asarray(cv2.warpAffine(hull.astype(np.uint8), move, (hull.shape[1], hull.shape[0]), flags=cv2.INTER_NEAREST) > 0)
+
+
+def _snapped(hull: Mask, off: Mask, gradient: np.ndarray, band_px: float) -> Mask:
+    """The hull with its border moved, within the band, onto the strongest edge."""
+    from skimage.segmentation import watershed
+
+    outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
+    inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    deep = min(band_px, 0.6 * float(inside.max()))
+    markers = np.zeros(hull.shape, np.int32)
+    markers[outside > band_px] = 2
+    markers[inside > deep] = 1
+    markers[off & (outside > 0.25 * band_px)] = 2
+    if not (markers == 1).any() or not (markers == 2).any():
+        return hull
+    return np.asarray(watershed(gradient, markers) == 1)

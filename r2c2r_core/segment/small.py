@@ -1,0 +1,234 @@
+"""Engine C, small things: space carved by depth, then by colour silhouettes of many frames, which forgives coarse depth."""
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.silhouettes import occluders, raised, small_mask, support_offset, usual_shift
+from r2c2r_core.segment.things import Thing, ThingConfig, support_height
+from r2c2r_core.segment.upright import upright_shape
+from r2c2r_core.segment.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
+
+_FRAMES = 18
+_POSES_AGREE_M = 0.006  # phones: below 0.005; KinectFusion on the real kitchen: 0.009
+_OFF_SUPPORT_M, _OFF_WALL_M = 0.012, 0.03  # nearer points are the structure's
+_DEPTH_SLACK_M = 0.022  # what coarse depth of a curved thing is off by
+_SEEN_THROUGH = 0.12  # share of the views that may err before a voxel counts as empty
+_INSIDE = 0.85  # share of silhouettes that must hold a voxel
+
+
+def find_small(
+    scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
+) -> Thing | None:
+    """A small thing's visual hull; None when depth shows nothing that stands apart at the clicks."""
+    support = support_height(scene, positives, config)
+    voxels = _voxels_around(scene, positives, config, support)
+    views = _best_views(scene, positives.mean(axis=0), _FRAMES)
+    if len(views) < 2:
+        return None
+    spread = _pose_spread(scene, views, support, positives.mean(axis=0))
+    if spread > _POSES_AGREE_M:
+        return upright_shape(scene, positives, views, config, support)  # frames disagree by more than fusing bears
+    front = _seen_points(scene, views, voxels, positives, support, structure)
+    if len(front) < 12:
+        return None
+    solid = _carve(voxels, scene, views, support) & _as_deep_as_wide(voxels, front, views)
+    solid = part_at(solid, voxels, positives, negatives, reach_m=0.03)
+    if solid is None:
+        return None
+    voxels, solid = cropped(voxels, solid)
+    room = with_headroom(solid, voxels)
+    thing = mesh_of(solid.astype(np.float32), 0.5, voxels, support)
+    if thing is None:
+        return None
+    for band_m in (0.012, 0.007):  # the first silhouettes start from coarse depth, the next from the first
+        share = np.where(room, _silhouette_share(thing, voxels, scene, views, band_m), 0)
+        inside = part_at(share > _INSIDE, voxels, positives, negatives, reach_m=0.03)
+        better = mesh_of(np.where(grown(inside), share, 0), _INSIDE, voxels, support) if inside is not None else None
+        if better is None:
+            break
+        thing = better
+    if (
+        spread + usual_shift(thing, scene, views) > _POSES_AGREE_M
+        or _too_wide(thing, config)
+        or _lost(thing, scene, views, positives)
+    ):
+        return upright_shape(scene, positives, views, config, support)
+    return thing
+
+
+def _too_wide(thing: Thing, config: ThingConfig) -> bool:
+    """Whether the hull is far wider than such a thing can be: it took in a neighbour."""
+    width = np.ptp(np.quantile(thing.vertices[:, :2], [0.02, 0.98], axis=0), axis=0).min()
+    return config.width_m is not None and bool(width > 1.7 * config.width_m)
+
+
+def _lost(thing: Thing, scene: Scene, views: list[Frame], positives: Points) -> bool:
+    """Whether the hull left a click, or shows in too few of the frames that see the clicks."""
+    away = [float(np.linalg.norm(thing.vertices - point, axis=1).min()) for point in positives]
+    shown = [bool(small_mask(thing, scene, frame)[0].any()) for frame in views[::2]]
+    return max(away) > 0.02 or float(np.mean(shown)) < 0.7
+
+
+def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre: Vector3) -> float:
+    """How much the frames disagree about the height of the support: the median absolute deviation."""
+    offsets = np.array([support_offset(scene, frame, support, centre) for frame in views])
+    return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0
+
+
+def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None) -> Voxels:
+    reach = 1.25 * config.radius_m + 0.02
+    low, high = positives.min(axis=0) - reach, positives.max(axis=0) + reach
+    low[2], high[2] = positives[:, 2].min() - 2.2 * config.radius_m, positives[:, 2].max() + 2.2 * config.radius_m
+    if support is not None:
+        low[2] = support + 0.002
+        high[2] = max(min(high[2], support + 2.6 * config.radius_m), positives[:, 2].max() + 0.03)
+    # The clicks lie on the near side: look further behind them than before them.
+    centres = np.stack([frame.world_from_camera.translation for frame in scene.frames])
+    away = positives.mean(axis=0) - centres[np.argmin(np.linalg.norm(centres - positives.mean(axis=0), axis=1))]
+    away[2] = 0
+    low, high = (
+        low + 0.3 * reach * away / max(np.linalg.norm(away), 1e-6),
+        high + 0.3 * reach * away / max(np.linalg.norm(away), 1e-6),
+    )
+    size = max(0.003, float(np.prod(high - low) / 100_000) ** (1 / 3))
+    return Voxels(low, size, tuple(np.ceil((high - low) / size).astype(int).tolist()))
+
+
+def _best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
+    """Frames in which nothing hides the point, spread over the directions they look from."""
+    rated: list[tuple[float, Frame, float]] = []
+    for frame in scene.frames:
+        local = frame.world_from_camera.inverse.apply(point[None])[0]
+        camera = frame.rgb_camera
+        if local[2] < 0.2:
+            continue
+        u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
+        margin = 0.04 * camera.width
+        if not (margin < u < camera.width - margin and margin < v < camera.height - margin):
+            continue
+        seen = scene.filled_depth(frame.index)
+        at = seen[int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)]
+        if 0 < at < local[2] - 0.08:
+            continue
+        away = point - frame.world_from_camera.translation
+        rated.append((float(np.sqrt(max(frame.sharpness, 1e-3)) / local[2]), frame, float(np.arctan2(away[1], away[0]))))
+    if not rated:
+        return []
+    middle = np.angle(np.exp(1j * np.array([yaw for _, _, yaw in rated])).mean())
+    bins: dict[int, list[tuple[float, Frame]]] = {}
+    for score, frame, yaw in rated:
+        bins.setdefault(round(float(np.angle(np.exp(1j * (yaw - middle)))) / np.radians(8)), []).append((score, frame))
+    per_bin = max(2, -(-count // len(bins)))
+    chosen = [item for _, items in sorted(bins.items()) for item in sorted(items, key=lambda item: -item[0])[:per_bin]]
+    return [frame for _, frame in sorted(chosen, key=lambda item: -item[0])[: count + 4]]
+
+
+def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | None) -> np.ndarray:
+    """Voxels that depth does not show to be empty, and that some frame's depth touches or hides."""
+    centres = voxels.centres
+    empty, known = np.zeros(len(centres), np.int32), np.zeros(len(centres), np.int32)
+    for frame in views:
+        depth = scene.depth(frame.index)
+        offset = support_offset(scene, frame, support, centres.mean(axis=0))
+        z, seen = _lookup(raised(centres, offset), frame, depth)
+        valid = (z > 0.1) & (seen > 0)
+        empty += valid & (seen > z + _DEPTH_SLACK_M)
+        known += valid & (seen > z - 0.15)
+    return np.asarray((empty <= np.maximum(1, _SEEN_THROUGH * known)) & (known > 0)).reshape(voxels.shape)
+
+
+def _seen_points(
+    scene: Scene,
+    views: list[Frame],
+    voxels: Voxels,
+    positives: Points,
+    support: float | None,
+    structure: tuple[PlaneRegion, ...],
+) -> Points:
+    """Depth points of the thing: connected to the clicks, off its support and off walls."""
+    from scipy import ndimage
+
+    cell = max(voxels.size_m, 0.008)
+    extent = np.array(voxels.shape) * voxels.size_m
+    shape = np.ceil(extent / cell).astype(int)
+    hits = np.zeros(shape, np.int32)
+    for frame in views:
+        depth = scene.depth(frame.index)
+        points = frame.world_from_camera.apply(depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64))
+        points = raised(points, -support_offset(scene, frame, support, positives.mean(axis=0)))
+        at = np.floor((points - voxels.origin) / cell).astype(int)
+        at[:, 2] = np.where(points[:, 2] < voxels.origin[2] + _OFF_SUPPORT_M, -1, at[:, 2])
+        inside = ((at >= 0) & (at < shape)).all(axis=1)
+        points, at = points[inside], at[inside]
+        for plane in structure:
+            off = np.abs((points - plane.world_from_plane.translation) @ plane.outward) > _OFF_WALL_M
+            off |= ~plane.supports(points, 0.10)
+            points, at = points[off], at[off]
+        once = np.unique(at @ [shape[1] * shape[2], shape[2], 1])
+        hits.ravel()[once] += 1
+    solid = hits >= max(2, 0.05 * len(views))
+    labels, _ = ndimage.label(solid, structure=np.ones((3, 3, 3)))
+    grid = Voxels(voxels.origin, cell, tuple(shape.tolist()))
+    chosen = {label for point in positives if (label := label_near(labels, grid, point, 0.035))}
+    return (np.argwhere(np.isin(labels, sorted(chosen))) + 0.5) * cell + voxels.origin if chosen else np.zeros((0, 3))
+
+
+def _as_deep_as_wide(voxels: Voxels, front: Points, views: list[Frame]) -> np.ndarray:
+    """Voxels behind what was seen, no deeper than it is wide: depth does not carve the shadow of a thing."""
+    centres = np.stack([frame.world_from_camera.translation for frame in views])
+    away = front.mean(axis=0) - centres.mean(axis=0)
+    away = away * [1, 1, 0] / max(float(np.linalg.norm(away[:2])), 1e-6)
+    across = np.array([-away[1], away[0], 0.0])
+    low, high = np.quantile(front @ across, [0.01, 0.99])
+    near, far = np.quantile(front @ away, [0.01, 0.99])
+    slack = 0.012
+    far = max(far, near + (high - low))
+    at = voxels.centres
+    side, deep = at @ across, at @ away
+    inside = (side > low - slack) & (side < high + slack) & (deep > near - slack) & (deep < far + slack)
+    inside &= at[:, 2] < np.quantile(front[:, 2], 0.995) + 0.03
+    return np.asarray(inside.reshape(voxels.shape))
+
+
+def _lookup(points: Points, frame: Frame, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    camera = frame.depth_camera
+    local = frame.world_from_camera.inverse.apply(points)
+    z = np.maximum(local[:, 2], 1e-3)
+    column, row = (
+        (camera.fx * local[:, 0] / z + camera.cx).astype(np.int64),
+        (camera.fy * local[:, 1] / z + camera.cy).astype(np.int64),
+    )
+    inside = (local[:, 2] > 0.1) & (column >= 0) & (row >= 0) & (column < camera.width) & (row < camera.height)
+    seen = depth[np.where(inside, row, 0), np.where(inside, column, 0)]
+    return local[:, 2], np.where(inside, seen, 0)
+
+
+def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Frame], band_m: float) -> np.ndarray:
+    """For each voxel, the share of colour silhouettes that hold it, among those that could."""
+    centres = voxels.centres
+    inside, seen = np.zeros(len(centres)), np.zeros(len(centres))
+    for frame in views:
+        mask, _ = small_mask(thing, scene, frame, band_m)
+        if not mask.any():
+            continue
+        camera = frame.rgb_camera
+        offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
+        local = frame.world_from_camera.inverse.apply(raised(centres, offset))
+        z = np.maximum(local[:, 2], 1e-3)
+        column, row = (
+            (camera.fx * local[:, 0] / z + camera.cx).astype(np.int64),
+            (camera.fy * local[:, 1] / z + camera.cy).astype(np.int64),
+        )
+        valid = (column >= 0) & (row >= 0) & (column < camera.width) & (row < camera.height)
+        hidden = occluders(thing, scene, frame)
+        column, row = np.where(valid, column, 0), np.where(valid, row, 0)
+        valid &= ~hidden[row, column] | mask[row, column]
+        seen += valid
+        inside += valid & mask[row, column]
+    share = inside / np.maximum(seen, 1)
+    share[seen < 2] = 0
+    return share.reshape(voxels.shape).astype(np.float32)

@@ -1,0 +1,186 @@
+"""How far each joint opens before something that stands still is in its way."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.boxes import Boxes, box_penetration
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
+
+_TOUCH_M = 0.0005
+_STEPS = 36
+_BEHIND_M = 0.05  # a closed front further behind a wall's plane is not in front of that wall
+_SPARE = {"revolute": np.deg2rad(1.0), "prismatic": 0.003}  # kept free before the obstacle
+_LEAST = {"revolute": 1e-3, "prismatic": 1e-3}  # a jammed joint keeps a range that simulators accept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Obstacles:
+    """Boxes in the world that stand still, with the object each belongs to."""
+
+    boxes: Boxes
+    owner: np.ndarray  # (n,) index of the object
+    link: np.ndarray  # (n,) index of the link in the object
+
+
+def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> list[SceneObject]:
+    """The objects, each joint's upper limit lowered to where its free sweep ends; joints in `kept` are a person's."""
+    obstacles = _gather(objects)
+    result = []
+    for index, item in enumerate(objects):
+        joints, warnings = [], []
+        for joint in item.joints:
+            if joint.name in kept:
+                joints.append(joint)
+                continue
+            free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
+            if blocker is None:
+                joints.append(joint)
+                continue
+            joints.append(replace(joint, upper=free, sources={**joint.sources, "limits": "inferred"}))
+            warnings.append(
+                f"{joint.name} opens to {_amount(joint, free)} of {_amount(joint, joint.upper)}: {blocker} is in the way"
+            )
+        result.append(replace(item, joints=tuple(joints), warnings=(*item.warnings, *warnings)))
+    return result
+
+
+def free_travel(
+    item: SceneObject,
+    joint: Joint,
+    index: int,
+    objects: Sequence[SceneObject],
+    obstacles: Obstacles,
+    walls: Sequence[Wall],
+) -> tuple[float, str | None]:
+    """How far a joint opens with all others closed, and the name of what stops it short of its limit."""
+    child_index = next(i for i, link in enumerate(item.links) if link.name == joint.child)
+    child = item.links[child_index]
+    others = ~((obstacles.owner == index) & (obstacles.link == child_index))
+    moving = _link_boxes(item, child)
+    near = others & _within_reach(obstacles.boxes, item, joint, moving)
+    corners = _corners(moving)
+    near_walls = [wall for wall, depth in zip(walls, _wall_depths(corners, walls), strict=True) if depth < _BEHIND_M]
+    before = np.maximum(_wall_depths(corners, near_walls), 0.0)
+
+    def blocker_at(position: float) -> str | None:
+        motion = motion_at(item, joint, position)
+        if (_wall_depths(motion.apply(corners), near_walls) > before + _TOUCH_M).any():
+            return "a wall"
+        return _blocker(_moved(moving, motion), obstacles, near, objects)
+
+    free = 0.0
+    for position in np.linspace(0.0, joint.upper, _STEPS + 1):
+        blocker = blocker_at(position)
+        if blocker is not None:
+            return _shortened(_last_free(free, position, blocker_at), joint), blocker
+        free = float(position)
+    return joint.upper, None
+
+
+def _last_free(free: float, blocked: float, blocker_at: Callable[[float], str | None]) -> float:
+    """The furthest free position between a free and a blocked one, to a 64th of the step."""
+    for _ in range(6):
+        middle = (free + blocked) / 2
+        free, blocked = (middle, blocked) if blocker_at(middle) is None else (free, middle)
+    return free
+
+
+def _shortened(free: float, joint: Joint) -> float:
+    """A limit that stays clear of the obstacle, and above zero so that the joint keeps a range."""
+    return max(free - _SPARE[joint.type], 0.5 * free, _LEAST[joint.type])
+
+
+def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
+    """The world motion of the joint's child from closed to `position`."""
+    axis = item.world_from_object.rotation @ joint.axis_object
+    if joint.type == "prismatic":
+        return Rigid3(np.eye(3), axis * position)
+    pivot = item.world_from_object.apply(joint.origin_object[None])[0]
+    rotation = rotation_about(axis, position)
+    return Rigid3(rotation, pivot - rotation @ pivot)
+
+
+def rotation_about(axis: Vector3, angle_rad: float) -> np.ndarray:
+    """Rotation about a unit axis by the right-hand rule (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross)
+
+
+def _blocker(moving: Boxes, obstacles: Obstacles, near: np.ndarray, objects: Sequence[SceneObject]) -> str | None:
+    candidates = np.flatnonzero(near)
+    if len(candidates) == 0:
+        return None
+    i, j = (v.ravel() for v in np.meshgrid(np.arange(len(moving.centres)), candidates, indexing="ij"))
+    depth = box_penetration(Boxes(*(v[i] for v in moving)), Boxes(*(v[j] for v in obstacles.boxes)))
+    worst = int(np.argmax(depth))
+    return objects[obstacles.owner[j[worst]]].name if depth[worst] > _TOUCH_M else None
+
+
+def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) -> np.ndarray:
+    """Obstacles near enough to the sweep to be worth testing."""
+    centre = moving.centres.mean(axis=0)
+    size = float(np.linalg.norm(np.ptp(_corners(moving), axis=0)))
+    reach = size * 1.6 if joint.type == "revolute" else size + joint.upper
+    return np.asarray(np.linalg.norm(boxes.centres - centre, axis=1) - np.linalg.norm(boxes.halves, axis=1) < reach)
+
+
+def _gather(objects: Sequence[SceneObject]) -> Obstacles:
+    """Boxes of everything that stands still; things that can be pushed aside do not limit a hinge."""
+    parts: list[Boxes] = []
+    owner: list[int] = []
+    number: list[int] = []
+    for index, item in enumerate(objects):
+        for link_index, link in enumerate(item.links):
+            if item.movable or not link.boxes:
+                continue
+            boxes = _link_boxes(item, link)
+            parts.append(boxes)
+            owner += [index] * len(boxes.centres)
+            number += [link_index] * len(boxes.centres)
+    if not parts:
+        return Obstacles(
+            boxes=Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3))), owner=np.zeros(0, int), link=np.zeros(0, int)
+        )
+    joined = Boxes(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return Obstacles(boxes=joined, owner=np.array(owner), link=np.array(number))
+
+
+def _link_boxes(item: SceneObject, link: Link) -> Boxes:
+    world_from_link = item.world_from_object @ link.object_from_link
+    return _stacked([_in_world(box, world_from_link) for box in link.boxes])
+
+
+def _in_world(box: Box, world_from_link: Rigid3) -> tuple[Rigid3, Vector3]:
+    return world_from_link @ box.link_from_box, box.size_m
+
+
+def _stacked(boxes: Sequence[tuple[Rigid3, Vector3]]) -> Boxes:
+    return Boxes(
+        np.array([pose.translation for pose, _ in boxes]),
+        np.array([pose.rotation for pose, _ in boxes]),
+        np.array([size / 2 for _, size in boxes]),
+    )
+
+
+def _moved(boxes: Boxes, motion: Rigid3) -> Boxes:
+    return Boxes(motion.apply(boxes.centres), motion.rotation @ boxes.axes, boxes.halves)
+
+
+def _corners(boxes: Boxes) -> np.ndarray:
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+    return (boxes.centres[:, None] + np.einsum("nij,nkj->nki", boxes.axes, signs[None] * boxes.halves[:, None])).reshape(-1, 3)
+
+
+def _wall_depths(points: np.ndarray, walls: Sequence[Wall]) -> np.ndarray:
+    """How far the points pass behind each wall; negative where all are in front of it."""
+    return np.array([float((wall.offset_m - points @ wall.normal).max()) for wall in walls])
+
+
+def _amount(joint: Joint, position: float) -> str:
+    return f"{np.rad2deg(position):.0f} deg" if joint.type == "revolute" else f"{position:.2f} m"

@@ -1,0 +1,250 @@
+"""How large an object is and how it stands (paper eq. 8-10, mended).
+
+Departures from the paper (method.md rows 17, 18): the box is measured on the *placed* mesh, in metres; gravity is known,
+so only the plan is searched (exactly); width, depth and height are named by the side the cameras saw; the handle is kept
+apart; what the segmenter measured over all frames (a front's rectangle, a thing's box) replaces the mesh's word on the
+axes it saw.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.boxes import upright_box
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.scene import Source
+from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack
+from r2c2r_core.synthesize.fixtures.spec import FixtureSpec
+from r2c2r_core.synthesize.handles import handle_of_mesh
+from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
+
+_SAMPLES = 6000
+_TO_WALL_M = 0.03  # a back that ends this near the wall stands against it
+_TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredObject:
+    """An object as measured, before the layout."""
+
+    name: str
+    category: str
+    spec: FixtureSpec
+    world_from_object: Rigid3
+    dimensions_m: Vector3
+    sources: tuple[Source, Source, Source]
+    handle: FrontHandle | None
+    support_z_m: float | None
+    front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
+    confidence: float
+    fixed_by_person: bool  # a person gave pose or size: the layout leaves it where it is
+    placed_pose: Rigid3  # world_from_object as the mesh was placed, before person and layout
+    warnings: tuple[str, ...]
+
+    @property
+    def outward(self) -> Vector3:
+        """The horizontal direction its front faces."""
+        return -self.world_from_object.rotation[:, 1]
+
+    @property
+    def front_centre(self) -> Vector3:
+        """Centre of the front face, in the world."""
+        return self.world_from_object.apply(np.array([[0.0, -self.dimensions_m[1] / 2, 0.0]]))[0]
+
+
+def measure_object(
+    capture: Capture,
+    track: MaskTrack,
+    placement: Placement,
+    asset: MeshAsset,
+    spec: FixtureSpec,
+    override: ObjectOverride,
+    *,
+    seed: int = 0,
+) -> MeasuredObject:
+    """Size, pose and handle of one object; every axis says where its number comes from."""
+    vertices_world = placement.world_from_mesh.apply(asset.mesh.vertices)
+    samples = sampled(vertices_world, asset.mesh.faces, _SAMPLES, seed)
+    warnings: list[str] = []
+    outward, yaw_known = facing(capture, track, samples)
+    rotation = _mesh_rotation(samples, outward) if not yaw_known else front_rotation(outward)
+    low, high = mesh_range(samples, rotation, with_front=spec.opening not in ("rigid", "fixed"))
+    handle = None
+    front = track.front if track.front is not None and _fits(track.front, high - low, warnings) else None
+    sources: list[Source] = ["measured", "inferred", "measured"]
+    if front is not None:
+        low, high = _with_front(low, high, front, rotation)
+        handle = front.handle
+    elif track.box is not None and spec.opening != "rigid":
+        low, high = _with_box(low, high, track, rotation)
+    low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
+    if track.box is not None and sources[1] == "inferred" and _side_seen(capture, low, high, rotation):
+        sources[1] = "measured"
+    if handle is None and spec.opening not in ("rigid", "fixed"):
+        handle = handle_of_mesh(samples, rotation, low, high)
+    pose = Rigid3(rotation, rotation @ ((low + high) / 2))
+    measured = MeasuredObject(
+        name=track.name,
+        category=track.category,
+        spec=spec,
+        world_from_object=pose,
+        dimensions_m=high - low,
+        sources=(sources[0], sources[1], sources[2]),
+        handle=handle,
+        support_z_m=track.box.support_z_m if track.box is not None else None,
+        front_measured=front is not None,
+        confidence=front.confidence if front is not None else 0.3,
+        fixed_by_person=False,
+        placed_pose=pose,
+        warnings=tuple(warnings),
+    )
+    return _corrected(measured, override)
+
+
+def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:
+    """The horizontal direction the object faces, and whether its exact yaw is known; else only the side the cameras saw."""
+    if track.front is not None:
+        return -track.front.world_from_front.rotation[:, 1], True
+    if track.box is not None and track.kind == "appliance":
+        return -track.box.world_from_object.rotation[:, 1], True
+    if track.box is not None:
+        return -track.box.world_from_object.rotation[:, 1], False
+    seen = [f.world_from_camera.translation for f in capture.frames if f.index in track.masks]
+    towards = np.mean(seen, axis=0) - samples.points.mean(axis=0) if seen else np.array([0.0, -1.0, 0.0])
+    return np.array([towards[0], towards[1], 0.0]) / max(float(np.hypot(towards[0], towards[1])), 1e-9), False
+
+
+def mesh_range(samples: SurfaceSamples, rotation: np.ndarray, *, with_front: bool) -> tuple[Vector3, Vector3]:
+    """Low and high ends along the object's axes; with a front, its plane is the low end of y and the handle is left out."""
+    points = samples.points @ rotation
+    if with_front:
+        front_y = front_face_y(points, samples.normals @ rotation)
+        points = points[points[:, 1] > front_y - 0.004]
+        low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
+        low[1] = front_y
+        return low, high
+    low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
+    return low, high
+
+
+def front_face_y(points: Points, normals: Points) -> float:
+    """Where the front face lies along y: the foremost large flat of the faces that look towards -y."""
+    looking = points[normals[:, 1] < -0.8, 1]
+    if len(looking) < 20:
+        return float(np.quantile(points[:, 1], _TRIM))
+    bins = np.arange(looking.min() - 0.006, looking.max() + 0.018, 0.006)
+    counts = np.histogram(looking, bins)[0]
+    smooth = counts + np.append(counts[1:], 0)
+    first = int(np.flatnonzero(smooth >= 0.4 * smooth.max())[0])
+    near = looking[(looking >= bins[first]) & (looking <= bins[first + 2])] if first + 2 < len(bins) else looking
+    return float(np.median(near))
+
+
+def _mesh_rotation(samples: SurfaceSamples, outward: Vector3) -> np.ndarray:
+    """The mesh's own upright box, turned by the quarter turn whose front is nearest to `outward`."""
+    box = upright_box(samples.points, samples.normals, trim=_TRIM)
+    fronts = [box.world_from_box.rotation @ d for d in ([0, -1.0, 0], [1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0])]
+    return front_rotation(max(fronts, key=lambda d: float(d @ outward)))
+
+
+def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:
+    """Whether the measured front may replace the mesh's width and height."""
+    ratio = np.array([front.width_m, front.height_m]) / np.maximum(mesh_size[[0, 2]], 1e-6)
+    if front.confidence < 0.15:
+        return False
+    if (ratio < 0.8).any() or (ratio > 1.25).any():
+        warnings.append(
+            f"the mesh measures {mesh_size[0]:.2f} x {mesh_size[2]:.2f} m across, its front in the frames "
+            f"{front.width_m:.2f} x {front.height_m:.2f} m: the frames were believed"
+        )
+    return True
+
+
+def _with_front(low: Vector3, high: Vector3, front: FrontPanel, rotation: np.ndarray) -> tuple[Vector3, Vector3]:
+    """The front's rectangle and plane in place of the mesh's; the back stays the mesh's."""
+    centre = front.world_from_front.translation @ rotation
+    half = np.array([front.width_m, 0.0, front.height_m]) / 2
+    new_low, new_high = centre - half, centre + half
+    new_high[1] = centre[1] + max(high[1] - low[1], 0.02) if high[1] < centre[1] + 0.05 else high[1]
+    return new_low, new_high
+
+
+def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarray) -> tuple[Vector3, Vector3]:
+    """The box measured on the visible points in place of the mesh's, for an appliance without a front."""
+    assert track.box is not None
+    centre = track.box.world_from_object.translation @ rotation
+    return centre - track.box.dimensions_m / 2, centre + track.box.dimensions_m / 2
+
+
+def _believable_depth(
+    capture: Capture, track: MaskTrack, spec: FixtureSpec, low: Vector3, high: Vector3, rotation: np.ndarray
+) -> tuple[Vector3, Vector3, Source]:
+    """The depth, up to the wall where it ends near or beyond it, and within what the category allows."""
+    depth, (least, most) = float(high[1] - low[1]), spec.depth_range_m
+    low, high = low.copy(), high.copy()
+    if spec.opening == "rigid":
+        return low, high, "measured"
+    to_wall = distance_to_wall(capture, rotation, low, high)
+    source: Source = "inferred"
+    # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
+    near = _TO_WALL_M if track.kind == "front" else 0.0
+    if to_wall is not None and to_wall >= least and depth > to_wall - near:
+        depth = to_wall
+    if not least <= depth <= most:
+        reaches = to_wall is not None and least <= to_wall <= most
+        depth, source = (float(to_wall), "inferred") if reaches and to_wall is not None else (spec.dimensions_m[1], "default")
+    high[1] = low[1] + depth
+    return low, high, source
+
+
+def distance_to_wall(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3) -> float | None:
+    """From the front plane back to the nearest wall that faces the same way, if there is one within 1.2 m."""
+    front_centre = rotation @ np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    outward = -rotation[:, 1]
+    behind = [
+        float(wall.normal @ front_centre - wall.offset_m)
+        for wall in capture.room.walls
+        if float(wall.normal @ outward) > np.cos(np.deg2rad(8.0))
+    ]
+    return min((d for d in behind if 0.1 < d < 1.2), default=None)
+
+
+def _side_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:
+    """Whether the scan shows a side face from front to back, so that the depth was observed."""
+    points = capture.surface.vertices_world @ rotation
+    margin = 0.2 * (high - low)
+    inner = (points[:, 2] > low[2] + margin[2]) & (points[:, 2] < high[2] - margin[2])
+    inner &= (points[:, 1] > low[1] - 0.02) & (points[:, 1] < high[1] + 0.02)
+    for side in (low[0], high[0]):
+        y = points[inner & (np.abs(points[:, 0] - side) < 0.02), 1]
+        if len(y) > 30:
+            filled = np.histogram(y, bins=12, range=(low[1], high[1]))[0]
+            if (filled > 0).mean() > 0.85:
+                return True
+    return False
+
+
+def _corrected(measured: MeasuredObject, override: ObjectOverride) -> MeasuredObject:
+    """What a person gave, in place of what was measured; the front face stays where it is when only the size is given."""
+    if override.dimensions_m is not None:
+        grown = np.asarray(override.dimensions_m, dtype=np.float64)
+        into = measured.world_from_object.rotation[:, 1]
+        shift = into * (grown[1] - measured.dimensions_m[1]) / 2
+        if measured.spec.stands:  # it grows from what it stands on
+            shift = shift + np.array([0.0, 0.0, (grown[2] - measured.dimensions_m[2]) / 2])
+        pose = Rigid3(measured.world_from_object.rotation, measured.world_from_object.translation + shift)
+        measured = replace(
+            measured,
+            dimensions_m=grown,
+            world_from_object=pose,
+            sources=("person", "person", "person"),
+            fixed_by_person=True,
+        )
+    if override.pose is not None:
+        measured = replace(measured, world_from_object=Rigid3.from_matrix(override.pose), fixed_by_person=True)
+    return measured

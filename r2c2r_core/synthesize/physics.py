@@ -1,0 +1,55 @@
+"""Masses and inertias from panels and densities (sim-ready.md: about the centre of mass, never the identity)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.scene import Box, ConvexPiece, Inertial
+
+_LIGHTEST_KG = 0.01  # lighter bodies make contact solvers stiff
+
+
+def inertial_of_boxes(boxes: Sequence[Box], density_kg_m3: float) -> Inertial:
+    """Mass, centre and inertia of solid boxes, in the link's frame."""
+    masses = np.array([max(float(np.prod(box.size_m)) * density_kg_m3, 1e-6) for box in boxes])
+    centres = np.array([box.link_from_box.translation for box in boxes])
+    own = [_box_inertia(m, box.size_m, box.link_from_box.rotation) for m, box in zip(masses, boxes, strict=True)]
+    return _combined(masses, centres, np.array(own))
+
+
+def inertial_of_pieces(pieces: Sequence[ConvexPiece], density_kg_m3: float) -> Inertial:
+    """Mass, centre and inertia of convex solids, in the link's frame."""
+    from trimesh.convex import convex_hull
+
+    masses, centres, own = [], [], []
+    for piece in pieces:
+        hull = convex_hull(piece.vertices_link)
+        hull.density = density_kg_m3
+        masses.append(max(float(hull.mass), 1e-6))
+        centres.append(np.asarray(hull.center_mass))
+        own.append(np.asarray(hull.moment_inertia))
+    return _combined(np.array(masses), np.array(centres), np.array(own))
+
+
+def _box_inertia(mass_kg: float, size_m: Vector3, rotation: np.ndarray) -> np.ndarray:
+    squares = np.asarray(size_m) ** 2
+    return np.asarray(rotation @ np.diag(mass_kg / 12 * (squares.sum() - squares)) @ rotation.T)
+
+
+def _combined(masses: np.ndarray, centres: Points, own: np.ndarray) -> Inertial:
+    """Bodies joined into one: parallel axes onto the common centre of mass; scaled up if lighter than 10 g."""
+    total = float(masses.sum())
+    centre = masses @ centres / total
+    arms = centres - centre
+    squares = (arms**2).sum(axis=1)
+    steiner = np.einsum("n,nij->ij", masses, squares[:, None, None] * np.eye(3) - arms[:, :, None] * arms[:, None, :])
+    scale = max(_LIGHTEST_KG / total, 1.0)
+    inertia = (own.sum(axis=0) + steiner) * scale
+    return Inertial(mass_kg=total * scale, com_link=centre, inertia=(inertia + inertia.T) / 2)
+
+
+def moved_boxes(boxes: Sequence[Box], target_from_source: Rigid3) -> tuple[Box, ...]:
+    """The boxes expressed in another frame."""
+    return tuple(Box(name=b.name, size_m=b.size_m, link_from_box=target_from_source @ b.link_from_box) for b in boxes)

@@ -1,0 +1,133 @@
+"""Runs: fronts side by side in one plane. Their shared line is longer, so better measured, than any single front."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation, rotation_about_z
+from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.edits import moved
+
+_SAME_DIRECTION_RAD = np.deg2rad(7.0)
+_COPLANAR_M = 0.015
+_MANHATTAN_RAD = np.deg2rad(1.0)  # the room's right angle is measured on all walls: nearer than this it is the better word
+_LONG_RUN_M = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A direction that fronts face."""
+
+    members: list[int]
+    yaw_rad: float  # of the outward normal
+
+
+def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> tuple[MeasuredObject, ...]:
+    """Fronts that face one way turned parallel; those within 1.5 cm of one plane moved onto it."""
+    items = list(objects)
+    fronts = [i for i, o in enumerate(items) if o.spec.opening not in ("rigid",) and not o.fixed_by_person]
+    for line in _directions(items, fronts):
+        yaw = _run_yaw(items, line, manhattan_yaw_rad)
+        for i in line.members:
+            items[i] = _facing(items[i], yaw)
+        outward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+        for plane in _planes(items, [i for i in line.members if built_in(items[i])], outward):
+            offset = weighted_median(
+                np.array([items[i].front_centre @ outward for i in plane]), np.array([weight(items[i]) for i in plane])
+            )
+            for i in plane:
+                items[i] = moved(items[i], outward * (offset - items[i].front_centre @ outward))
+    return tuple(items)
+
+
+def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[_Line]:
+    """Fronts grouped by the way they face; the widest and surest front leads each group."""
+    left = sorted(fronts, key=lambda i: -weight(items[i]))
+    lines: list[_Line] = []
+    for i in left:
+        yaw = _yaw(items[i])
+        near = next((line for line in lines if abs(_wrapped(yaw - line.yaw_rad)) < _SAME_DIRECTION_RAD), None)
+        if near is None:
+            lines.append(_Line([i], yaw))
+        else:
+            near.members.append(i)
+    return lines
+
+
+def _run_yaw(items: Sequence[MeasuredObject], line: _Line, manhattan_yaw_rad: float) -> float:
+    """The direction a group faces: a line through its coplanar fronts where the run is long, else their weighted mean."""
+    weights = np.array([weight(items[i]) * items[i].dimensions_m[0] ** 2 for i in line.members])
+    turns = np.array([_wrapped(_yaw(items[i]) - line.yaw_rad) for i in line.members])
+    yaw = line.yaw_rad + float(weights @ turns / weights.sum())
+    outward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    planes = _planes(items, [i for i in line.members if built_in(items[i])], outward)
+    longest = max(planes, key=lambda plane: _length(items, plane, outward), default=[])
+    if len(longest) >= 3 and _length(items, longest, outward) > _LONG_RUN_M:
+        fitted = _line_yaw(np.array([items[i].front_centre[:2] for i in longest]), outward)
+        if abs(_wrapped(fitted - yaw)) < np.deg2rad(2.0):
+            yaw = fitted
+    off = (yaw - manhattan_yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    return yaw - off if abs(off) < _MANHATTAN_RAD else yaw
+
+
+def _planes(items: Sequence[MeasuredObject], members: Sequence[int], outward: Vector3) -> list[list[int]]:
+    """Members whose front planes lie within 1.5 cm of their group's heaviest one."""
+    left = sorted(members, key=lambda i: -weight(items[i]))
+    planes: list[list[int]] = []
+    for i in left:
+        offset = items[i].front_centre @ outward
+        home = next((p for p in planes if abs(items[p[0]].front_centre @ outward - offset) < _COPLANAR_M), None)
+        if home is None:
+            planes.append([i])
+        else:
+            home.append(i)
+    return planes
+
+
+def _line_yaw(centres: np.ndarray, outward: Vector3) -> float:
+    """Yaw of the normal of the least-squares line through points in plan, on the outward side."""
+    _, _, axes = np.linalg.svd(centres - centres.mean(axis=0))
+    normal = axes[1] if axes[1] @ outward[:2] > 0 else -axes[1]
+    return float(np.arctan2(normal[1], normal[0]))
+
+
+def _length(items: Sequence[MeasuredObject], plane: Sequence[int], outward: Vector3) -> float:
+    along = np.array([-outward[1], outward[0], 0.0])
+    positions = [float(items[i].front_centre @ along) for i in plane]
+    return max(positions) - min(positions)
+
+
+def built_in(item: MeasuredObject) -> bool:
+    """Whether the object's front belongs to a run: worktops overhang it, free-standing appliances stand as they like."""
+    return not item.spec.stands and item.spec.opening != "fixed"
+
+
+def _facing(item: MeasuredObject, yaw_rad: float) -> MeasuredObject:
+    """The object turned about its front's centre so that it faces `yaw_rad`."""
+    pivot = item.front_centre
+    rotation = rotation_about_z(_wrapped(yaw_rad - _yaw(item)))
+    centre = pivot + rotation @ (item.world_from_object.translation - pivot)
+    exact = front_rotation(np.array([np.cos(yaw_rad), np.sin(yaw_rad), 0.0]))
+    return replace(item, world_from_object=Rigid3(exact, centre))
+
+
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    order = np.argsort(values)
+    cumulative = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(cumulative, cumulative[-1] / 2)])
+
+
+def weight(item: MeasuredObject) -> float:
+    """How much a front's word counts: its area, its confidence, and whether the frames or only the mesh measured it."""
+    area = float(item.dimensions_m[0] * item.dimensions_m[2])
+    return area * max(item.confidence, 0.05) * (1.0 if item.front_measured else 0.2)
+
+
+def _yaw(item: MeasuredObject) -> float:
+    return float(np.arctan2(item.outward[1], item.outward[0]))
+
+
+def _wrapped(angle_rad: float) -> float:
+    return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)

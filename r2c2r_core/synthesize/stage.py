@@ -1,0 +1,182 @@
+"""Placements to an articulated scene of primitives (paper sections 4.4-4.5)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
+from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
+from r2c2r_core.synthesize.fixtures.table import fixture_for, normalised
+from r2c2r_core.synthesize.fixtures.thing import DEFAULT_DENSITY_KG_M3, DENSITY_KG_M3
+from r2c2r_core.synthesize.joints import Hinge, choose_hinges
+from r2c2r_core.synthesize.layout import arrange
+from r2c2r_core.synthesize.opening import open_all
+from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes
+from r2c2r_core.synthesize.things import Solid, convex_pieces
+
+_WOOD = (0.80, 0.76, 0.70)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesizeConfig:
+    """Settings of this stage."""
+
+    version: int = 2  # of the stage's code, so that a changed method re-runs
+    seed: int = 0
+
+
+def build_scene(
+    capture: Capture,
+    tracks: Sequence[MaskTrack],
+    placements: Sequence[Placement],
+    assets: Sequence[MeshAsset],
+    overrides: Overrides,
+    config: SynthesizeConfig,
+    *,
+    progress: Progress = SILENT,
+) -> ArticulatedScene:
+    """Measure every object, arrange them, and build each as a fixture that opens."""
+    measured = []
+    for track, placement, asset in progress.part(0.0, 0.5).each(
+        list(zip(tracks, placements, assets, strict=True)), "measuring"
+    ):
+        spec, notice = fixture_for(track.category)
+        item = measure_object(capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed)
+        measured.append(replace(item, warnings=(*([notice] if notice else []), *item.warnings)))
+    progress.at(0.5, "arranging")
+    layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
+    hinges = choose_hinges(layout.objects, overrides)
+    built = []
+    shapes = list(zip(layout.objects, placements, assets, strict=True))
+    for item, placement, asset in progress.part(0.5, 0.9).each(shapes, "building"):
+        if item.spec.build is None:
+            built.append(_thing(item, placement, asset, config.seed))
+        else:
+            built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name)))
+    progress.at(0.9, "opening every joint")
+
+    def rebuild(index: int, hinge: Hinge) -> SceneObject:
+        item = layout.objects[index]
+        return _fixture(item, hinge, overrides.of(item.name))
+
+    kept = frozenset(j.name for o in built for j in o.joints if overrides.of(o.name).joint_upper is not None)
+    return ArticulatedScene(
+        name=capture.name,
+        objects=tuple(open_all(built, hinges, rebuild, capture.room.walls, kept)),
+        layout_moves_m=layout.moves_m,
+        warnings=layout.warnings,
+    )
+
+
+def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride) -> SceneObject:
+    """A fixture of the table as links and joints."""
+    assert item.spec.build is not None  # things are built from their mesh
+    order = Order(dimensions_m=item.dimensions_m, hinge=hinge.side if hinge else None, handle=item.handle)
+    build = item.spec.build(order)
+    base, *movers = build.parts
+    motions = {motion.part: motion for motion in build.motions}
+    links = [_link(item.name, base, np.zeros(3))]
+    links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
+    joints = [_joint(item, motion, hinge, override) for motion in build.motions]
+    warnings = list(item.warnings)
+    if hinge is not None and hinge.source == "default":
+        warnings.append(f"hinge on the {hinge.side} by default: {hinge.reason}")
+    return SceneObject(
+        name=item.name,
+        category=item.category,
+        fixture=item.spec.name,
+        dimensions_m=item.dimensions_m,
+        dimension_sources=item.sources,
+        world_from_object=item.world_from_object,
+        links=tuple(links),
+        joints=tuple(joints),
+        movable=False,
+        front_texture=None,
+        warp_residual_m=None,
+        warnings=tuple(warnings),
+        final_from_placed=item.world_from_object @ item.placed_pose.inverse,
+    )
+
+
+def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: int) -> SceneObject:
+    """A free body with convex colliders: the placed mesh, in the frame of its measured box, at its final size."""
+    vertices = item.placed_pose.inverse.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    fitted = (vertices - (low + high) / 2) * (item.dimensions_m / np.maximum(high - low, 1e-6))
+    pieces = convex_pieces(Solid(vertices=fitted, faces=asset.mesh.faces), item.dimensions_m, seed=seed)
+    density = DENSITY_KG_M3.get(normalised(item.category), DEFAULT_DENSITY_KG_M3)
+    link = Link(
+        name=f"{item.name}_base",
+        object_from_link=Rigid3(),
+        boxes=(),
+        pieces=pieces,
+        visual=None,
+        colour=_WOOD,
+        inertial=inertial_of_pieces(pieces, density),
+    )
+    return SceneObject(
+        name=item.name,
+        category=item.category,
+        fixture=item.spec.name,
+        dimensions_m=item.dimensions_m,
+        dimension_sources=item.sources,
+        world_from_object=item.world_from_object,
+        links=(link,),
+        joints=(),
+        movable=True,
+        front_texture=None,
+        warp_residual_m=None,
+        warnings=item.warnings,
+        final_from_placed=item.world_from_object @ item.placed_pose.inverse,
+    )
+
+
+def _link(object_name: str, part: Part, origin: Vector3) -> Link:
+    """A link whose frame has the object's axes and its origin at `origin`."""
+    object_from_link = Rigid3(np.eye(3), origin)
+    boxes = moved_boxes(part.boxes, object_from_link.inverse)
+    return Link(
+        name=f"{object_name}_{part.name}",
+        object_from_link=object_from_link,
+        boxes=boxes,
+        pieces=(),
+        visual=None,
+        colour=_WOOD,
+        inertial=inertial_of_boxes(boxes, part.density_kg_m3),
+    )
+
+
+def _link_origin(motion: Motion) -> Vector3:
+    return motion.origin_object if motion.type == "revolute" else np.zeros(3)
+
+
+def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> Joint:
+    """The joint of one moving part; what a person gave replaces the category's limits."""
+    person = override.joint_lower is not None or override.joint_upper is not None
+    axis: Source = hinge.source if hinge is not None else "inferred"
+    feel = item.spec.feel
+    return Joint(
+        name=f"{item.name}_{motion.part}_joint",
+        type=motion.type,
+        parent=f"{item.name}_base",
+        child=f"{item.name}_{motion.part}",
+        origin_object=motion.origin_object,
+        axis_object=motion.axis_object,
+        lower=override.joint_lower if override.joint_lower is not None else 0.0,
+        upper=override.joint_upper if override.joint_upper is not None else motion.upper,
+        effort=feel.effort,
+        velocity=feel.velocity,
+        damping=feel.damping,
+        friction=feel.friction,
+        sources={"axis": axis, "origin": "inferred", "limits": "person" if person else "default"},
+    )

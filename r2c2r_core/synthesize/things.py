@@ -1,0 +1,92 @@
+"""Free-standing rigid things: convex colliders from the placed mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.model.scene import ConvexPiece
+
+_OPENNESS = 1.35  # hull volume over solid volume: above it the thing has a cavity or legs that a gripper needs
+_FLAT_M = 0.006  # what lies this near the underside belongs to it: reconstructed feet are uneven
+_MOST_PIECES = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solid:
+    """A closed shape in the object frame."""
+
+    vertices: Points
+    faces: Faces
+
+
+def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
+    """The hull, or a convex decomposition where the hull would fill a cavity; all with one flat underside."""
+    from trimesh import Trimesh
+
+    shape = Trimesh(solid.vertices, solid.faces, process=True)
+    hull = shape.convex_hull
+    if shape.is_volume and float(hull.volume) > _OPENNESS * float(shape.volume):
+        parts = _decomposed(shape, seed)
+    else:
+        parts = [np.asarray(hull.vertices)]
+    pieces = []
+    for number, points in enumerate(parts):
+        simple = _simplified(_flat_below(points, -dimensions_m[2] / 2))
+        if simple is not None:
+            pieces.append(ConvexPiece(name=f"piece_{number}", vertices_link=simple))
+    return tuple(pieces)
+
+
+def _decomposed(shape: object, seed: int) -> list[Points]:
+    """CoACD parts; decimated first, or it takes minutes (stack.md section 1)."""
+    import coacd
+    import fast_simplification
+
+    vertices, faces = np.asarray(shape.vertices), np.asarray(shape.faces)  # type: ignore[attr-defined]  # trimesh is untyped
+    if len(faces) > 1200:
+        vertices, faces = fast_simplification.simplify(vertices.astype(np.float32), faces.astype(np.int32), target_count=1200)
+    coacd.set_log_level("error")
+    parts = coacd.run_coacd(
+        coacd.Mesh(vertices.astype(np.float64), faces.astype(np.int32)),
+        threshold=0.15,
+        max_convex_hull=12,
+        preprocess_resolution=20,
+        mcts_iterations=20,  # with the defaults a chair takes 26 s of CPU instead of 4, for the same volume
+        mcts_nodes=8,
+        mcts_max_depth=2,
+        seed=seed,
+    )
+    return [np.asarray(points, dtype=np.float64) for points, _ in parts][:_MOST_PIECES]
+
+
+def _flat_below(points: Points, underside_m: float) -> Points:
+    """The points with those near the underside put onto it."""
+    flat = points.copy()
+    flat[:, 2] = np.where(points[:, 2] < underside_m + _FLAT_M, underside_m, points[:, 2])
+    return flat
+
+
+def _simplified(points: Points) -> Points | None:
+    """The hull's extreme points in directions all round; None for a sliver without volume (simulators refuse flat hulls).
+
+    Points are chosen, never moved: the piece stays inside its shape and touches it along its axes.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners = points[ConvexHull(points).vertices]
+        kept = np.unique(np.argmax(corners @ _directions().T, axis=0))
+        hull = ConvexHull(corners[kept])
+    except QhullError:
+        return None
+    if hull.volume < 1e-8 or np.ptp(corners[kept], axis=0).min() < 1e-3:
+        return None
+    return np.asarray(corners[kept][hull.vertices])
+
+
+def _directions() -> Points:
+    """Unit directions: rings of 20 at several heights, for upright rims, and the axes."""
+    azimuth, height = (v.ravel() for v in np.meshgrid(np.arange(20) * np.pi / 10, np.deg2rad([-60, -25, -5, 5, 25, 60])))
+    ring = np.column_stack([np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)])
+    return np.concatenate([ring, np.eye(3), -np.eye(3)])

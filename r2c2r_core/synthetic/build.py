@@ -1,0 +1,273 @@
+"""Kitchen → surfaces: fronts, carcasses, handles, appliances, bottles and the room."""
+
+import numpy as np
+
+from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Furniture, Handle, Kitchen, Leaf, Paint
+from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, tube, turned
+from r2c2r_core.synthetic.props import prop_patches, sink_bounds, window_frame
+
+_SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
+
+
+def build_kitchen(kitchen: Kitchen) -> list[Patch]:
+    """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background)."""
+    ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
+    patches = [*_room(kitchen), *_base_body(kitchen), *_upper_body(kitchen)]
+    for furniture in kitchen.base:
+        patches += _furniture(kitchen, furniture, kitchen.style.base_front, ids[furniture.name])
+    for furniture in kitchen.upper:
+        patches += _furniture(kitchen, furniture, kitchen.style.wall_front, ids[furniture.name])
+    patches += _fridge(kitchen, ids[kitchen.fridge.name])
+    patches += _microwave(kitchen, ids[kitchen.microwave.name])
+    for prop in kitchen.props:
+        patches += prop_patches(kitchen, prop)
+    for bottle in kitchen.bottles:
+        patches += _bottle(kitchen, bottle, ids.get(bottle.name, 0))
+    return patches
+
+
+def _room(kitchen: Kitchen) -> list[Patch]:
+    x0, x1, y0, y1, ceiling = kitchen.room
+    style = kitchen.style
+    white = Paint(kind="plaster", colour=(0.82, 0.82, 0.80), texel_m=0.02)
+    dx, dy, dz = np.array([x1 - x0, 0.0, 0.0]), np.array([0.0, y1 - y0, 0.0]), np.array([0.0, 0.0, ceiling])
+    patches = [
+        quad(np.array([x0, y1, 0.0]), dx, -dy, style.floor, lumel_m=0.05),
+        quad(np.array([x0, y0, ceiling]), dx, dy, white, lumel_m=0.08),
+        quad(np.array([x0, y1, ceiling]), dx, -dz, style.wall, lumel_m=0.05),
+        quad(np.array([x1, y0, ceiling]), -dx, -dz, style.wall, lumel_m=0.1),
+        quad(np.array([x0, y0, ceiling]), dy, -dz, style.wall, lumel_m=0.06),
+        quad(np.array([x1, y1, ceiling]), -dy, -dz, style.wall, lumel_m=0.06),
+    ]
+    patches += _lights(kitchen)
+    splash_top = min((c.z for c in kitchen.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
+    left, right = kitchen.run
+    patches += box(
+        (left, -0.009, kitchen.worktop_top_m), (right, -0.0005, splash_top), style.splash, faces="front left right top"
+    )
+    skirting = Paint(kind="laminate", colour=(0.78, 0.78, 0.76), texel_m=0.004)
+    patches += box((x0, -0.015, 0.0), (x1, 0.0, 0.08), skirting, faces="front top")
+    patches += box((x0, y0, 0.0), (x0 + 0.015, y1, 0.08), skirting, faces="right top")
+    patches += box((x1 - 0.015, y0, 0.0), (x1, y1, 0.08), skirting, faces="left top")
+    return patches
+
+
+def _lights(kitchen: Kitchen) -> list[Patch]:
+    """A ceiling panel and a window in the side wall beside the run, both emitting."""
+    x0, x1, y0, _, ceiling = kitchen.room
+    day = kitchen.style.daylight
+    lamp = Paint(kind="emitter", colour=(1.0, 0.93, 0.82), accent=((1 - day) * 9.0,) * 3, texel_m=0.02)
+    sky = Paint(kind="emitter", colour=(0.85, 0.93, 1.0), accent=(day * 7.0,) * 3, texel_m=0.02)
+    centre_x, centre_y = (x0 + x1) / 2, -1.7
+    lamp_quad = quad(
+        np.array([centre_x - 0.45, centre_y - 0.25, ceiling - 0.02]),
+        np.array([0.9, 0.0, 0.0]),
+        np.array([0.0, 0.5, 0.0]),
+        lamp,
+        lumel_m=0.2,
+    )
+    height = np.array([0.0, 0.0, -1.1])
+    middle = max(y0 + 0.9, -2.4)
+    if kitchen.window_on_left:
+        window = quad(np.array([x0 + 0.01, middle - 0.6, 2.15]), np.array([0.0, 1.2, 0.0]), height, sky, lumel_m=0.2)
+    else:
+        window = quad(np.array([x1 - 0.01, middle + 0.6, 2.15]), np.array([0.0, -1.2, 0.0]), height, sky, lumel_m=0.2)
+    return [lamp_quad, window, *window_frame(window)]
+
+
+def _base_body(kitchen: Kitchen) -> list[Patch]:
+    style, left, right = kitchen.style, *kitchen.run
+    patches: list[Patch] = []
+    for carcass in kitchen.base_carcasses:
+        low = (carcass.x, -carcass.depth_m, carcass.z)
+        high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
+        patches += box(low, high, style.carcass, faces="front left right")
+    front = -kitchen.base_depth_m
+    overhang = 0.018
+    top, bottom = kitchen.worktop_top_m, kitchen.worktop_top_m - kitchen.worktop_thickness_m
+    patches += box((left, front - overhang, bottom), (right, 0.0, top), style.worktop, faces="front left right bottom")
+    patches += _worktop_surface(kitchen, front - overhang)
+    patches += box(
+        (left + 0.005, front + 0.06, 0.0),
+        (right - 0.005, front + 0.076, kitchen.plinth_m),
+        style.plinth,
+        faces="front left right top",
+    )
+    return patches
+
+
+def _worktop_surface(kitchen: Kitchen, front: float) -> list[Patch]:
+    """The top, with a hole where the sink is."""
+    left, right = kitchen.run
+    top = kitchen.worktop_top_m
+    sink = next((p for p in kitchen.props if p.kind == "sink"), None)
+    pieces = [(left, right, front, 0.0)]
+    if sink is not None:
+        x0, x1, y0, y1 = sink_bounds(sink)
+        pieces = [(left, x0, front, 0.0), (x1, right, front, 0.0), (x0, x1, front, y0), (x0, x1, y1, 0.0)]
+    return [
+        quad(np.array([x0, y1, top]), np.array([x1 - x0, 0.0, 0.0]), np.array([0.0, y0 - y1, 0.0]), kitchen.style.worktop)
+        for x0, x1, y0, y1 in pieces
+    ]
+
+
+def _upper_body(kitchen: Kitchen) -> list[Patch]:
+    patches: list[Patch] = []
+    for carcass in kitchen.upper_carcasses:
+        low = (carcass.x, -carcass.depth_m, carcass.z)
+        high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
+        patches += box(low, high, kitchen.style.carcass, faces="front left right top bottom")
+    return patches
+
+
+def _furniture(kitchen: Kitchen, furniture: Furniture, paint: Paint, object_id: int) -> list[Patch]:
+    style = kitchen.style
+    face = -furniture.depth_m
+    patches: list[Patch] = []
+    for leaf in furniture.leaves:
+        patches += _front_panel(leaf, face, style.front_thickness_m, paint, style.shaker, object_id)
+        patches += handle_patches(leaf.handle, np.array([leaf.x, face, leaf.z]), style.handle, object_id)
+    first, last = furniture.leaves[0], furniture.leaves[-1]
+    back = face + style.front_thickness_m
+    edge = style.gap_m / 2 + 0.0005  # the carcass is as wide as the unit, the front a gap narrower
+    low, high = first.z, first.z + first.height_m
+    if furniture.shows_left_side:
+        x = first.x - edge
+        patches += box((x, back, low), (x + 0.0005, 0.0, high), style.carcass, faces="left", object_id=object_id)
+    if furniture.shows_right_side:
+        x = last.x + last.width_m + edge
+        patches += box((x - 0.0005, back, low), (x, 0.0, high), style.carcass, faces="right", object_id=object_id)
+    return patches
+
+
+def _front_panel(leaf: Leaf, face_y: float, thickness: float, paint: Paint, shaker: bool, object_id: int) -> list[Patch]:
+    """A slab, or a frame of four rails round a recessed panel. `face_y` is the outer face."""
+    x0, x1, z0, z1 = leaf.x, leaf.x + leaf.width_m, leaf.z, leaf.z + leaf.height_m
+    rail = min(0.065, 0.25 * leaf.height_m)
+    if not shaker or leaf.height_m < 0.2:
+        return box(
+            (x0, face_y, z0), (x1, face_y + thickness, z1), paint, faces="front left right top bottom", object_id=object_id
+        )
+    patches = []
+    for low, high in (
+        ((x0, z0), (x0 + rail, z1)),
+        ((x1 - rail, z0), (x1, z1)),
+        ((x0 + rail, z1 - rail), (x1 - rail, z1)),
+        ((x0 + rail, z0), (x1 - rail, z0 + rail)),
+    ):
+        patches += box(
+            (low[0], face_y, low[1]),
+            (high[0], face_y + thickness, high[1]),
+            paint,
+            faces="front left right top bottom",
+            object_id=object_id,
+        )
+    recess = face_y + 0.007
+    inner_low, inner_high = (x0 + rail, recess, z0 + rail), (x1 - rail, recess + 0.006, z1 - rail)
+    return patches + box(inner_low, inner_high, paint, faces="front", object_id=object_id)
+
+
+def handle_patches(handle: Handle, corner: np.ndarray, paint: Paint, object_id: int) -> list[Patch]:
+    """A handle as real geometry; `corner` is the front's lower left corner on its outer face (facing -Y)."""
+    along = np.array([0.0, 0.0, 1.0]) if handle.vertical else np.array([1.0, 0.0, 0.0])
+    out = np.array([0.0, -1.0, 0.0])
+    centre = corner + np.array([handle.x, 0.0, handle.z])
+    half, radius = handle.length_m / 2, handle.thickness_m / 2
+    share = {"object_id": object_id, "is_handle": True}
+    if handle.kind == "knob":
+        stem = np.array([centre + out * 0.0, centre + out * (handle.reach_m - 0.012)])
+        head = np.array([centre + out * (handle.reach_m - 0.012), centre + out * handle.reach_m])
+        return [tube(stem, 0.007, paint, **share), tube(head, radius, paint, **share)]  # type: ignore[arg-type]
+    axis = centre + out * (handle.reach_m - radius)
+    if handle.kind == "bow":
+        turn = np.linspace(0, np.pi, 15)[:, None]
+        curve = centre - along * half * np.cos(turn) + out * (handle.reach_m - radius) * np.sin(turn) ** 0.6
+        return [tube(curve, radius, paint, **share)]  # type: ignore[arg-type]
+    posts = [
+        tube(np.array([foot, foot + out * (handle.reach_m - radius)]), radius * 0.7, paint, **share)  # type: ignore[arg-type]
+        for foot in (centre - along * (half - 0.02), centre + along * (half - 0.02))
+    ]
+    if handle.kind == "bar":
+        rod = tube(np.linspace(axis - along * half, axis + along * half, 5), radius, paint, **share)  # type: ignore[arg-type]
+        return [*posts, rod]
+    spread = along * half + np.array([1.0, 0.0, 1.0]) * (1 - np.abs(along)) * radius
+    low, high = axis - spread - np.array([0, 0.004, 0]), axis + spread + np.array([0, 0.004, 0])
+    bar = box(_triple(low), _triple(high), paint, object_id=object_id, is_handle=True, lumel_m=0.01)
+    return [*posts, *bar]
+
+
+def _fridge(kitchen: Kitchen, object_id: int) -> list[Patch]:
+    fridge = kitchen.fridge
+    x0, x1, y0, y1, _, z1 = _bounds(fridge)
+    z0 = 0.018  # above its feet
+    seal = y0 + fridge.door_thickness_m
+    patches = box((x0, y0, z0), (x1, seal, z1), fridge.door, object_id=object_id)
+    patches += box(
+        (x0 + 0.008, seal, z0), (x1 - 0.008, seal + 0.012, z1 - 0.008), _SHADOW, faces="left right top", object_id=object_id
+    )
+    patches += box((x0, seal + 0.012, z0), (x1, y1, z1), fridge.body, object_id=object_id)
+    foot = Paint(kind="plain", colour=(0.03, 0.03, 0.03), texel_m=0.004)
+    patches += box((x0 + 0.02, y0 + 0.07, 0.0), (x1 - 0.02, y1, z0), foot, faces="front left right", object_id=object_id)
+    return patches + handle_patches(fridge.handle, np.array([x0, y0, 0.0]), _appliance_handle(fridge), object_id)
+
+
+def _microwave(kitchen: Kitchen, object_id: int) -> list[Patch]:
+    """Door on the hinge side, control panel beside it; turned by its yaw on the worktop."""
+    oven = kitchen.microwave
+    x0, x1, y0, y1, z0, z1 = _bounds(oven)
+    z0 += 0.012  # above its feet
+    split = y0 + oven.door_thickness_m
+    left_hinged = oven.hinge == "left"
+    door_x = (x0, x0 + oven.door_width_m - 0.001) if left_hinged else (x1 - oven.door_width_m + 0.001, x1)
+    panel_x = (x0 + oven.door_width_m + 0.001, x1) if left_hinged else (x0, x1 - oven.door_width_m - 0.001)
+    controls = Paint(kind="controls", colour=oven.body.colour, accent=_contrast(oven.body.colour), gloss=0.3, texel_m=0.001)
+    patches = box((door_x[0], y0, z0), (door_x[1], split, z1), {"front": oven.door, "": oven.body}, object_id=object_id)
+    patches += box((panel_x[0], y0, z0), (panel_x[1], split, z1), {"front": controls, "": oven.body}, object_id=object_id)
+    patches += box((x0, split + 0.002, z0), (x1, y1, z1), oven.body, object_id=object_id)
+    patches += box(
+        (x0 + 0.004, split, z0 + 0.004),
+        (x1 - 0.004, split + 0.002, z1 - 0.004),
+        _SHADOW,
+        faces="left right top",
+        object_id=object_id,
+    )
+    for foot_x in (x0 + 0.03, x1 - 0.05):
+        for foot_y in (y0 + 0.03, y1 - 0.05):
+            foot = (foot_x, foot_y, kitchen.worktop_top_m), (foot_x + 0.02, foot_y + 0.02, z0)
+            patches += box(*foot, _SHADOW, faces="front left right", object_id=object_id)
+    patches += handle_patches(oven.handle, np.array([door_x[0], y0, z0]), _appliance_handle(oven), object_id)
+    return turned(patches, oven.yaw_rad, (oven.centre[0], oven.centre[1]))
+
+
+def _bottle(kitchen: Kitchen, bottle: Bottle, object_id: int) -> list[Patch]:
+    """Body with a label, shoulder and neck, cap."""
+    r, h, n = bottle.radius_m, bottle.height_m, bottle.neck_radius_m
+    shoulder, neck, cap = bottle.shoulder * h, (bottle.shoulder + 0.18) * h, h - 0.022
+    centre = (bottle.x, bottle.y, kitchen.worktop_top_m)
+    ease = np.linspace(0, np.pi, 9)
+    bend = [(n + (r - n) * (1 - np.cos(t)) / 2, neck + (shoulder - neck) * t / np.pi) for t in ease]
+    label_top, label_bottom = shoulder - 0.01, 0.18 * h
+    return [
+        lathe(centre, [(0.0, h), (n + 0.0015, h), (n + 0.0015, cap)], bottle.cap, object_id=object_id),
+        lathe(centre, [(n, cap), *bend, (r, label_top)], bottle.glass, object_id=object_id),
+        lathe(centre, [(r, label_top), (r, label_bottom)], bottle.label, object_id=object_id),
+        lathe(centre, [(r, label_bottom), (r, 0.006), (r - 0.006, 0.0)], bottle.glass, object_id=object_id),
+    ]
+
+
+def _bounds(thing: Appliance) -> tuple[float, float, float, float, float, float]:
+    (x, y, z), (w, d, h) = thing.centre, thing.size_m
+    return x - w / 2, x + w / 2, y - d / 2, y + d / 2, z - h / 2, z + h / 2
+
+
+def _appliance_handle(thing: Appliance) -> Paint:
+    return Paint(kind="steel", colour=_contrast(thing.door.colour, 0.5, 0.25), gloss=0.8, texel_m=0.002)
+
+
+def _contrast(colour: tuple[float, float, float], light: float = 0.6, dark: float = 0.12) -> tuple[float, float, float]:
+    tone = light if sum(colour) / 3 < 0.35 else dark
+    return (tone, tone, tone)
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    return (float(values[0]), float(values[1]), float(values[2]))

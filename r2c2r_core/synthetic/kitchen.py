@@ -1,0 +1,168 @@
+"""A planned kitchen: sizes, places, hinge sides and looks, before anything is built.
+
+Kitchen frame: metres, +Z up, floor z = 0, back wall at y = 0, fronts face -Y, +X to the right of a person facing them.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Hinge = Literal["left", "right"]
+HandleKind = Literal["bar", "flat", "bow", "knob"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paint:
+    """A surface's look; `kind` names its painter in textures.py, colours are linear RGB 0..1."""
+
+    kind: str
+    colour: tuple[float, float, float]
+    accent: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    texel_m: float = 0.0016
+    gloss: float = 0.0  # 0 matt .. 1 mirror-like
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Handle:
+    """A handle on a front; lengths in metres."""
+
+    kind: HandleKind
+    length_m: float
+    thickness_m: float
+    reach_m: float  # how far it stands out of the front
+    vertical: bool
+    x: float  # its centre, from the front's left edge
+    z: float  # its centre, from the front's bottom edge
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaf:
+    """One moving front panel, in the kitchen frame."""
+
+    x: float  # left edge
+    z: float  # bottom edge
+    width_m: float
+    height_m: float
+    hinge: Hinge | None  # None: a drawer
+    handle: Handle
+    open_limit: float  # rad, or metres for a drawer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Furniture:
+    """A prompted built-in object: one front, or the two of a double door."""
+
+    name: str
+    category: str
+    leaves: tuple[Leaf, ...]
+    depth_m: float  # from the outer face of the front to the back
+    shows_left_side: bool = False
+    shows_right_side: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carcass:
+    """The box behind one or more fronts."""
+
+    x: float
+    z: float
+    width_m: float
+    height_m: float
+    depth_m: float  # without the front panel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Appliance:
+    """A free-standing box with one hinged door."""
+
+    name: str
+    category: str
+    centre: tuple[float, float, float]
+    size_m: tuple[float, float, float]  # width, depth, height, without the handle
+    yaw_rad: float
+    hinge: Hinge
+    handle: Handle
+    door_thickness_m: float
+    door_width_m: float  # narrower than the appliance where a control panel stands beside it
+    open_limit: float
+    body: Paint
+    door: Paint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bottle:
+    """A bottle standing on the worktop."""
+
+    name: str
+    x: float
+    y: float
+    radius_m: float
+    height_m: float
+    neck_radius_m: float
+    shoulder: float  # where the neck begins, 0..1 of the height
+    glass: Paint
+    label: Paint
+    cap: Paint
+    prompted: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prop:
+    """Something that nobody clicks: a sink, a hob, a kettle, a shelf …, standing at (x, y)."""
+
+    kind: str
+    x: float
+    y: float
+    width_m: float
+    paint: Paint
+    z: float = 0.0  # above the worktop
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Style:
+    """What all units of one kitchen share."""
+
+    base_front: Paint
+    wall_front: Paint
+    carcass: Paint
+    plinth: Paint
+    worktop: Paint
+    splash: Paint
+    wall: Paint
+    floor: Paint
+    handle: Paint
+    shaker: bool
+    gap_m: float
+    front_thickness_m: float
+    daylight: float  # share of the light that comes through the window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kitchen:
+    """Everything the builder needs."""
+
+    style: Style
+    base: tuple[Furniture, ...]
+    upper: tuple[Furniture, ...]
+    base_carcasses: tuple[Carcass, ...]
+    upper_carcasses: tuple[Carcass, ...]
+    run: tuple[float, float]  # x of the worktop's ends
+    plinth_m: float
+    worktop_top_m: float
+    worktop_thickness_m: float
+    base_depth_m: float  # outer face of the fronts to the wall
+    upper_depth_m: float
+    fridge: Appliance
+    microwave: Appliance
+    bottles: tuple[Bottle, ...]
+    props: tuple[Prop, ...]
+    room: tuple[float, float, float, float, float]  # x_min, x_max, y_min, y_max, ceiling
+    window_on_left: bool
+    yaw_rad: float  # of the kitchen in the capture frame
+
+    @property
+    def object_names(self) -> tuple[str, ...]:
+        """The prompted objects; instance ids are 1 + their position."""
+        furniture = [f.name for f in (*self.base, *self.upper)]
+        bottles = [b.name for b in self.bottles if b.prompted]
+        return (*furniture, self.fridge.name, self.microwave.name, *bottles)

@@ -1,0 +1,152 @@
+"""A kitchen that never was: a recording as a phone would make it, with everything about it known."""
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.synthetic.atlas import LitScene, light_scene
+from r2c2r_core.synthetic.build import build_kitchen
+from r2c2r_core.synthetic.layout import plan_kitchen
+from r2c2r_core.synthetic.path import SECONDS, Shot, walk
+from r2c2r_core.synthetic.record3d import Record3DWriter
+from r2c2r_core.synthetic.render import photograph, render_view
+from r2c2r_core.synthetic.sensor import scan_depth
+from r2c2r_core.synthetic.truth import Sightings, capture_from_kitchen, prompts_document, true_objects, truth_document
+
+_FOCAL_PER_LONG_SIDE = 0.757  # 726.6 px at 960 px: a real iPhone recording
+
+_QUICK_PNG = [
+    cv2.IMWRITE_PNG_COMPRESSION,
+    1,
+    cv2.IMWRITE_PNG_STRATEGY,
+    cv2.IMWRITE_PNG_STRATEGY_RLE,
+    cv2.IMWRITE_PNG_FILTER,
+    cv2.IMWRITE_PNG_FILTER_NONE,
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SamplePaths:
+    """What a sample consists of."""
+
+    scan: Path
+    truth: Path
+    prompts: Path
+    masks: Path
+
+
+def write_sample(
+    out: Path, *, seed: int = 0, frames: int = 180, size: tuple[int, int] = (960, 720), progress: Progress = SILENT
+) -> SamplePaths:
+    """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames."""
+    paths = SamplePaths(
+        scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(paths.masks, ignore_errors=True)
+    progress.at(0.0, "building the kitchen")
+    kitchen = plan_kitchen(seed)
+    scene = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
+    shots = walk(kitchen, frames, np.random.default_rng([seed, 3]))
+    objects = true_objects(kitchen)
+    to_capture = capture_from_kitchen(kitchen, shots[0].kitchen_from_camera.translation)
+    sightings = Sightings(objects)
+    folders = [paths.masks / thing.name for thing in objects]
+    for folder in folders:
+        folder.mkdir(parents=True)
+    poses = _drifting_poses(shots, to_capture, np.random.default_rng([seed, 4]))
+    cameras = _cameras(size, frames, np.random.default_rng([seed, 5]))
+    white = _white_balance(np.random.default_rng([seed, 6]))
+    with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
+        for number in progress.part(0.1, 1.0).each(range(frames), "frame"):
+            rng = np.random.default_rng([seed, 7, number])
+            _add_frame(writer, scene, shots[number], cameras[number], poses[number], white, rng, number, sightings, folders)
+    _write_json(paths.truth, truth_document(objects, to_capture, sightings))
+    _write_json(paths.prompts, prompts_document(objects, sightings, np.random.default_rng([seed, 8])))
+    return paths
+
+
+def _add_frame(
+    writer: Record3DWriter,
+    scene: LitScene,
+    shot: Shot,
+    camera: Intrinsics,
+    pose: Rigid3,
+    white: tuple[float, float, float],
+    rng: np.random.Generator,
+    number: int,
+    sightings: Sightings,
+    folders: list[Path],
+) -> None:
+    camera_from_kitchen = shot.kitchen_from_camera.inverse
+    view = render_view(scene, camera, camera_from_kitchen)
+    blur_px = shot.blur_px * camera.width / 960
+    rgb = photograph(view.colour, gain=shot.gain, blur_px=blur_px, white=white, rng=rng)
+    lidar = scan_depth(scene, _depth_camera(camera), camera_from_kitchen, rng)
+    writer.add(rgb, lidar.depth_m, lidar.confidence, camera, pose, shot.timestamp_s)
+    ids = np.where(view.patch >= 0, scene.object_of_patch[view.patch], 0)
+    is_handle = (view.patch >= 0) & scene.handle_patch[view.patch]
+    sightings.add(number, view, ids, is_handle, camera, shot.kitchen_from_camera, rng)
+    for index in np.unique(ids[ids > 0]):
+        mask = (ids == index).astype(np.uint8) * np.uint8(255)
+        cv2.imwrite(str(folders[index - 1] / f"{number:06d}.png"), mask, _QUICK_PNG)
+
+
+def _cameras(size: tuple[int, int], frames: int, rng: np.random.Generator) -> list[Intrinsics]:
+    """A phone's pinhole: the principal point near the centre, both wandering a little as the lens refocuses."""
+    width, height = size
+    focal = _FOCAL_PER_LONG_SIDE * max(size) * float(rng.uniform(0.98, 1.03))
+    offset = rng.uniform(-0.006, 0.006, 2)
+    wander = np.cumsum(rng.standard_normal((frames, 3)), axis=0) * 1e-4
+    return [
+        Intrinsics(
+            fx=focal * (1 + float(f)),
+            fy=focal * (1 + float(f)),
+            cx=width * (0.5 + float(offset[0] + x)),
+            cy=height * (0.5 + float(offset[1] + y)),
+            width=width,
+            height=height,
+        )
+        for f, x, y in wander
+    ]
+
+
+def _depth_camera(camera: Intrinsics) -> Intrinsics:
+    """The LiDAR frame: 256x192, upright when the colour frame is."""
+    return camera.resized(192, 256) if camera.height > camera.width else camera.resized(256, 192)
+
+
+def _drifting_poses(shots: list[Shot], to_capture: Rigid3, rng: np.random.Generator) -> list[Rigid3]:
+    """capture_from_camera as the phone believes it: off by a few millimetres that wander slowly."""
+    from scipy.ndimage import gaussian_filter1d
+    from scipy.spatial.transform import Rotation
+
+    count = len(shots)
+    slow = gaussian_filter1d(rng.standard_normal((count, 6)), max(count / 25, 1), axis=0, mode="nearest")
+    slow /= max(float(slow.std()), 1e-9)
+    quick = rng.standard_normal((count, 6))
+    shift = 0.0025 * slow[:, :3] + 0.0005 * quick[:, :3]
+    turn = np.radians(0.08 * slow[:, 3:] + 0.015 * quick[:, 3:])
+    return [
+        to_capture
+        @ Rigid3(
+            shot.kitchen_from_camera.rotation @ Rotation.from_rotvec(t).as_matrix(), shot.kitchen_from_camera.translation + s
+        )
+        for shot, s, t in zip(shots, shift, turn, strict=True)
+    ]
+
+
+def _white_balance(rng: np.random.Generator) -> tuple[float, float, float]:
+    red, blue = rng.uniform(0.97, 1.03, 2)
+    return (float(red), 1.0, float(blue))
+
+
+def _write_json(path: Path, document: dict[str, object]) -> None:
+    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

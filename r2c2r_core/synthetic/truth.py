@@ -1,0 +1,233 @@
+"""What is true of a sample: boxes, joints, clicks, and which axes the camera could see. Written in the capture frame."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.geometry.camera import Intrinsics, unproject
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Leaf
+from r2c2r_core.synthetic.render import View
+
+_BINS = 16  # slices of an axis
+_MIN_SHARE = 0.002  # a slice counts as seen when this share of all pixels showed it
+_SAMPLE_STEP = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrueJoint:
+    """One joint in the kitchen frame; 0 is closed, positive opens by the right-hand rule."""
+
+    name: str
+    type: str
+    axis: np.ndarray
+    origin: np.ndarray
+    lower: float
+    upper: float
+    hinge: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrueObject:
+    """One prompted object; its box leaves the handle out."""
+
+    name: str
+    category: str
+    dimensions_m: np.ndarray  # width, depth, height
+    kitchen_from_object: Rigid3
+    joints: tuple[TrueJoint, ...]
+    is_round: bool = False  # about its vertical axis: its yaw means nothing
+
+
+def true_objects(kitchen: Kitchen) -> tuple[TrueObject, ...]:
+    """All prompted objects, in the order of `kitchen.object_names`."""
+    furniture = [_furniture(f) for f in (*kitchen.base, *kitchen.upper)]
+    bottles = [
+        TrueObject(
+            name=b.name,
+            category="bottle",
+            dimensions_m=np.array([2 * b.radius_m, 2 * b.radius_m, b.height_m]),
+            kitchen_from_object=Rigid3(np.eye(3), np.array([b.x, b.y, kitchen.worktop_top_m + b.height_m / 2])),
+            joints=(),
+            is_round=True,
+        )
+        for b in kitchen.bottles
+        if b.prompted
+    ]
+    return (*furniture, _appliance(kitchen.fridge), _appliance(kitchen.microwave), *bottles)
+
+
+def capture_from_kitchen(kitchen: Kitchen, first_eye: np.ndarray) -> Rigid3:
+    """ARKit's world: +Y up, its origin where the recording began, its heading arbitrary."""
+    y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    rotation = y_up @ rotation_about_z(kitchen.yaw_rad)
+    return Rigid3(rotation, -rotation @ first_eye)
+
+
+class Sightings:
+    """What the frames showed of every object: seen extents and possible clicks, gathered frame by frame."""
+
+    def __init__(self, objects: tuple[TrueObject, ...]) -> None:
+        self._objects = objects
+        self._bins = np.zeros((len(objects), 3, _BINS), np.int64)
+        self._clicks: list[list[tuple[float, int, float, float]]] = [[] for _ in objects]
+
+    def add(
+        self,
+        frame: int,
+        view: View,
+        ids: np.ndarray,
+        is_handle: np.ndarray,
+        camera: Intrinsics,
+        kitchen_from_camera: Rigid3,
+        rng: np.random.Generator,
+    ) -> None:
+        """Take one frame into account; `ids` (h, w) are instance ids, `is_handle` (h, w) marks handle pixels."""
+        v, u = np.mgrid[_SAMPLE_STEP // 2 : camera.height : _SAMPLE_STEP, _SAMPLE_STEP // 2 : camera.width : _SAMPLE_STEP]
+        seen, body = ids[v, u], ~is_handle[v, u]
+        for index, thing in enumerate(self._objects):
+            chosen = (seen == index + 1) & body
+            if np.count_nonzero(chosen) < 12:
+                continue
+            uv = np.column_stack([u[chosen], v[chosen]]) + 0.5
+            points = kitchen_from_camera.apply(unproject(uv, view.depth_m[v[chosen], u[chosen]].astype(float), camera))
+            share = thing.kitchen_from_object.inverse.apply(points) / thing.dimensions_m + 0.5
+            for axis in range(3):
+                within = share[(share[:, axis] > -0.02) & (share[:, axis] < 1.02), axis]
+                place = np.clip((within * _BINS).astype(int), 0, _BINS - 1)
+                self._bins[index, axis] += np.bincount(place, minlength=_BINS)
+            self._propose_click(index, frame, ids == index + 1, is_handle, rng)
+
+    def observed_axes(self, index: int) -> list[bool]:
+        """Whether the object's width, depth and height were seen from end to end: in all of 16 slices but at most one."""
+        bins = self._bins[index]
+        enough = np.maximum(_MIN_SHARE * bins.sum(axis=1, keepdims=True), 1)
+        return [bool(seen[0] and seen[-1] and seen.sum() >= _BINS - 1) for seen in bins >= enough]
+
+    def click(self, index: int, rng: np.random.Generator) -> tuple[int, float, float] | None:
+        """A frame and pixel where a person might click the object: one of the ten clearest views."""
+        ranked = sorted(self._clicks[index], reverse=True)[:10]
+        if not ranked:
+            return None
+        _, frame, x, y = ranked[int(rng.integers(len(ranked)))]
+        return frame, x, y
+
+    def _propose_click(self, index: int, frame: int, mask: np.ndarray, is_handle: np.ndarray, rng: np.random.Generator) -> None:
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
+        border = top == 0 or left == 0 or bottom == mask.shape[0] or right == mask.shape[1]
+        handle = cv2.dilate(is_handle[top:bottom, left:right].astype(np.uint8), np.ones((5, 5), np.uint8))
+        inner = (mask[top:bottom, left:right] & (handle == 0)).astype(np.uint8)
+        distance = cv2.distanceTransform(np.pad(inner, 1), cv2.DIST_L2, 3)[1:-1, 1:-1]
+        rows, columns = np.nonzero(distance > 0.45 * distance.max())
+        if len(rows) == 0 or distance.max() < 2:
+            return
+        pick = int(rng.integers(len(rows)))
+        score = float(np.count_nonzero(mask)) * (0.05 if border else 1.0)
+        self._clicks[index].append((score, frame, left + float(columns[pick]) + 0.5, top + float(rows[pick]) + 0.5))
+
+
+def truth_document(objects: tuple[TrueObject, ...], capture_from_kitchen: Rigid3, sightings: Sightings) -> dict[str, object]:
+    """truth.json."""
+    entries = []
+    for index, thing in enumerate(objects):
+        joints = [_joint_entry(joint, capture_from_kitchen) for joint in thing.joints]
+        hinges = {joint.hinge for joint in thing.joints}
+        entries.append(
+            {
+                "name": thing.name,
+                "category": thing.category,
+                "dimensions_m": [float(v) for v in thing.dimensions_m],
+                "capture_from_object": (capture_from_kitchen @ thing.kitchen_from_object).matrix.tolist(),
+                "joint": joints[0] if joints else None,
+                "joints": joints,
+                "hinge": hinges.pop() if len(hinges) == 1 else None,
+                "symmetry": "axial" if thing.is_round else None,
+                "observed_axes": sightings.observed_axes(index),
+            }
+        )
+    return {"version": 1, "objects": entries}
+
+
+def prompts_document(objects: tuple[TrueObject, ...], sightings: Sightings, rng: np.random.Generator) -> dict[str, object]:
+    """prompts.json: one click for every object that can be seen."""
+    entries = []
+    for index, thing in enumerate(objects):
+        click = sightings.click(index, rng)
+        if click is not None:
+            point = {"frame": click[0], "x": click[1], "y": click[2], "label": 1}
+            entries.append({"name": thing.name, "category": thing.category, "points": [point]})
+    return {"version": 1, "objects": entries}
+
+
+def _furniture(furniture: Furniture) -> TrueObject:
+    first, last = furniture.leaves[0], furniture.leaves[-1]
+    width, height = last.x + last.width_m - first.x, first.height_m
+    centre = np.array([first.x + width / 2, -furniture.depth_m / 2, first.z + height / 2])
+    joints = tuple(_leaf_joint(furniture, leaf, position) for position, leaf in enumerate(furniture.leaves))
+    return TrueObject(
+        name=furniture.name,
+        category=furniture.category,
+        dimensions_m=np.array([width, furniture.depth_m, height]),
+        kitchen_from_object=Rigid3(np.eye(3), centre),
+        joints=joints,
+    )
+
+
+def _leaf_joint(furniture: Furniture, leaf: Leaf, position: int) -> TrueJoint:
+    suffix = f"_{leaf.hinge}" if len(furniture.leaves) > 1 else ""
+    middle_z, face = leaf.z + leaf.height_m / 2, -furniture.depth_m
+    if leaf.hinge is None:
+        origin, axis, kind = np.array([leaf.x + leaf.width_m / 2, face, middle_z]), np.array([0.0, -1.0, 0.0]), "prismatic"
+    else:
+        # A door hinged on the left turns its free edge towards -Y: negative about +Z.
+        edge = leaf.x if leaf.hinge == "left" else leaf.x + leaf.width_m
+        origin, axis, kind = (
+            np.array([edge, face, middle_z]),
+            np.array([0.0, 0.0, -1.0 if leaf.hinge == "left" else 1.0]),
+            "revolute",
+        )
+    return TrueJoint(
+        name=f"{furniture.name}_joint{suffix}",
+        type=kind,
+        axis=axis,
+        origin=origin,
+        lower=0.0,
+        upper=leaf.open_limit,
+        hinge=leaf.hinge,
+    )
+
+
+def _appliance(thing: Appliance) -> TrueObject:
+    width, depth, _ = thing.size_m
+    kitchen_from_object = Rigid3(rotation_about_z(thing.yaw_rad), np.array(thing.centre))
+    edge = -width / 2 if thing.hinge == "left" else width / 2
+    joint = TrueJoint(
+        name=f"{thing.name}_joint",
+        type="revolute",
+        axis=np.array([0.0, 0.0, -1.0 if thing.hinge == "left" else 1.0]),
+        origin=kitchen_from_object.apply(np.array([[edge, -depth / 2, 0.0]]))[0],
+        lower=0.0,
+        upper=thing.open_limit,
+        hinge=thing.hinge,
+    )
+    return TrueObject(
+        name=thing.name,
+        category=thing.category,
+        dimensions_m=np.array(thing.size_m),
+        kitchen_from_object=kitchen_from_object,
+        joints=(joint,),
+    )
+
+
+def _joint_entry(joint: TrueJoint, capture_from_kitchen: Rigid3) -> dict[str, object]:
+    return {
+        "name": joint.name,
+        "type": joint.type,
+        "axis": capture_from_kitchen.turn(joint.axis[None])[0].tolist(),
+        "origin": capture_from_kitchen.apply(joint.origin[None])[0].tolist(),
+        "lower": joint.lower,
+        "upper": joint.upper,
+        "hinge": joint.hinge,
+    }

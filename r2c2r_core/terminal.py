@@ -1,0 +1,76 @@
+"""What the command line prints: progress on stderr, tables."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Iterator, Sequence
+
+from r2c2r_core.model.report import Certificate
+from r2c2r_core.progress import Progress
+
+
+@contextlib.contextmanager
+def show_progress() -> Iterator[Progress]:
+    """A live line on a terminal; one line per step when piped."""
+    reporter = _Live() if sys.stderr.isatty() else _Lines()
+    try:
+        yield Progress(reporter.report)
+    finally:
+        reporter.close()
+
+
+def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Aligned plain-text columns."""
+    widths = [max(len(row[k]) for row in [titles, *rows]) for k in range(len(titles))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in [titles, *rows]]
+    return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
+
+
+def certificate_text(certificate: Certificate) -> str:
+    """The certificate for a person at a terminal."""
+    joints = [(j.joint, f"{1000 * j.deepest_penetration_m:.2f}", f"{100 * j.travel_reached:.0f}") for j in certificate.joints]
+    lines = [
+        table(("joint", "deepest mm", "travel %"), joints) if joints else "no joints",
+        "",
+        *(f"{loader.loader}: {loader.state} {loader.detail}".rstrip() for loader in certificate.loaders),
+        *(f"{finding.severity}: {finding.rule}: {finding.where}: {finding.message}" for finding in certificate.findings),
+        f"deepest contact at rest {1000 * certificate.rest_penetration_m:.2f} mm, drift {1000 * certificate.drift_m:.2f} mm, "
+        f"{certificate.realtime_factor:.0f} x real time",
+        f"certificate {'passed' if certificate.passed else 'FAILED'}",
+    ]
+    return "\n".join(lines)
+
+
+class _Live:
+    def __init__(self) -> None:
+        self.started = time.monotonic()
+        self.stage = ""
+
+    def report(self, stage: str, fraction: float, text: str) -> None:
+        if self.stage and stage != self.stage:
+            sys.stderr.write("\n")
+        self.stage = stage
+        filled = int(24 * fraction)
+        bar = "#" * filled + "." * (24 - filled)
+        elapsed = time.monotonic() - self.started
+        sys.stderr.write(f"\r\033[K{stage:<11}[{bar}] {100 * fraction:3.0f} %  {elapsed:5.0f} s  {text[:60]}")
+        sys.stderr.flush()
+
+    def close(self) -> None:
+        if self.stage:
+            sys.stderr.write("\n")
+
+
+class _Lines:
+    def __init__(self) -> None:
+        self.last = ("", "")
+
+    def report(self, stage: str, fraction: float, text: str) -> None:
+        step = (stage, text.rstrip("0123456789/ "))  # counting up is not a new step
+        if step != self.last:
+            self.last = step
+            sys.stderr.write(f"{stage} {100 * fraction:.0f} % {text}".rstrip() + "\n")
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        pass

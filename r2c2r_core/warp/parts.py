@@ -1,0 +1,154 @@
+"""A fitted mesh cut into the fronts that move, with their handles, and the hollow carcass that stays.
+
+One closed mesh has no inside and no separate door (method.md row 25): the fronts are cut off where the primitive's are,
+the cuts are capped, and the carcass is hollowed like its panels, so that an opened door shows an inside.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.model.scene import Box, Link, SceneObject
+from r2c2r_core.warp.solids import Paint, box_solid, joined, mesh_of, plain_box, solid_of
+
+_FAR_M = 10.0
+_BESIDE_M = 0.0015  # between a moving front and what stays beside it
+_BEHIND_M = 0.002  # between a moving front and the carcass behind it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Region:
+    """Where a moving front lies, in the object frame: open towards the outside of the object."""
+
+    low: Vector3
+    high: Vector3
+
+
+def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, TexturedMesh]:
+    """Visual of each link in the object frame, closed: fronts with handles (and a drawer's tray), and the carcass."""
+    fronts = {link.name: front_region(item, link) for link in item.links[1:]}
+    solid = solid_of(mesh.vertices, mesh.faces, mesh.uv)
+    if solid is None:
+        return _cut_open(item, mesh, paint, fronts)
+    visuals: dict[str, TexturedMesh] = {}
+    rest = solid
+    for link in item.links[1:]:
+        region = fronts[link.name]
+        front = solid ^ box_solid(region.low, region.high, paint.back_uv)
+        visuals[link.name] = joined([mesh_of(front, paint.texture), *_inner_boxes(item, link, paint)])
+        wider = _widened(region)
+        rest = rest - box_solid(wider.low, wider.high, paint.inside_uv)
+    low, high = cavity(item)
+    if (high > low).all():
+        rest = rest - box_solid(low, high, paint.inside_uv)
+    visuals[item.links[0].name] = mesh_of(rest, paint.texture)
+    return visuals
+
+
+def front_region(item: SceneObject, link: Link) -> Region:
+    """The front board's box, unbounded forwards (the handle) and where it reaches the object's own edge."""
+    board = link.boxes[0]
+    centre = link.object_from_link.apply(board.link_from_box.translation[None])[0]
+    low, high = centre - board.size_m / 2, centre + board.size_m / 2
+    half = item.dimensions_m / 2
+    for axis in (0, 2):
+        low[axis] = -_FAR_M if low[axis] < -half[axis] + 1e-4 else low[axis]
+        high[axis] = _FAR_M if high[axis] > half[axis] - 1e-4 else high[axis]
+    low[1] = -_FAR_M
+    return Region(low=low, high=high)
+
+
+def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
+    """The inside of the carcass, from its panels; empty (low > high) when it has none."""
+    panels = {box.name: box for box in item.links[0].boxes}
+    if not {"left", "right", "top", "back"} <= panels.keys():
+        return np.ones(3), -np.ones(3)
+    wall = float(panels["left"].size_m[0])
+    half = item.dimensions_m / 2
+    front = float(panels["left"].link_from_box.translation[1] - panels["left"].size_m[1] / 2)
+    low = np.array([-half[0] + wall, front - _BEHIND_M, -half[2] + wall])
+    high = np.array([half[0] - wall, half[1] - wall, half[2] - wall])
+    return low, high
+
+
+def _widened(region: Region) -> Region:
+    """The region a carcass must leave free: a little wider than the front, and deeper by the seat gap."""
+    beside = np.array([_BESIDE_M, 0.0, _BESIDE_M])
+    return Region(low=region.low - beside, high=region.high + beside + np.array([0.0, _BEHIND_M, 0.0]))
+
+
+def _inner_boxes(item: SceneObject, link: Link, paint: Paint) -> list[TexturedMesh]:
+    """A drawer's floor, sides and back, which no camera saw: as panels."""
+    return [_placed(box, link, paint) for box in link.boxes if box.name.startswith("tray")]
+
+
+def _placed(box: Box, link: Link, paint: Paint) -> TexturedMesh:
+    plain = plain_box(box.size_m, paint.inside_uv, paint.texture)
+    pose: Rigid3 = link.object_from_link @ box.link_from_box
+    return TexturedMesh(vertices=pose.apply(plain.vertices), faces=plain.faces, uv=plain.uv, texture=plain.texture)
+
+
+def _cut_open(item: SceneObject, mesh: TexturedMesh, paint: Paint, fronts: dict[str, Region]) -> dict[str, TexturedMesh]:
+    """The same cuts on a surface that bounds no solid: cut open, and backed with the primitive's panels instead of capped."""
+    visuals: dict[str, TexturedMesh] = {}
+    for link in item.links[1:]:
+        skin = _kept(mesh, fronts[link.name])
+        panels = [_placed(_thinner(box), link, paint) for box in link.boxes if not box.name.startswith("handle")]
+        visuals[link.name] = joined([skin, *panels])
+    base = item.links[0]
+    behind = max(region.high[1] for region in fronts.values()) + _BEHIND_M
+    pieces = [_sliced(mesh, np.array([0.0, 1.0, 0.0]), behind)]
+    if len(fronts) == 1:
+        pieces += _beside(_sliced(mesh, np.array([0.0, -1.0, 0.0]), -behind), _widened(next(iter(fronts.values()))))
+    pieces += [_placed(_thinner(box), base, paint) for box in base.boxes]
+    visuals[base.name] = joined([piece for piece in pieces if len(piece.faces)])
+    return visuals
+
+
+def _kept(mesh: TexturedMesh, region: Region) -> TexturedMesh:
+    """The part of a surface inside a region."""
+    for axis in range(3):
+        direction = np.eye(3)[axis]
+        mesh = _sliced(mesh, direction, float(region.low[axis]))
+        mesh = _sliced(mesh, -direction, -float(region.high[axis]))
+    return mesh
+
+
+def _beside(mesh: TexturedMesh, region: Region) -> list[TexturedMesh]:
+    """The parts of a front that lie left, right, below and above a region: control panels."""
+    pieces = []
+    for axis in (0, 2):
+        direction = np.eye(3)[axis]
+        pieces.append(_sliced(mesh, -direction, -float(region.low[axis])))
+        pieces.append(_sliced(mesh, direction, float(region.high[axis])))
+        mesh = _sliced(_sliced(mesh, direction, float(region.low[axis])), -direction, -float(region.high[axis]))
+    return pieces
+
+
+def _sliced(mesh: TexturedMesh, normal: Vector3, offset: float) -> TexturedMesh:
+    """The part of a surface where normal @ x >= offset."""
+    from trimesh.intersections import slice_faces_plane
+
+    if len(mesh.faces) == 0:
+        return mesh
+    vertices, faces, uv = slice_faces_plane(mesh.vertices, mesh.faces, normal, normal * offset, uv=mesh.uv)
+    return TexturedMesh(
+        vertices=np.asarray(vertices, dtype=np.float64).reshape(-1, 3),
+        faces=np.asarray(faces, dtype=np.int64).reshape(-1, 3),
+        uv=np.asarray(uv, dtype=np.float64).reshape(-1, 2),
+        texture=mesh.texture,
+    )
+
+
+def _thinner(box: Box) -> Box:
+    """The panel drawn in by a millimetre, so that it backs the skin without fighting it."""
+    return Box(name=box.name, size_m=np.maximum(box.size_m - 0.002, 0.001), link_from_box=box.link_from_box)
+
+
+def outline(meshes: Sequence[TexturedMesh]) -> TexturedMesh:
+    """All fronts together, for measuring their corners."""
+    return joined(list(meshes))

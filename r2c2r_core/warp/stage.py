@@ -1,0 +1,164 @@
+"""Primitives dressed in the fitted meshes (paper sections 4.6-4.9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.raster import sample_texture
+from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.scene import ArticulatedScene, Link, SceneObject
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.warp.affine import AxisMap, fit_map, fit_ranges, warp_vertices
+from r2c2r_core.warp.axes import face_outwards
+from r2c2r_core.warp.corners import FrontFace, find_front
+from r2c2r_core.warp.parts import cut_apart, outline
+from r2c2r_core.warp.solids import with_plain_colours
+
+_INSIDE_RGB = (226, 222, 214)  # white melamine in the shade
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WarpConfig:
+    """Settings of this stage."""
+
+    version: int = 2  # of the stage's code, so that a changed method re-runs
+    front_scale: tuple[float, float] = (0.7, 1.4)  # how much a front may be stretched before its mesh is not believed
+    depth_scale: tuple[float, float] = (0.2, 5.0)  # depth is mostly unobserved
+    seed: int = 0
+
+
+class _Unusable(Exception):  # not an error: the primitive stays visible and says so
+    """Why a mesh cannot dress its object."""
+
+
+def fit_meshes(
+    scene: ArticulatedScene,
+    tracks: Sequence[MaskTrack],
+    placements: Sequence[Placement],
+    assets: Sequence[MeshAsset],
+    config: WarpConfig,
+    *,
+    progress: Progress = SILENT,
+) -> ArticulatedScene:
+    """Every object with the visual of its mesh; where a mesh cannot be used the primitive stays, with a warning."""
+    placed = {p.object_name: (p, a) for p, a in zip(placements, assets, strict=True)}
+    objects = []
+    for item in progress.each(list(scene.objects), "fitting"):
+        if item.name not in placed:
+            objects.append(item)
+            continue
+        placement, asset = placed[item.name]
+        try:
+            objects.append(fit_mesh(item, placement, asset, config))
+        except _Unusable as reason:
+            objects.append(replace(item, warnings=(*item.warnings, f"the primitive is shown instead of the mesh: {reason}")))
+    return replace(scene, objects=tuple(objects))
+
+
+def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: WarpConfig) -> SceneObject:
+    """One object, dressed."""
+    vertices_world = item.final_from_placed.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
+    if item.movable or not item.joints:
+        return _whole(item, vertices_world, asset.mesh, config)
+    has_handle = any(box.name.startswith("handle") for link in item.links[1:] for box in link.boxes)
+    canonical = face_outwards(vertices_world, asset.mesh.faces, item.world_from_object, has_handle=has_handle, seed=config.seed)
+    tilted = find_front(canonical.vertices, asset.mesh.faces, seed=config.seed)
+    if tilted is None:
+        raise _Unusable("no flat front was found on it")
+    upright = canonical.vertices @ tilted.upright_from_mesh.T
+    front = find_front(upright, asset.mesh.faces, seed=config.seed)
+    if front is None:
+        raise _Unusable("no flat front was found on it")
+    target = front_corners(item)
+    axis_map = _believable(_map_to(front, upright, target, float(item.dimensions_m[1])), config)
+    warped = warp_vertices(upright, asset.mesh.faces, axis_map, float(front.centre[1]))
+    colour = _front_colour(asset.mesh, warped, item)
+    painted, paint = with_plain_colours(
+        TexturedMesh(vertices=warped, faces=asset.mesh.faces, uv=asset.mesh.uv, texture=asset.mesh.texture),
+        _INSIDE_RGB,
+        _as_bytes(colour),
+    )
+    visuals = cut_apart(item, painted, paint)
+    links = tuple(_dressed(link, visuals.get(link.name), colour) for link in item.links)
+    residual = _corner_residual([visuals[link.name] for link in item.links[1:]], target, config.seed)
+    return replace(item, links=links, warp_residual_m=residual, warnings=(*item.warnings, *canonical.warnings))
+
+
+def front_corners(item: SceneObject) -> Points:
+    """Corners (4, 3) of the primitive's front face, in the order of the mesh's."""
+    x, y, z = item.dimensions_m / 2
+    return np.array([[x, -y, z], [-x, -y, z], [-x, -y, -z], [x, -y, -z]])
+
+
+def _whole(item: SceneObject, vertices_world: Points, mesh: TexturedMesh, config: WarpConfig) -> SceneObject:
+    """A thing or a fixed box: one visual, its range brought onto the box."""
+    if item.movable:
+        vertices = item.world_from_object.inverse.apply(vertices_world)
+    else:
+        vertices = face_outwards(
+            vertices_world, mesh.faces, item.world_from_object, has_handle=False, seed=config.seed
+        ).vertices
+    axis_map = fit_ranges(vertices.min(axis=0), vertices.max(axis=0), item.dimensions_m)
+    visual = TexturedMesh(vertices=axis_map.apply(vertices), faces=mesh.faces, uv=mesh.uv, texture=mesh.texture)
+    base, *rest = item.links
+    colour = _as_unit(np.median(mesh.texture.reshape(-1, 3), axis=0))
+    return replace(item, links=(_dressed(base, visual, colour), *rest))
+
+
+def _map_to(front: FrontFace, vertices: Points, target: Points, depth_m: float) -> AxisMap:
+    back = float(np.quantile(vertices[:, 1], 0.999))
+    return fit_map(front.corners, target, max(back - float(front.centre[1]), 1e-3), depth_m)
+
+
+def _believable(axis_map: AxisMap, config: WarpConfig) -> AxisMap:
+    """The map, if it stretches no more than a placement can be wrong by."""
+    across, (least, most) = axis_map.scale[[0, 2]], config.front_scale
+    if (across < least).any() or (across > most).any():
+        raise _Unusable(f"its front would have to be stretched by {across[0]:.2f} x {across[1]:.2f}")
+    if not config.depth_scale[0] <= axis_map.scale[1] <= config.depth_scale[1]:
+        raise _Unusable(f"its depth would have to be stretched by {axis_map.scale[1]:.2f}")
+    return axis_map
+
+
+def _corner_residual(fronts: Sequence[TexturedMesh], target: Points, seed: int) -> float | None:
+    """Largest distance from the primitive's front corners to those found anew on the finished fronts."""
+    whole = outline(fronts)
+    found = find_front(whole.vertices, whole.faces, seed=seed)
+    if found is None:
+        return None
+    return float(np.linalg.norm(_outer(found.corners, target) - target, axis=1).max())
+
+
+def _outer(corners: Points, target: Points) -> Points:
+    """Corners of a front that covers only part of the face (a control panel stays behind) are compared where they lie."""
+    partial = np.abs(corners - target) > 0.05
+    return np.where(partial, target, corners)
+
+
+def _dressed(link: Link, visual_object: TexturedMesh | None, colour: tuple[float, float, float]) -> Link:
+    if visual_object is None or len(visual_object.faces) == 0:
+        return replace(link, colour=colour)
+    vertices = link.object_from_link.inverse.apply(visual_object.vertices)
+    return replace(link, visual=replace(visual_object, vertices=vertices), colour=colour)
+
+
+def _front_colour(mesh: TexturedMesh, warped: Points, item: SceneObject) -> tuple[float, float, float]:
+    """Median texture colour of the front face."""
+    near = np.abs(warped[:, 1] + item.dimensions_m[1] / 2) < 0.004
+    uv = mesh.uv[near] if near.sum() > 3 else mesh.uv
+    # vertices lie on a chart's border: look at triangle centres
+    faces = mesh.faces[near[mesh.faces].all(axis=1)] if near.sum() > 3 else mesh.faces
+    centres = mesh.uv[faces].mean(axis=1) if len(faces) else uv
+    return _as_unit(np.median(sample_texture(mesh.texture, centres[None].astype(np.float32))[0], axis=0))
+
+
+def _as_unit(rgb: np.ndarray) -> tuple[float, float, float]:
+    return float(rgb[0]) / 255, float(rgb[1]) / 255, float(rgb[2]) / 255
+
+
+def _as_bytes(colour: tuple[float, float, float]) -> tuple[int, int, int]:
+    return round(colour[0] * 255), round(colour[1] * 255), round(colour[2] * 255)

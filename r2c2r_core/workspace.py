@@ -1,0 +1,181 @@
+"""A reconstruction on disk: where each noun lies, under which key, and whether it can be used again.
+
+WORKDIR/
+├── request.json prompts.json overrides.json     inputs, when the app runs the pipeline
+├── capture/                                     frames, normalised (ingest/stage.py)
+├── cache/                                       what a segmenter prepared
+├── nouns/<stage>/<name>.noun                    one file per stage and object, written atomically
+└── bundle.zip                                   the result
+
+A noun's key is the hash of its stage's version and configuration and of its inputs' keys, so a changed setting or click
+re-runs exactly what depends on it, and a crash resumes where it stopped.
+"""
+
+import contextlib
+import errno
+import fcntl
+import hashlib
+import json
+import os
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, is_dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from r2c2r_core.codec import decode_header, decode_noun, encode_noun
+from r2c2r_core.errors import EnvironmentProblem
+from r2c2r_core.model.capture import Capture
+
+T = TypeVar("T")
+
+
+class Workspace:
+    """The folder of one reconstruction."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.computed: list[str] = []  # "stage/name" of what this process computed rather than found
+        with explained_io(root):
+            (root / "nouns").mkdir(parents=True, exist_ok=True)
+
+    @property
+    def frames(self) -> Path:
+        """Folder of the normalised frames."""
+        return self.root / "capture"
+
+    @property
+    def cache(self) -> Path:
+        """Folder a segmenter may use for what it prepared."""
+        return self.root / "cache"
+
+    @property
+    def bundle(self) -> Path:
+        """The finished bundle."""
+        return self.root / "bundle.zip"
+
+    def noun_path(self, stage: str, name: str) -> Path:
+        """File of one noun."""
+        return self.root / "nouns" / stage / f"{name}.noun"
+
+    def once(self, stage: str, name: str, key: str, compute: Callable[[], T]) -> tuple[T, float]:
+        """The stored noun when its key matches, else the computed one, stored; with the seconds its computation took."""
+        found = self.find(stage, name, key)
+        if found is not None:
+            return found
+        started = time.monotonic()
+        noun = compute()
+        seconds = time.monotonic() - started
+        self.computed.append(f"{stage}/{name}")
+        self.save(stage, name, noun, {"key": key, "seconds": seconds})
+        return noun, seconds
+
+    def find(self, stage: str, name: str, key: str) -> tuple[Any, float] | None:
+        """The stored noun and its seconds, when its key matches; a damaged file counts as absent."""
+        path = self.noun_path(stage, name)
+        try:
+            if decode_header(path)["key"] != key:
+                return None
+            noun, header = decode_noun(path.read_bytes())
+        except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+            return None
+        return self._attached(noun), float(header["seconds"])
+
+    def load_latest(self, stage: str, name: str) -> Any | None:
+        """The stored noun whatever its key (for looking at, never for computing on); None when there is none."""
+        path = self.noun_path(stage, name)
+        try:
+            noun, _ = decode_noun(path.read_bytes())
+        except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+            return None
+        return self._attached(noun)
+
+    def names(self, stage: str) -> list[str]:
+        """Names of the nouns a stage has stored."""
+        return sorted(path.stem for path in (self.root / "nouns" / stage).glob("*.noun"))
+
+    def save(self, stage: str, name: str, noun: object, header: dict[str, Any]) -> None:
+        """Store a noun atomically."""
+        if isinstance(noun, Capture):
+            noun = replace(noun, images=None)  # type: ignore[arg-type]  # re-attached by _attached when loaded
+        write_atomically(self.noun_path(stage, name), encode_noun(noun, header))
+
+    def forget(self, stage: str, name: str) -> None:
+        """Drop a stored noun, so that it is computed again."""
+        self.noun_path(stage, name).unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the workspace against a second run; raises EnvironmentProblem when one is at work."""
+        with (self.root / ".lock").open("w") as handle:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise EnvironmentProblem(
+                    f"{self.root}: another run is at work here", hint="wait for it, or choose another --workdir"
+                ) from error
+            yield
+
+    def _attached(self, noun: Any) -> Any:
+        if not isinstance(noun, Capture):
+            return noun
+        from r2c2r_core.ingest.stage import open_images
+
+        return replace(noun, images=open_images(self.frames, noun.frames))
+
+
+def content_key(*parts: object) -> str:
+    """A short hash of configurations, inputs and other keys; equal parts give equal keys."""
+    return hashlib.sha256(json.dumps(_plain(parts), sort_keys=True).encode()).hexdigest()[:32]
+
+
+def file_key(path: Path) -> str:
+    """Key of a recording: a file by its content, a folder by its members' names, sizes and times."""
+    if path.is_file():
+        with path.open("rb") as handle:
+            return hashlib.file_digest(handle, "sha256").hexdigest()
+    members = sorted(p for p in path.rglob("*") if p.is_file())
+    return content_key([[str(p.relative_to(path)), p.stat().st_size, p.stat().st_mtime_ns] for p in members])
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that readers see the old one or the new one, never half of it."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    with explained_io(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            temporary.write_bytes(content)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def explained_io(path: Path) -> Iterator[None]:
+    """Turn a full disk or a forbidden folder into one line with the next step."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            hint = "free some space and run the same command again: finished stages are kept"
+            raise EnvironmentProblem(f"{path}: the disk is full", hint=hint) from error
+        raise EnvironmentProblem(f"{path}: {error.strerror or error}", hint="choose a folder you may write to") from error
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return _plain(asdict(value))
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value

@@ -1,0 +1,655 @@
+// Generated from the app's OpenAPI document by `python -m app.openapi_types`. Do not edit.
+
+/** One finished bundle. */
+export interface Bundle {
+  version: number;
+  url: string;
+  file_name: string;
+  sha256: string;
+  size: number;
+  created: number;
+  passed: boolean | null;
+  current: boolean;
+}
+
+/** One candidate mesh with its evidence. */
+export interface Candidate {
+  id: string;
+  generator: string;
+  seed: number;
+  watertight: boolean;
+  faces: number;
+  frames: number[];
+  metrics: Record<string, number>;
+  parameters: Record<string, number>;
+  warnings: string[];
+  verdict: "accepted" | "rejected" | null;
+  verdict_reason: string;
+  verdict_by: string;
+  glb: string;
+  thumbnail: string;
+}
+
+/** All candidates of one object, the automatic choice and its reason, and what people said. */
+export interface CandidateGroup {
+  object: number;
+  name: string;
+  category: string;
+  chosen: string;
+  chosen_by: string;
+  reason: string;
+  ranking: string[];
+  accepted: string | null;
+  candidates: Candidate[];
+  placement: Placement | null;
+  override: OverrideData;
+  can_undo: boolean;
+  can_redo: boolean;
+}
+
+/** What the recording is: shown before any work starts. */
+export interface CaptureFacts {
+  format: string;
+  sha256: string;
+  frame_count: number;
+  width: number;
+  height: number;
+  depth_width: number;
+  depth_height: number;
+  duration_s: number | null;
+  path_length_m: number;
+  up_source: string;
+  floor_found: boolean;
+  verdict: string;
+  reasons: string[];
+}
+
+/** One line of the category table. */
+export interface Category {
+  name: string;
+  label: string;
+  joint: string;
+}
+
+/** The proof in the newest bundle. */
+export interface Certificate {
+  version: number;
+  passed: boolean;
+  findings: Finding[];
+  loaders: LoaderVerdict[];
+  joints: JointVerdict[];
+  rest_penetration_m: number;
+  drift_m: number;
+  realtime_factor: number;
+}
+
+/** What deleting freed. */
+export interface Deleted {
+  freed_bytes: number;
+}
+
+/** The one shape of an error; `current` is what is stored now when the kind is `conflict`. */
+export interface ErrorBody {
+  kind: string;
+  message: string;
+  hint: string;
+  current: unknown;
+}
+
+/** One thing the linter or the simulation has to say. */
+export interface Finding {
+  rule: string;
+  severity: string;
+  where: string;
+  message: string;
+}
+
+/** One line of a folder that a recording may be taken from. */
+export interface FolderEntry {
+  name: string;
+  path: string;
+  folder: boolean;
+  size: number | null;
+}
+
+/** A folder below an allowed root. */
+export interface FolderListing {
+  path: string;
+  parent: string | null;
+  entries: FolderEntry[];
+}
+
+/** One frame; `index` is its number in the recording. Image: /media/{project}/frames/{index}.jpg?w=960&v={media_version}. */
+export interface FrameInfo {
+  index: number;
+  timestamp_s: number | null;
+  width: number;
+  height: number;
+  sharpness: number;
+  camera: number[];
+}
+
+/** One object's mask on one frame. */
+export interface FrameMask {
+  object: number;
+  frame: number;
+  confidence: number;
+  source: "live" | "run";
+  mask: MaskBits;
+}
+
+/** Who changed what, when. */
+export interface HistoryEntry {
+  id: number;
+  object: number | null;
+  scope: string;
+  action: string;
+  text: string;
+  frame: number | null;
+  who: string;
+  at: number;
+  undone: boolean;
+}
+
+/** A recording on this machine. */
+export interface ImportPath {
+  path: string;
+  name?: string | null;
+}
+
+/** One piece of heavy work. */
+export interface Job {
+  id: number;
+  project: string;
+  project_name: string;
+  kind: "import" | "sample" | "run";
+  state: "queued" | "running" | "cancelling" | "cancelled" | "failed" | "done";
+  stage: string;
+  stage_fraction: number;
+  stages: StageState[];
+  progress: number;
+  eta_s: number | null;
+  message: string;
+  error: ErrorBody | null;
+  position: number | null;
+  attempts: number;
+  who: string;
+  has_log: boolean;
+  created: number;
+  started: number | null;
+  finished: number | null;
+}
+
+/** One line of a job's history. */
+export interface JobEvent {
+  id: number;
+  at: number;
+  kind: string;
+  stage: string;
+  fraction: number;
+  text: string;
+}
+
+/** Joint positions; they are clamped to the limits. */
+export interface JointValues {
+  values: Record<string, number>;
+}
+
+/** One joint's sweep and drive test. */
+export interface JointVerdict {
+  joint: string;
+  deepest_penetration_m: number;
+  travel_reached: number;
+}
+
+/** Where an object is seen. */
+export interface Lane {
+  object: number;
+  state: "none" | "waiting" | "running" | "partial" | "done" | "failed";
+  source: "live" | "run" | "none";
+  complete: boolean;
+  frames: LaneEntry[];
+}
+
+/** An object on one frame of the film-strip. */
+export interface LaneEntry {
+  frame: number;
+  area: number;
+  confidence: number;
+}
+
+/** The project's live segmenter. */
+export interface LiveStatus {
+  state: "off" | "starting" | "preparing" | "ready" | "failed";
+  fraction: number;
+  text: string;
+  error: ErrorBody | null;
+}
+
+/** One loader's verdict; one that is not installed is `not tried`. */
+export interface LoaderVerdict {
+  loader: string;
+  state: string;
+  detail: string;
+}
+
+/** A mask at preview size: base64 of zlib of the bits of its box, row by row without padding, high bit first. */
+export interface MaskBits {
+  width: number;
+  height: number;
+  left: number;
+  top: number;
+  box_width: number;
+  box_height: number;
+  bits: string;
+}
+
+/** A new object; without a name it gets its category's and the next number. */
+export interface ObjectIn {
+  name?: string | null;
+  category?: string;
+  points?: PointIn[];
+}
+
+/** What changes; with `version`, only if nobody changed it meanwhile. */
+export interface ObjectPatch {
+  name?: string | null;
+  category?: string | null;
+  colour?: number | null;
+  version?: number | null;
+}
+
+/** What a person corrected about one object; None is computed. */
+export interface OverrideData {
+  candidate: string | null;
+  hinge: "left" | "right" | "top" | "bottom" | null;
+  dimensions_m: [number, number, number] | null;
+  pose: number[][] | null;
+  joint_lower: number | null;
+  joint_upper: number | null;
+  rejected: string[];
+}
+
+/** The fields that are present are set; null clears. */
+export interface OverridePatch {
+  candidate?: string | null;
+  hinge?: "left" | "right" | "top" | "bottom" | null;
+  dimensions_m?: [number, number, number] | null;
+  pose?: number[][] | null;
+  joint_lower?: number | null;
+  joint_upper?: number | null;
+  rerun?: boolean;
+}
+
+/** Where the chosen candidate stands, with the evidence for it. */
+export interface Placement {
+  candidate: string;
+  scale: number;
+  translation_m: number[];
+  matches: number;
+  inliers: number;
+  rms_m: number;
+  mask_iou: number;
+  condition: number;
+  unsure: boolean;
+  runner_up: number | null;
+  method: string;
+  votes: Record<string, number>;
+  warnings: string[];
+}
+
+/** A stored click. */
+export interface Point {
+  id: number;
+  frame: number;
+  x: number;
+  y: number;
+  label: 0 | 1;
+}
+
+/** A click. Outside the frame is refused. */
+export interface PointIn {
+  frame: number;
+  x: number;
+  y: number;
+  label?: 0 | 1;
+}
+
+/** A moved or flipped click. */
+export interface PointPatch {
+  x?: number | null;
+  y?: number | null;
+  label?: 0 | 1 | null;
+}
+
+/** One recording and what became of it. */
+export interface Project {
+  id: string;
+  name: string;
+  status: "importing" | "failed" | "ready";
+  created: number;
+  updated: number;
+  source_name: string;
+  media_version: string;
+  capture: CaptureFacts | null;
+  notices: string[];
+  error: ErrorBody | null;
+  counts: ProjectCounts;
+  job: Job | null;
+  result: "none" | "stale" | "current";
+  bundle: Bundle | null;
+  thumbnail: string | null;
+  size_bytes: number;
+}
+
+/** What is in a project. */
+export interface ProjectCounts {
+  objects: number;
+  points: number;
+  accepted: number;
+  rejected: number;
+}
+
+/** A new name. */
+export interface ProjectRename {
+  name: string;
+}
+
+/** prompts.json. */
+export interface PromptsFile {
+  version: 1;
+  objects: PromptsFileObject[];
+}
+
+/** One object of prompts.json. */
+export interface PromptsFileObject {
+  name: string;
+  category: string;
+  points: PromptsFilePoint[];
+}
+
+/** One click of prompts.json. */
+export interface PromptsFilePoint {
+  frame: number;
+  x: number;
+  y: number;
+  label: 0 | 1;
+}
+
+/** The object after a verdict or a correction, and the job that follows from it. */
+export interface Reviewed {
+  group: CandidateGroup | null;
+  job: Job | null;
+  text: string;
+}
+
+/** Which backends, where not the defaults. */
+export interface RunRequest {
+  segmenter?: string | null;
+  generator?: string | null;
+  matcher?: string | null;
+  seed?: number;
+}
+
+/** A synthetic kitchen. */
+export interface SampleRequest {
+  seed?: number;
+  frames?: number;
+  width?: number;
+  height?: number;
+  name?: string | null;
+}
+
+/** One object of the finished scene. */
+export interface SceneItem {
+  object: number | null;
+  name: string;
+  category: string;
+  fixture: string;
+  dimensions_m: number[];
+  dimension_sources: string[];
+  joints: SceneJoint[];
+  movable: boolean;
+  mask_frames: number;
+  placement_rms_m: number | null;
+  warp_residual_m: number | null;
+  warnings: string[];
+}
+
+/** One joint; 0 is closed, positive opens. Angles in radians, lengths in metres. */
+export interface SceneJoint {
+  name: string;
+  type: "revolute" | "prismatic";
+  axis: number[];
+  origin: number[];
+  lower: number;
+  upper: number;
+  sources: Record<string, string>;
+}
+
+/** One object a person named. */
+export interface SceneObject {
+  id: number;
+  project: string;
+  name: string;
+  category: string;
+  colour: number;
+  version: number;
+  deleted: boolean;
+  points: Point[];
+  can_undo: boolean;
+  can_redo: boolean;
+  segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
+  mask_frames: number;
+  notices: string[];
+  saved: number;
+}
+
+/** The finished scene as a table. */
+export interface SceneSummary {
+  items: SceneItem[];
+  failures: Record<string, string>;
+  warnings: string[];
+  stages: StageInfo[];
+  glb: string | null;
+  preview: string | null;
+}
+
+/** How one stage was run. */
+export interface StageInfo {
+  name: string;
+  backend: string;
+  seconds: number;
+}
+
+/** One stage of a job. */
+export interface StageState {
+  name: string;
+  state: "waiting" | "running" | "done" | "failed" | "cancelled";
+}
+
+/** What the app can do here; limits are shown before a file is chosen. */
+export interface SystemInfo {
+  version: string;
+  user: string;
+  max_upload_bytes: number;
+  free_bytes: number;
+  import_roots: string[];
+  categories: Category[];
+  palette: string[];
+  viewer: boolean;
+}
+
+/** What to undo or redo: the last change of this object, or of any object when None. */
+export interface UndoRequest {
+  object?: number | null;
+  scope?: "prompts" | "review";
+}
+
+/** What was undone or redone, so that the page can say it. */
+export interface Undone {
+  object: SceneObject;
+  text: string;
+  frame: number | null;
+}
+
+/** What a reviewer says. Rejecting makes new candidates; accepting another one aligns it anew. */
+export interface VerdictIn {
+  candidate: string;
+  verdict: "accepted" | "rejected" | "cleared";
+  reason?: string;
+  rerun?: boolean;
+}
+
+/** One joint of the scene the 3D view shows. */
+export interface ViewerJoint {
+  name: string;
+  lower: number;
+  upper: number;
+  value: number;
+}
+
+/** Where the 3D view of a project is; `fallback` when it is down. */
+export interface ViewerSession {
+  state: "ready" | "down";
+  url: string | null;
+  message: string;
+  fallback_glb: string | null;
+  fallback_image: string | null;
+}
+
+/** What the 3D view shows. */
+export interface ViewerShow {
+  mode: "cloud" | "candidate" | "aligned" | "scene";
+  object?: number | null;
+  candidate?: string | null;
+  cloud?: boolean;
+  opacity?: number;
+  collision?: boolean;
+  full?: boolean;
+}
+
+/** What the 3D view shows now. */
+export interface ViewerShown {
+  mode: string;
+  text: string;
+  joints: ViewerJoint[];
+}
+
+/** Every endpoint by its name. */
+export interface Operations {
+  /** GET /api/browse */
+  browse: { parameters: { path?: string | null }; body: undefined; answer: FolderListing };
+  /** GET /api/health */
+  health: { parameters: Record<string, never>; body: undefined; answer: Record<string, string> };
+  /** GET /api/jobs */
+  listJobs: { parameters: { project?: string | null; limit?: number }; body: undefined; answer: Job[] };
+  /** GET /api/jobs/{job} */
+  getJob: { parameters: { job: number }; body: undefined; answer: Job };
+  /** POST /api/jobs/{job}/cancel */
+  cancelJob: { parameters: { job: number }; body: undefined; answer: Job };
+  /** GET /api/jobs/{job}/events */
+  getJobEvents: { parameters: { job: number; after?: number }; body: undefined; answer: JobEvent[] };
+  /** GET /api/jobs/{job}/log */
+  getJobLog: { parameters: { job: number; tail?: number }; body: undefined; answer: unknown };
+  /** POST /api/jobs/{job}/retry */
+  retryJob: { parameters: { job: number }; body: undefined; answer: Job };
+  /** GET /api/projects */
+  listProjects: { parameters: Record<string, never>; body: undefined; answer: Project[] };
+  /** POST /api/projects/import */
+  importProject: { parameters: Record<string, never>; body: ImportPath; answer: Project };
+  /** POST /api/projects/sample */
+  sampleProject: { parameters: Record<string, never>; body: SampleRequest; answer: Project };
+  /** POST /api/projects/upload */
+  uploadProject: { parameters: { filename: string; name?: string | null }; body: undefined; answer: Project };
+  /** DELETE /api/projects/{project} */
+  deleteProject: { parameters: { project: string }; body: undefined; answer: Deleted };
+  /** GET /api/projects/{project} */
+  getProject: { parameters: { project: string }; body: undefined; answer: Project };
+  /** PATCH /api/projects/{project} */
+  renameProject: { parameters: { project: string }; body: ProjectRename; answer: Project };
+  /** GET /api/projects/{project}/bundles */
+  listBundles: { parameters: { project: string }; body: undefined; answer: Bundle[] };
+  /** GET /api/projects/{project}/candidates */
+  listCandidates: { parameters: { project: string }; body: undefined; answer: CandidateGroup[] };
+  /** GET /api/projects/{project}/certificate */
+  getCertificate: { parameters: { project: string }; body: undefined; answer: Certificate };
+  /** GET /api/projects/{project}/frames */
+  listFrames: { parameters: { project: string }; body: undefined; answer: FrameInfo[] };
+  /** GET /api/projects/{project}/history */
+  getHistory: { parameters: { project: string; object?: number | null; before?: number | null; limit?: number }; body: undefined; answer: HistoryEntry[] };
+  /** GET /api/projects/{project}/lanes */
+  getLanes: { parameters: { project: string }; body: undefined; answer: Lane[] };
+  /** GET /api/projects/{project}/live */
+  getLive: { parameters: { project: string }; body: undefined; answer: LiveStatus };
+  /** POST /api/projects/{project}/live/open */
+  openLive: { parameters: { project: string }; body: undefined; answer: LiveStatus };
+  /** GET /api/projects/{project}/masks/{frame} */
+  getMasks: { parameters: { project: string; frame: number }; body: undefined; answer: FrameMask[] };
+  /** GET /api/projects/{project}/objects */
+  listObjects: { parameters: { project: string; deleted?: boolean }; body: undefined; answer: SceneObject[] };
+  /** POST /api/projects/{project}/objects */
+  createObject: { parameters: { project: string; infer?: boolean }; body: ObjectIn; answer: SceneObject };
+  /** DELETE /api/projects/{project}/objects/{object} */
+  deleteObject: { parameters: { project: string; object: number }; body: undefined; answer: SceneObject };
+  /** PATCH /api/projects/{project}/objects/{object} */
+  editObject: { parameters: { project: string; object: number }; body: ObjectPatch; answer: SceneObject };
+  /** GET /api/projects/{project}/objects/{object}/candidates */
+  getCandidates: { parameters: { project: string; object: number }; body: undefined; answer: CandidateGroup };
+  /** POST /api/projects/{project}/objects/{object}/candidates */
+  uploadCandidate: { parameters: { project: string; object: number; filename: string; rerun?: boolean }; body: undefined; answer: Reviewed };
+  /** GET /api/projects/{project}/objects/{object}/override */
+  getOverride: { parameters: { project: string; object: number }; body: undefined; answer: OverrideData };
+  /** PATCH /api/projects/{project}/objects/{object}/override */
+  setOverride: { parameters: { project: string; object: number }; body: OverridePatch; answer: Reviewed };
+  /** POST /api/projects/{project}/objects/{object}/points */
+  addPoint: { parameters: { project: string; object: number; infer?: boolean }; body: PointIn; answer: SceneObject };
+  /** DELETE /api/projects/{project}/objects/{object}/points/{point} */
+  deletePoint: { parameters: { project: string; object: number; point: number; infer?: boolean }; body: undefined; answer: SceneObject };
+  /** PATCH /api/projects/{project}/objects/{object}/points/{point} */
+  movePoint: { parameters: { project: string; object: number; point: number; infer?: boolean }; body: PointPatch; answer: SceneObject };
+  /** POST /api/projects/{project}/objects/{object}/segment */
+  segmentObject: { parameters: { project: string; object: number }; body: undefined; answer: SceneObject };
+  /** POST /api/projects/{project}/objects/{object}/segment/cancel */
+  cancelSegment: { parameters: { project: string; object: number }; body: undefined; answer: SceneObject };
+  /** POST /api/projects/{project}/objects/{object}/verdicts */
+  giveVerdict: { parameters: { project: string; object: number }; body: VerdictIn; answer: Reviewed };
+  /** GET /api/projects/{project}/prompts.json */
+  exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFile };
+  /** POST /api/projects/{project}/prompts.json */
+  importPrompts: { parameters: { project: string }; body: PromptsFile; answer: SceneObject[] };
+  /** POST /api/projects/{project}/redo */
+  redo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
+  /** POST /api/projects/{project}/run */
+  runProject: { parameters: { project: string }; body: RunRequest; answer: Job };
+  /** GET /api/projects/{project}/scene */
+  getScene: { parameters: { project: string }; body: undefined; answer: SceneSummary };
+  /** POST /api/projects/{project}/undo */
+  undo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
+  /** POST /api/projects/{project}/viewer */
+  openViewer: { parameters: { project: string }; body: undefined; answer: ViewerSession };
+  /** POST /api/projects/{project}/viewer/joints */
+  setJoints: { parameters: { project: string }; body: JointValues; answer: ViewerShown };
+  /** POST /api/projects/{project}/viewer/show */
+  showInViewer: { parameters: { project: string }; body: ViewerShow; answer: ViewerShown };
+  /** GET /api/system */
+  getSystem: { parameters: Record<string, never>; body: undefined; answer: SystemInfo };
+  /** GET /media/{project}/bundles/{version}.zip */
+  downloadBundle: { parameters: { project: string; version: number }; body: undefined; answer: unknown };
+  /** GET /media/{project}/candidates/{object}/{candidate}.glb */
+  candidateMesh: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/candidates/{object}/{candidate}.png */
+  candidatePicture: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/depth/{frame}.png */
+  depthImage: { parameters: { project: string; frame: number; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/frames/{frame}.jpg */
+  frameImage: { parameters: { project: string; frame: number; w?: number | null; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/preview.png */
+  scenePicture: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/report.html */
+  sceneReport: { parameters: { project: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/scene.glb */
+  sceneMesh: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/thumbnail.jpg */
+  thumbnail: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+}

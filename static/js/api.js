@@ -1,0 +1,204 @@
+/** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
+
+/** @import {
+ *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane,
+ *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
+ *   Bundle, ViewerSession, ViewerShown, ViewerShow, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest
+ * } from "./api-types" */
+
+export class ApiError extends Error {
+  /**
+   * @param {number} status 0 when the server could not be reached
+   * @param {Omit<ErrorBody, "current"> & { current?: unknown }} body
+   */
+  constructor(status, body) {
+    super(body.message);
+    this.status = status;
+    this.kind = body.kind;
+    this.hint = body.hint ?? "";
+    this.current = body.current;
+  }
+}
+
+/**
+ * @param {string} path
+ * @param {{ method?: string, json?: unknown, body?: BodyInit, signal?: AbortSignal }} [options]
+ */
+async function call(path, { method = "GET", json, body, signal } = {}) {
+  /** @type {Record<string, string>} */
+  const headers = method === "GET" ? {} : { "X-Requested-With": "r2c2r" };
+  if (json !== undefined) headers["Content-Type"] = "application/json";
+  else if (body !== undefined) headers["Content-Type"] = "application/octet-stream";
+  /** @type {Response} */
+  let response;
+  try {
+    response = await fetch(path, { method, headers, body: json === undefined ? body : JSON.stringify(json), signal });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new ApiError(0, {
+      kind: "offline",
+      message: "the server cannot be reached",
+      hint: "is r2c2r serve running?",
+    });
+  }
+  if (!response.ok) throw new ApiError(response.status, await errorBody(response));
+  return response;
+}
+
+/**
+ * @param {Response} response
+ * @returns {Promise<ConstructorParameters<typeof ApiError>[1]>}
+ */
+async function errorBody(response) {
+  try {
+    return await response.json();
+  } catch {
+    return { kind: "internal", message: `the server answered ${response.status}`, hint: "see its log" };
+  }
+}
+
+/**
+ * @param {string} path
+ * @param {AbortSignal} [signal]
+ */
+const get = async (path, signal) => (await call(path, { signal })).json();
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {unknown} [json]
+ */
+const send = async (method, path, json = {}) => (await call(path, { method, json })).json();
+/** @param {string} id */
+const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
+
+/** @returns {Promise<SystemInfo>} */
+export const getSystem = () => get("/api/system");
+/** @param {string} path @returns {Promise<FolderListing>} */
+export const browse = (path) => get(`/api/browse?${new URLSearchParams({ path })}`);
+
+/** @param {AbortSignal} [signal] @returns {Promise<Project[]>} */
+export const listProjects = (signal) => get("/api/projects", signal);
+/** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Project>} */
+export const getProject = (id, signal) => get(of(id), signal);
+/** @param {string} path @returns {Promise<Project>} */
+export const importPath = (path) => send("POST", "/api/projects/import", { path });
+/** @param {Partial<SampleRequest>} request @returns {Promise<Project>} */
+export const makeSample = (request) => send("POST", "/api/projects/sample", request);
+/** @param {string} id @param {string} name @returns {Promise<Project>} */
+export const renameProject = (id, name) => send("PATCH", of(id), { name });
+/** @param {string} id @returns {Promise<Deleted>} */
+export const deleteProject = (id) => send("DELETE", of(id));
+/** @param {string} id @returns {Promise<FrameInfo[]>} */
+export const listFrames = (id) => get(`${of(id)}/frames`);
+/** @param {string} id @returns {Promise<HistoryEntry[]>} */
+export const getHistory = (id) => get(`${of(id)}/history?limit=100`);
+
+/**
+ * Upload a recording; `onProgress` hears 0..1. Aborting the signal stops it.
+ * @param {File} file
+ * @param {(fraction: number) => void} onProgress
+ * @param {AbortSignal} signal
+ * @returns {Promise<Project>}
+ */
+export function uploadRecording(file, onProgress, signal) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest(); // fetch cannot report how much was sent
+    request.open("POST", `/api/projects/upload?${new URLSearchParams({ filename: file.name })}`);
+    request.setRequestHeader("X-Requested-With", "r2c2r");
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    request.upload.addEventListener("progress", (event) => onProgress(event.loaded / Math.max(event.total, 1)));
+    request.addEventListener("load", () => {
+      if (request.status < 300) resolve(JSON.parse(request.responseText));
+      else reject(new ApiError(request.status, parsedError(request)));
+    });
+    const hint = "nothing was kept; try again";
+    request.addEventListener("error", () =>
+      reject(new ApiError(0, { kind: "offline", message: "the upload broke off", hint })),
+    );
+    signal.addEventListener("abort", () => request.abort());
+    request.addEventListener("abort", () => reject(new DOMException("cancelled", "AbortError")));
+    request.send(file);
+  });
+}
+
+/**
+ * @param {XMLHttpRequest} request
+ * @returns {ConstructorParameters<typeof ApiError>[1]}
+ */
+function parsedError(request) {
+  try {
+    return JSON.parse(request.responseText);
+  } catch {
+    return { kind: "internal", message: `the server answered ${request.status}`, hint: "see its log" };
+  }
+}
+
+/** @param {string} id @returns {Promise<SceneObject[]>} */
+export const listObjects = (id) => get(`${of(id)}/objects`);
+/** @param {string} id @param {Partial<ObjectIn>} object @param {boolean} infer @returns {Promise<SceneObject>} */
+export const addObject = (id, object, infer = true) => send("POST", `${of(id)}/objects?infer=${infer}`, object);
+/** @param {string} id @param {number} object @param {Partial<ObjectPatch>} patch @returns {Promise<SceneObject>} */
+export const changeObject = (id, object, patch) => send("PATCH", `${of(id)}/objects/${object}`, patch);
+/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
+export const deleteObject = (id, object) => send("DELETE", `${of(id)}/objects/${object}`);
+/** @param {string} id @param {number} object @param {PointIn} point @param {boolean} infer @returns {Promise<SceneObject>} */
+export const addPoint = (id, object, point, infer = true) =>
+  send("POST", `${of(id)}/objects/${object}/points?infer=${infer}`, point);
+/** @param {string} id @param {number} object @param {number} point @param {Partial<PointPatch>} patch @returns {Promise<SceneObject>} */
+export const changePoint = (id, object, point, patch) =>
+  send("PATCH", `${of(id)}/objects/${object}/points/${point}`, patch);
+/** @param {string} id @param {number} object @param {number} point @returns {Promise<SceneObject>} */
+export const deletePoint = (id, object, point) => send("DELETE", `${of(id)}/objects/${object}/points/${point}`);
+/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
+export const segmentObject = (id, object) => send("POST", `${of(id)}/objects/${object}/segment`);
+/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
+export const cancelSegment = (id, object) => send("POST", `${of(id)}/objects/${object}/segment/cancel`);
+/** @param {string} id @param {"undo" | "redo"} which @param {number | null} object @param {"prompts" | "review"} scope @returns {Promise<Undone>} */
+export const undoRedo = (id, which, object, scope) => send("POST", `${of(id)}/${which}`, { object, scope });
+
+/** @param {string} id @returns {Promise<LiveStatus>} */
+export const openLive = (id) => send("POST", `${of(id)}/live/open`);
+/** @param {string} id @returns {Promise<Lane[]>} */
+export const getLanes = (id) => get(`${of(id)}/lanes`);
+/** @param {string} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<FrameMask[]>} */
+export const getMasks = (id, frame, signal) => get(`${of(id)}/masks/${frame}`, signal);
+
+/** @param {string} id @param {Partial<RunRequest>} [request] @returns {Promise<Job>} */
+export const startRun = (id, request) => send("POST", `${of(id)}/run`, request ?? {});
+/** @param {string} id @returns {Promise<Job[]>} */
+export const listJobs = (id) => get(`/api/jobs?${new URLSearchParams({ project: id })}`);
+/** @param {number} job @returns {Promise<Job>} */
+export const getJob = (job) => get(`/api/jobs/${job}`);
+/** @param {number} job @returns {Promise<Job>} */
+export const cancelJob = (job) => send("POST", `/api/jobs/${job}/cancel`);
+/** @param {number} job @returns {Promise<Job>} */
+export const retryJob = (job) => send("POST", `/api/jobs/${job}/retry`);
+/** @param {number} job @returns {Promise<JobEvent[]>} */
+export const getJobEvents = (job) => get(`/api/jobs/${job}/events`);
+/** @param {number} job @returns {Promise<string>} */
+export const getJobLog = async (job) => (await call(`/api/jobs/${job}/log`)).text();
+
+/** @param {string} id @returns {Promise<CandidateGroup[]>} */
+export const listCandidates = (id) => get(`${of(id)}/candidates`);
+/** @param {string} id @param {number} object @param {VerdictIn} verdict @returns {Promise<Reviewed>} */
+export const giveVerdict = (id, object, verdict) => send("POST", `${of(id)}/objects/${object}/verdicts`, verdict);
+/** @param {string} id @param {number} object @param {Partial<OverridePatch>} patch @returns {Promise<Reviewed>} */
+export const changeOverride = (id, object, patch) => send("PATCH", `${of(id)}/objects/${object}/override`, patch);
+/** @param {string} id @param {number} object @param {File} file @returns {Promise<Reviewed>} */
+export const uploadCandidate = async (id, object, file) => {
+  const query = new URLSearchParams({ filename: file.name });
+  return (await call(`${of(id)}/objects/${object}/candidates?${query}`, { method: "POST", body: file })).json();
+};
+
+/** @param {string} id @returns {Promise<SceneSummary>} */
+export const getScene = (id) => get(`${of(id)}/scene`);
+/** @param {string} id @returns {Promise<Certificate>} */
+export const getCertificate = (id) => get(`${of(id)}/certificate`);
+/** @param {string} id @returns {Promise<Bundle[]>} */
+export const listBundles = (id) => get(`${of(id)}/bundles`);
+/** @param {string} id @returns {Promise<ViewerSession>} */
+export const openViewer = (id) => send("POST", `${of(id)}/viewer`);
+/** @param {string} id @param {Partial<ViewerShow>} what @returns {Promise<ViewerShown>} */
+export const showInViewer = (id, what) => send("POST", `${of(id)}/viewer/show`, what);
+/** @param {string} id @param {Record<string, number>} values @returns {Promise<ViewerShown>} */
+export const moveJoints = (id, values) => send("POST", `${of(id)}/viewer/joints`, { values });

@@ -1,0 +1,100 @@
+/** Small helpers around the DOM. Text enters by textContent, never as markup. */
+
+/**
+ * Make an element: properties are set, `on…` functions become listeners, dashed names and `role`, `for` become attributes.
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {Record<string, unknown>} [props]
+ * @param {...(Node | string | null | undefined | false)} children
+ * @returns {HTMLElementTagNameMap[K]}
+ */
+export function h(tag, props = {}, ...children) {
+  const element = document.createElement(tag);
+  assign(element, props);
+  element.append(...children.filter((child) => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
+/**
+ * @param {Element} element
+ * @param {Record<string, unknown>} props
+ */
+function assign(element, props) {
+  for (const [name, value] of Object.entries(props)) {
+    if (value === undefined || value === null) continue;
+    if (name.startsWith("on") && typeof value === "function") {
+      element.addEventListener(name.slice(2).toLowerCase(), /** @type {EventListener} */ (value));
+    } else if (name.includes("-") || ["role", "for", "list", "class"].includes(name)) {
+      element.setAttribute(name, String(value));
+    } else {
+      Reflect.set(element, name, value);
+    }
+  }
+}
+
+/**
+ * An icon of icons/sprite.svg, hidden from assistive technology (the button carries the label).
+ * @param {string} name
+ */
+export function icon(name) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("class", "icon");
+  svg.setAttribute("aria-hidden", "true");
+  const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
+  use.setAttribute("href", `/static/icons/sprite.svg#${name}`);
+  svg.append(use);
+  return svg;
+}
+
+/** An element whose listeners, fetches and timers end when it leaves the page. */
+export class LiveElement extends HTMLElement {
+  #controller = new AbortController();
+
+  /** Aborted when the element leaves the page. */
+  get signal() {
+    return this.#controller.signal;
+  }
+
+  connectedCallback() {
+    if (this.#controller.signal.aborted) this.#controller = new AbortController();
+    this.connected();
+  }
+
+  disconnectedCallback() {
+    this.#controller.abort();
+  }
+
+  /** Called when the element enters the page. */
+  connected() {}
+
+  /**
+   * Tell the parents.
+   * @param {string} type
+   * @param {unknown} [detail]
+   */
+  emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail, bubbles: true, composed: true }));
+  }
+}
+
+/**
+ * The detail of one of our events.
+ * @template T
+ * @param {Event} event
+ * @returns {T}
+ */
+export function detailOf(event) {
+  return /** @type {CustomEvent<T>} */ (event).detail;
+}
+
+/**
+ * Whether a key press belongs to a text field.
+ * @param {KeyboardEvent} event
+ */
+export function isTyping(event) {
+  const target = event.composedPath()[0];
+  if (!(target instanceof HTMLElement)) return false;
+  if (target instanceof HTMLInputElement)
+    return !["range", "checkbox", "radio", "button", "file"].includes(target.type);
+  return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
+}

@@ -1,0 +1,52 @@
+/** The `?` overlay, printed from the keymap the code uses. */
+
+import { h } from "../dom.js";
+import { KEYMAP } from "../lib/keymap.js";
+
+const TITLES = { all: "Everywhere", annotate: "Annotate", review: "Review" };
+
+export class HelpOverlay extends HTMLElement {
+  #dialog = h("dialog", { "aria-label": "Keyboard and mouse" });
+
+  connectedCallback() {
+    this.append(this.#dialog);
+  }
+
+  toggle() {
+    if (this.#dialog.open) this.#dialog.close();
+    else {
+      this.#dialog.replaceChildren(...content(() => this.#dialog.close()));
+      this.#dialog.showModal();
+    }
+  }
+}
+
+/** @param {() => void} close */
+function content(close) {
+  const sections = /** @type {const} */ (["annotate", "review", "all"]).flatMap((page) => [
+    h("h2", {}, TITLES[page]),
+    h(
+      "table",
+      {},
+      h(
+        "tbody",
+        {},
+        ...KEYMAP.filter((binding) => binding.page === page).map((binding) =>
+          h("tr", {}, h("td", {}, ...binding.keys.map((key) => h("kbd", {}, key))), h("td", {}, binding.text)),
+        ),
+      ),
+    ),
+  ]);
+  const mouse = h(
+    "p",
+    {},
+    "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
+      "Wheel zooms, middle drag pans. Hold Ctrl to place several clicks before the mask is computed.",
+  );
+  return [
+    h("h1", {}, "Keyboard and mouse"),
+    mouse,
+    ...sections,
+    h("p", {}, h("button", { type: "button", onClick: close }, "Close")),
+  ];
+}

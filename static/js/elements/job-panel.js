@@ -1,0 +1,96 @@
+/** One job: stages, progress, time left, cancel, retry, log. */
+
+import { cancelJob, getJobLog, retryJob } from "../api.js";
+import { h, LiveElement } from "../dom.js";
+import { duration } from "../lib/format.js";
+import { sayError } from "./toasts.js";
+
+/** @typedef {import("../api-types").Job} Job */
+
+const STATES = {
+  queued: "waiting",
+  running: "running",
+  cancelling: "stopping…",
+  cancelled: "cancelled",
+  failed: "failed",
+  done: "done",
+};
+
+export class JobPanel extends LiveElement {
+  /** @type {Job | null} */
+  #job = null;
+  #log = h("pre", { class: "log", hidden: true, tabIndex: 0, "aria-label": "Log" });
+
+  /** @param {Job | null} job */
+  set job(job) {
+    this.#job = job;
+    this.#draw();
+  }
+
+  get job() {
+    return this.#job;
+  }
+
+  #draw() {
+    const job = this.#job;
+    if (!job) return this.replaceChildren();
+    const running = ["queued", "running", "cancelling"].includes(job.state);
+    const tone =
+      job.state === "failed" ? "bad" : job.state === "done" ? "good" : job.state === "cancelled" ? "warn" : "";
+    const left = job.eta_s !== null && running ? `about ${duration(job.eta_s)} left` : "";
+    const queue = job.state === "queued" && job.position ? `number ${job.position} in the queue` : "";
+    const head = h(
+      "div",
+      { class: "row" },
+      h("span", { class: `chip ${tone}` }, STATES[job.state]),
+      h("span", { class: "muted" }, [job.message, left || queue].filter(Boolean).join(" · ")),
+    );
+    this.replaceChildren(
+      h(
+        "div",
+        { class: "stack" },
+        head,
+        running ? h("progress", { value: job.progress, max: 1, "aria-label": "Progress" }) : null,
+        h("ol", { class: "stages" }, ...job.stages.map((stage) => this.#stage(job, stage))),
+        job.error ? this.#error(job.error) : null,
+        this.#buttons(job, running),
+        this.#log,
+      ),
+    );
+  }
+
+  /**
+   * @param {Job} job
+   * @param {Job["stages"][number]} stage
+   */
+  #stage(job, stage) {
+    const value = stage.state === "done" ? 1 : stage.name === job.stage ? job.stage_fraction : 0;
+    const bar = h("progress", { value, max: 1, "aria-label": stage.name });
+    return h("li", {}, h("span", {}, stage.name), bar, h("span", { class: "muted" }, stage.state));
+  }
+
+  /** @param {NonNullable<Job["error"]>} error */
+  #error(error) {
+    return h("p", { role: "alert" }, h("strong", {}, error.message), error.hint ? ` — ${error.hint}` : "");
+  }
+
+  /**
+   * @param {Job} job
+   * @param {boolean} running
+   */
+  #buttons(job, running) {
+    const row = h("div", { class: "row" });
+    /** @type {(text: string, act: () => Promise<unknown>) => void} */
+    const add = (text, act) => row.append(h("button", { type: "button", onClick: () => act().catch(sayError) }, text));
+    if (running) add("Cancel", async () => (this.job = await cancelJob(job.id)));
+    if (["failed", "cancelled"].includes(job.state)) add("Try again", async () => (this.job = await retryJob(job.id)));
+    if (job.has_log) {
+      add(this.#log.hidden ? "Show the log" : "Hide the log", async () => {
+        this.#log.hidden = !this.#log.hidden;
+        if (!this.#log.hidden) this.#log.textContent = (await getJobLog(job.id)) || "The log is empty.";
+        this.#draw();
+      });
+    }
+    return row;
+  }
+}

@@ -1,0 +1,94 @@
+/** Tables of a finished scene, shared by the run and download pages. */
+
+import { h } from "../dom.js";
+import { centimetres, counted, jointValue } from "../lib/format.js";
+
+/** @typedef {import("../api-types").SceneSummary} SceneSummary */
+/** @typedef {import("../api-types").Certificate} Certificate */
+
+/** @param {SceneSummary} scene */
+export function sceneTable(scene) {
+  const titles = ["Object", "Category", "W × D × H cm", "Joint", "Mask frames", "Placement rms", "Notes"];
+  const failures = Object.entries(scene.failures);
+  return h(
+    "div",
+    { class: "stack" },
+    h(
+      "div",
+      { class: "scroll" },
+      h(
+        "table",
+        {},
+        h("thead", {}, h("tr", {}, ...titles.map((title) => h("th", { scope: "col" }, title)))),
+        h("tbody", {}, ...scene.items.map(row)),
+      ),
+    ),
+    failures.length
+      ? h(
+          "div",
+          { role: "alert" },
+          h("h3", {}, `${counted(failures.length, "object")} not in the bundle`),
+          h("ul", {}, ...failures.map(([name, line]) => h("li", {}, h("strong", {}, name), `: ${line}`))),
+        )
+      : null,
+  );
+}
+
+/** @param {SceneSummary["items"][number]} item */
+function row(item) {
+  const joints = item.joints.map((joint) => {
+    const source = joint.sources.axis ?? "";
+    return h(
+      "div",
+      {},
+      `${joint.type}, opens ${jointValue(joint.type, joint.upper)} `,
+      source ? h("span", { class: "chip" }, source) : "",
+    );
+  });
+  const rms = item.placement_rms_m === null ? "–" : `${(1000 * item.placement_rms_m).toFixed(1)} mm`;
+  const [width, depth, height] = item.dimensions_m.map(centimetres);
+  return h(
+    "tr",
+    {},
+    h("th", { scope: "row" }, item.name),
+    h("td", {}, item.category),
+    h("td", { title: `sources: ${item.dimension_sources.join(", ")}` }, `${width} × ${depth} × ${height}`),
+    h("td", {}, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
+    h("td", { class: "number" }, String(item.mask_frames)),
+    h("td", { class: "number" }, rms),
+    h("td", { class: "muted" }, item.warnings.join("; ")),
+  );
+}
+
+/** @param {Certificate} certificate */
+export function certificateCard(certificate) {
+  const state = certificate.passed ? "passed" : "did not pass";
+  const joints = certificate.joints;
+  const travel = joints.length ? Math.min(...joints.map((joint) => joint.travel_reached)) : 1;
+  const sweep = joints.length ? Math.max(...joints.map((joint) => joint.deepest_penetration_m)) : 0;
+  /** @type {[string, string][]} */
+  const facts = [
+    ["Deepest contact at rest", `${(1000 * certificate.rest_penetration_m).toFixed(2)} mm`],
+    ["Deepest contact while opening", `${(1000 * sweep).toFixed(2)} mm`],
+    ["Least travel reached", `${(100 * travel).toFixed(0)} % of ${counted(joints.length, "joint")}`],
+    ["Drift in five seconds", `${(1000 * certificate.drift_m).toFixed(2)} mm`],
+    ["Speed", `${certificate.realtime_factor.toFixed(0)} × real time`],
+  ];
+  return h(
+    "section",
+    { class: "card stack" },
+    h("h2", {}, "Certificate ", h("span", { class: `chip ${certificate.passed ? "good" : "bad"}` }, state)),
+    h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
+    h(
+      "div",
+      { class: "row" },
+      ...certificate.loaders.map((loader) => {
+        const tone = loader.state === "passed" ? "good" : loader.state === "failed" ? "bad" : "";
+        return h("span", { class: `chip ${tone}`, title: loader.detail }, `${loader.loader}: ${loader.state}`);
+      }),
+    ),
+    certificate.findings.length
+      ? h("ul", {}, ...certificate.findings.map((f) => h("li", {}, `${f.severity}: ${f.where}: ${f.message}`)))
+      : null,
+  );
+}

@@ -1,0 +1,52 @@
+/** Short messages in the corner; errors stay until closed. Announced to assistive technology. */
+
+import { ApiError } from "../api.js";
+import { h, icon } from "../dom.js";
+
+export class Toasts extends HTMLElement {
+  connectedCallback() {
+    this.setAttribute("role", "status");
+    this.setAttribute("aria-live", "polite");
+  }
+
+  /**
+   * @param {string} text
+   * @param {{ kind?: "good" | "bad" | "", hint?: string }} [options]
+   */
+  add(text, { kind = "", hint = "" } = {}) {
+    const close = h("button", { class: "quiet", type: "button", "aria-label": "Close this message" }, icon("cross"));
+    const toast = h(
+      "div",
+      { class: `toast ${kind}` },
+      h("div", {}, h("div", {}, text), hint ? h("div", { class: "muted" }, hint) : null),
+      close,
+    );
+    close.addEventListener("click", () => toast.remove());
+    if (kind !== "bad") setTimeout(() => toast.remove(), 6000);
+    this.append(toast);
+    while (this.childElementCount > 4) this.firstElementChild?.remove();
+  }
+}
+
+/**
+ * Say something in the corner of the page.
+ * @param {string} text
+ * @param {{ kind?: "good" | "bad" | "", hint?: string }} [options]
+ */
+export function say(text, options) {
+  const toasts = document.querySelector("r2c2r-toasts");
+  if (toasts instanceof Toasts) toasts.add(text, options);
+}
+
+/**
+ * Say what went wrong; a cancelled request is not news.
+ * @param {unknown} error
+ */
+export function sayError(error) {
+  if (error instanceof DOMException && error.name === "AbortError") return;
+  if (error instanceof ApiError) say(error.message, { kind: "bad", hint: error.hint });
+  else {
+    say(error instanceof Error ? error.message : String(error), { kind: "bad", hint: "reload the page" });
+    console.error(error);
+  }
+}

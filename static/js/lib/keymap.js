@@ -1,0 +1,85 @@
+/** One table of keys: the pages act on it, the `?` overlay prints it, a test looks for clashes. */
+
+/** @typedef {{ keys: string[], action: string, text: string, page: "annotate" | "review" | "all" }} Binding */
+
+/** @type {Binding[]} */
+export const KEYMAP = [
+  { keys: ["?"], action: "help", text: "Show or hide this list", page: "all" },
+  { keys: ["Ctrl+z"], action: "undo", text: "Undo", page: "all" },
+  { keys: ["Ctrl+Shift+z", "Ctrl+y"], action: "redo", text: "Redo", page: "all" },
+  { keys: ["ArrowRight", "f"], action: "next-frame", text: "Next frame", page: "annotate" },
+  { keys: ["ArrowLeft", "d"], action: "previous-frame", text: "Previous frame", page: "annotate" },
+  { keys: ["Shift+ArrowRight", "v"], action: "forward-ten", text: "Ten frames on", page: "annotate" },
+  { keys: ["Shift+ArrowLeft", "c"], action: "back-ten", text: "Ten frames back", page: "annotate" },
+  { keys: ["Home"], action: "first-frame", text: "First frame", page: "annotate" },
+  { keys: ["End"], action: "last-frame", text: "Last frame", page: "annotate" },
+  { keys: ["Space"], action: "play", text: "Play or pause", page: "annotate" },
+  { keys: ["]"], action: "next-prompt", text: "Next frame with a click of this object", page: "annotate" },
+  { keys: ["["], action: "previous-prompt", text: "Previous frame with a click of this object", page: "annotate" },
+  { keys: ["Enter"], action: "finish", text: "Finish this object; the next click starts a new one", page: "annotate" },
+  {
+    keys: ["Delete", "Backspace"],
+    action: "delete-point",
+    text: "Remove the last click on this frame",
+    page: "annotate",
+  },
+  { keys: ["h"], action: "hide", text: "Hide or show this object's mask", page: "annotate" },
+  { keys: ["Shift+h"], action: "solo", text: "Show this object's mask alone", page: "annotate" },
+  { keys: ["t"], action: "raw", text: "Hold: the frame without masks", page: "annotate" },
+  { keys: ["0"], action: "fit", text: "Fit the frame to the window", page: "annotate" },
+  {
+    keys: ["k"],
+    action: "crosshair",
+    text: "Place clicks by keyboard: arrows move, + adds, - subtracts, Esc ends",
+    page: "annotate",
+  },
+  { keys: ["y"], action: "accept", text: "Accept this candidate", page: "review" },
+  { keys: ["x"], action: "reject", text: "Reject this candidate", page: "review" },
+  { keys: ["n"], action: "next-object", text: "Next object", page: "review" },
+  { keys: ["p"], action: "previous-object", text: "Previous object", page: "review" },
+  { keys: ["1"], action: "view-candidate", text: "Show the candidate alone", page: "review" },
+  { keys: ["2"], action: "view-aligned", text: "Show the mesh over the scan", page: "review" },
+  { keys: ["3"], action: "view-scene", text: "Show the finished scene", page: "review" },
+  { keys: ["4"], action: "view-cloud", text: "Show the scan", page: "review" },
+];
+
+/**
+ * The action of a key press on a page, or null.
+ * @param {{ key: string, ctrlKey: boolean, metaKey: boolean, shiftKey: boolean, altKey: boolean }} event
+ * @param {string} page
+ */
+export function actionOf(event, page) {
+  if (event.altKey) return null;
+  const name = nameOf(event);
+  const found = KEYMAP.find(
+    (binding) => (binding.page === page || binding.page === "all") && binding.keys.includes(name),
+  );
+  return found ? found.action : null;
+}
+
+/** @param {{ key: string, ctrlKey: boolean, metaKey: boolean, shiftKey: boolean }} event */
+function nameOf(event) {
+  const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
+  // A shifted sign such as ? already says that Shift was held; letters and named keys do not.
+  const shift = event.shiftKey && (key.length > 1 || /[a-z]/.test(key)) ? "Shift+" : "";
+  return control + shift + key;
+}
+
+/** Keys that two actions of one page claim. */
+export function clashes() {
+  /** @type {string[]} */
+  const found = [];
+  for (const page of ["annotate", "review"]) {
+    /** @type {Map<string, string>} */
+    const taken = new Map();
+    for (const binding of KEYMAP.filter((b) => b.page === page || b.page === "all")) {
+      for (const key of binding.keys) {
+        const other = taken.get(key);
+        if (other !== undefined) found.push(`${page}: ${key} is ${other} and ${binding.action}`);
+        taken.set(key, binding.action);
+      }
+    }
+  }
+  return found;
+}

@@ -1,0 +1,59 @@
+/** One WebSocket per tab: job progress, masks, saved objects. Messages arrive as events named by their type. */
+
+/** @typedef {{ type: string, seq?: number, [key: string]: unknown }} Message */
+
+class Live extends EventTarget {
+  /** @type {WebSocket | null} */
+  #socket = null;
+  /** @type {string | null} */
+  #project = null;
+  #epoch = "";
+  #seq = 0;
+  #wait = 500;
+
+  /** Whether the server hears us. */
+  get connected() {
+    return this.#socket?.readyState === WebSocket.OPEN;
+  }
+
+  /**
+   * Look at a project; null for none.
+   * @param {string | null} project
+   */
+  watch(project) {
+    this.#project = project;
+    if (!this.#socket) this.#open();
+    else if (this.connected) this.#socket.send(JSON.stringify({ type: "watch", project }));
+  }
+
+  #open() {
+    const query = new URLSearchParams({ since: String(this.#seq), epoch: this.#epoch });
+    if (this.#project) query.set("project", this.#project);
+    const socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/api/live?${query}`);
+    this.#socket = socket;
+    const asked = this.#project;
+    socket.addEventListener("open", () => {
+      this.#wait = 500;
+      if (this.#project !== asked) socket.send(JSON.stringify({ type: "watch", project: this.#project }));
+      this.dispatchEvent(new Event("online"));
+    });
+    socket.addEventListener("message", (event) => this.#receive(JSON.parse(String(event.data))));
+    socket.addEventListener("close", () => {
+      this.dispatchEvent(new Event("offline"));
+      setTimeout(() => this.#open(), this.#wait);
+      this.#wait = Math.min(this.#wait * 1.8, 8000);
+    });
+  }
+
+  /** @param {Message} message */
+  #receive(message) {
+    if (message.type === "hello") {
+      this.#epoch = String(message.epoch);
+      if (message.reset || this.#seq === 0) this.#seq = Number(message.seq);
+    }
+    if (message.seq !== undefined) this.#seq = Math.max(this.#seq, message.seq);
+    this.dispatchEvent(new CustomEvent(message.type, { detail: message }));
+  }
+}
+
+export const live = new Live();

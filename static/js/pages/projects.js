@@ -1,0 +1,224 @@
+/** All projects; import by upload, drop or path; the sample kitchen. */
+
+import {
+  deleteProject,
+  getSystem,
+  importPath,
+  listProjects,
+  makeSample,
+  renameProject,
+  uploadRecording,
+} from "../api.js";
+import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { FolderDialog } from "../elements/folder-dialog.js";
+import { say, sayError } from "../elements/toasts.js";
+import { ago, bytes, counted } from "../lib/format.js";
+import { live } from "../live.js";
+import { go } from "../router.js";
+
+/** @typedef {import("../api-types").Project} Project */
+
+export class ProjectsPage extends LiveElement {
+  #cards = h("ul", { class: "cards" });
+  #upload = h("div", { class: "card", hidden: true });
+  #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
+  #folders = new FolderDialog();
+  #limit = Infinity;
+
+  connected() {
+    this.replaceChildren(
+      h(
+        "div",
+        { class: "page" },
+        h(
+          "header",
+          {},
+          h("h1", {}, "Projects"),
+          h("button", { type: "button", onClick: () => this.#sample() }, "Sample kitchen"),
+          h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…"),
+          h(
+            "button",
+            { type: "button", class: "primary", onClick: () => this.#picker.click() },
+            icon("plus"),
+            "Import a scan",
+          ),
+        ),
+        this.#upload,
+        this.#cards,
+      ),
+      this.#picker,
+      this.#folders,
+    );
+    const { signal } = this;
+    this.#picker.addEventListener("change", () => this.#send(this.#picker.files?.[0]), { signal });
+    this.#folders.addEventListener("choose", (event) => this.#import(detailOf(event)), { signal });
+    this.addEventListener("dragover", (event) => this.#dragging(event), { signal });
+    this.addEventListener("dragleave", () => this.classList.remove("dropping"), { signal });
+    this.addEventListener("drop", (event) => this.#drop(event), { signal });
+    for (const type of ["projects", "project", "job"]) live.addEventListener(type, () => this.#load(), { signal });
+    getSystem().then((system) => (this.#limit = system.max_upload_bytes), sayError);
+    this.#load();
+  }
+
+  async #load() {
+    try {
+      const projects = await listProjects(this.signal);
+      this.#cards.replaceChildren(
+        ...(projects.length ? projects.map((project) => this.#card(project)) : [this.#empty()]),
+      );
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  #empty() {
+    return h(
+      "li",
+      { class: "card empty" },
+      h("div", {}, h("h2", {}, "Nothing here yet")),
+      h(
+        "div",
+        {},
+        h("p", { class: "muted" }, "Drop a Record3D .r3d file here, or try everything on a kitchen made for it."),
+        h(
+          "div",
+          { class: "row" },
+          h("button", { type: "button", class: "primary", onClick: () => this.#sample() }, "Open the sample kitchen"),
+          h("button", { type: "button", onClick: () => this.#picker.click() }, "Import a scan"),
+        ),
+      ),
+    );
+  }
+
+  /** @param {Project} project */
+  #card(project) {
+    const { counts, job } = project;
+    const busy = job && ["queued", "running", "cancelling"].includes(job.state) ? job : null;
+    const facts = project.capture ? counted(project.capture.frame_count, "frame") : "";
+    const thumb = project.thumbnail
+      ? h("img", { class: "thumb", src: project.thumbnail, alt: "", loading: "lazy" })
+      : h("div", { class: "thumb" });
+    const line = [
+      facts,
+      counted(counts.objects, "object"),
+      bytes(project.size_bytes),
+      ago(project.updated, Date.now() / 1000),
+    ];
+    return h(
+      "li",
+      { class: "card" },
+      thumb,
+      h(
+        "div",
+        { class: "body" },
+        h("h2", {}, h("a", { href: `/p/${project.id}` }, project.name)),
+        h("div", { class: "row" }, stateChip(project)),
+        busy ? h("progress", { value: busy.progress, max: 1, "aria-label": `${busy.kind} ${project.name}` }) : null,
+        h("div", { class: "muted" }, line.filter(Boolean).join(" · ")),
+        h(
+          "div",
+          { class: "row" },
+          h("button", { type: "button", class: "quiet", onClick: () => this.#rename(project) }, "Rename"),
+          h(
+            "button",
+            { type: "button", class: "quiet danger", onClick: () => this.#delete(project) },
+            icon("trash"),
+            "Delete",
+          ),
+        ),
+      ),
+    );
+  }
+
+  async #sample() {
+    try {
+      go(`/p/${(await makeSample({})).id}`);
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** @param {string} path */
+  async #import(path) {
+    try {
+      go(`/p/${(await importPath(path)).id}`);
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** @param {DragEvent} event */
+  #dragging(event) {
+    event.preventDefault();
+    this.classList.add("dropping");
+  }
+
+  /** @param {DragEvent} event */
+  #drop(event) {
+    event.preventDefault();
+    this.classList.remove("dropping");
+    this.#send(event.dataTransfer?.files[0]);
+  }
+
+  /** @param {File | undefined} file */
+  async #send(file) {
+    this.#picker.value = "";
+    if (!file) return;
+    if (file.size > this.#limit) {
+      const hint = "put it on this machine and import it by its path";
+      return say(`${file.name} is ${bytes(file.size)}; uploads end at ${bytes(this.#limit)}`, { kind: "bad", hint });
+    }
+    const controller = new AbortController();
+    const bar = h("progress", { value: 0, max: 1, "aria-label": `Uploading ${file.name}` });
+    const cancel = h("button", { type: "button", onClick: () => controller.abort() }, "Cancel");
+    this.#upload.replaceChildren(
+      h("div", { class: "row" }, `Uploading ${file.name}, ${bytes(file.size)}`, cancel),
+      bar,
+    );
+    this.#upload.hidden = false;
+    try {
+      go(`/p/${(await uploadRecording(file, (fraction) => (bar.value = fraction), controller.signal)).id}`);
+    } catch (error) {
+      sayError(error);
+    }
+    this.#upload.hidden = true;
+  }
+
+  /** @param {Project} project */
+  async #rename(project) {
+    const name = prompt("Name of the project", project.name)?.trim();
+    if (!name || name === project.name) return;
+    await renameProject(project.id, name).catch(sayError);
+    this.#load();
+  }
+
+  /** @param {Project} project */
+  async #delete(project) {
+    if (!confirm(`Delete “${project.name}” with its recording, clicks and bundles? This cannot be undone.`)) return;
+    try {
+      const { freed_bytes } = await deleteProject(project.id);
+      say(`Deleted ${project.name}: ${bytes(freed_bytes)} freed`);
+    } catch (error) {
+      sayError(error);
+    }
+    this.#load();
+  }
+}
+
+/** @param {Project} project */
+function stateChip(project) {
+  if (project.status === "failed") return h("span", { class: "chip bad" }, "import failed");
+  if (project.status === "importing") return h("span", { class: "chip" }, "importing…");
+  if (project.job?.kind === "run" && ["queued", "running"].includes(project.job.state))
+    return h("span", { class: "chip" }, "running…");
+  if (project.result === "current") {
+    const passed = project.bundle?.passed;
+    return h(
+      "span",
+      { class: `chip ${passed ? "good" : "warn"}` },
+      passed ? "bundle certified" : "bundle with findings",
+    );
+  }
+  if (project.result === "stale") return h("span", { class: "chip warn" }, "changed since the last run");
+  return h("span", { class: "chip" }, project.counts.objects ? "annotating" : "new");
+}

@@ -1,0 +1,102 @@
+/** Run the pipeline: progress of each stage, cancel, the log of a failed one, then the result's table and certificate. */
+
+import { getCertificate, getProject, getScene, listJobs, startRun } from "../api.js";
+import { detailOf, h, LiveElement } from "../dom.js";
+import { JobPanel } from "../elements/job-panel.js";
+import { certificateCard, sceneTable } from "../elements/results.js";
+import { sayError } from "../elements/toasts.js";
+import { counted } from "../lib/format.js";
+import { live } from "../live.js";
+
+/** @typedef {import("../api-types").Job} Job */
+
+export class RunPage extends LiveElement {
+  project = "";
+  #job = new JobPanel();
+  #start = h("button", { type: "button", class: "primary" }, "Run");
+  #lead = h("p", { class: "muted" });
+  #result = h("div", { class: "stack" });
+
+  connected() {
+    this.replaceChildren(
+      h(
+        "div",
+        { class: "page stack" },
+        h("header", {}, h("h1", {}, "Run"), this.#start),
+        this.#lead,
+        h("section", { class: "card" }, this.#job),
+        this.#result,
+      ),
+    );
+    const { signal } = this;
+    this.#start.addEventListener("click", () => this.#run(), { signal });
+    live.addEventListener("job", (event) => this.#hear(/** @type {{ job: Job }} */ (detailOf(event)).job), { signal });
+    live.addEventListener("online", () => this.#load(), { signal });
+    this.#load();
+  }
+
+  async #load() {
+    try {
+      const [project, jobs] = await Promise.all([getProject(this.project, this.signal), listJobs(this.project)]);
+      const job = jobs.find((candidate) => candidate.kind === "run") ?? null;
+      this.#show(job);
+      this.#job.closest("section")?.toggleAttribute("hidden", job === null);
+      const objects = counted(project.counts.objects, "object");
+      this.#start.disabled = project.counts.objects === 0;
+      this.#lead.textContent = project.counts.objects
+        ? `${objects}. ${project.result === "current" ? "The result is up to date: running again does no work." : "Only what changed is computed."}`
+        : "Click at least one object on the Annotate page first.";
+      if (project.result !== "none") await this.#drawResult();
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  async #run() {
+    try {
+      this.#show(await startRun(this.project));
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** @param {Job} job */
+  #hear(job) {
+    if (job.project !== this.project || job.kind !== "run") return;
+    const finished = this.#job.job?.state !== job.state && ["done", "failed", "cancelled"].includes(job.state);
+    this.#show(job);
+    if (finished) this.#load();
+  }
+
+  /** @param {Job | null} job */
+  #show(job) {
+    this.#job.job = job;
+    this.#job.closest("section")?.toggleAttribute("hidden", job === null);
+    const running = job !== null && ["queued", "running", "cancelling"].includes(job.state);
+    this.#start.textContent = running ? "Running…" : job?.state === "done" ? "Run again" : "Run";
+    if (running) this.#start.disabled = true;
+    else if (job) this.#start.disabled = false;
+  }
+
+  async #drawResult() {
+    const [scene, certificate] = await Promise.all([
+      getScene(this.project),
+      getCertificate(this.project).catch(() => null),
+    ]);
+    this.#result.replaceChildren(
+      h(
+        "section",
+        { class: "card stack" },
+        h(
+          "div",
+          { class: "row" },
+          h("h2", {}, "Result"),
+          h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
+          h("a", { class: "button", href: `/p/${this.project}/download` }, "Download"),
+        ),
+        sceneTable(scene),
+      ),
+      certificate ? certificateCard(certificate) : "",
+    );
+  }
+}

@@ -1,0 +1,54 @@
+/** Addresses: which page shows, for which project, and what it should look at. */
+
+/** @typedef {{ page: string, project: string | null, query: URLSearchParams }} Route */
+
+const PAGES = ["annotate", "run", "review", "download"];
+
+/**
+ * @param {URL | Location} address
+ * @returns {Route}
+ */
+export function routeOf(address) {
+  const [first, project, page] = address.pathname.split("/").filter(Boolean);
+  const query = new URLSearchParams(address.search);
+  if (first !== "p" || !project) return { page: "projects", project: null, query };
+  return { page: page && PAGES.includes(page) ? page : "overview", project, query };
+}
+
+/**
+ * Follow links inside the app without reloading, and say when the page changes.
+ * @param {(route: Route) => void} show
+ */
+export function startRouter(show) {
+  document.addEventListener("click", (event) => {
+    const link = event.composedPath().find((node) => node instanceof HTMLAnchorElement);
+    if (!(link instanceof HTMLAnchorElement) || event.defaultPrevented || event.button !== 0) return;
+    if (event.ctrlKey || event.metaKey || event.shiftKey || link.target || link.hasAttribute("download")) return;
+    const url = new URL(link.href);
+    if (url.origin !== location.origin || !(url.pathname === "/" || url.pathname.startsWith("/p/"))) return;
+    event.preventDefault();
+    go(url.pathname + url.search);
+  });
+  window.addEventListener("popstate", () => show(routeOf(location)));
+  window.addEventListener("r2c2r-go", () => show(routeOf(location)));
+  show(routeOf(location));
+}
+
+/** @param {string} path */
+export function go(path) {
+  history.pushState(null, "", path);
+  window.dispatchEvent(new Event("r2c2r-go"));
+}
+
+/**
+ * Change the query without leaving the page or growing the history, so that the address can be shared.
+ * @param {Record<string, string | number | null>} values
+ */
+export function remember(values) {
+  const url = new URL(location.href);
+  for (const [name, value] of Object.entries(values)) {
+    if (value === null) url.searchParams.delete(name);
+    else url.searchParams.set(name, String(value));
+  }
+  history.replaceState(null, "", url);
+}

@@ -1,0 +1,119 @@
+"""An app of one's own, with workers that obey the tests."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+
+from app.jobs.plans import Commands
+from app.main import create_app
+from app.services.context import Context
+from app.settings import Settings
+from app.viewer.client import Viewer
+
+FAKES = Path(__file__).parent / "fakes"
+ORIGIN = "http://127.0.0.1:8000"
+SOCKETS = "ws://127.0.0.1:8000"
+
+
+def fake(name: str, *options: str) -> tuple[str, ...]:
+    return sys.executable, *options, str(FAKES / f"{name}.py")
+
+
+BARE = "-IS"  # no site packages: starts in a third of the time
+FAKE_COMMANDS = Commands(
+    worker=fake("worker", BARE), ingest=fake("ingest", BARE), sample=fake("sample", BARE), live=fake("live")
+)
+
+
+@dataclass
+class Running:
+    """A started app, a signed-in browser, and shorthands."""
+
+    app: FastAPI
+    client: TestClient
+    settings: Settings
+
+    @property
+    def context(self) -> Context:
+        context: Context = self.app.state.context
+        return context
+
+    def get(self, path: str, status: int = 200, **options: Any) -> Any:
+        return self._checked(self.client.get(path, **options), status)
+
+    def post(self, path: str, body: Any = None, status: int | None = None, **options: Any) -> Any:
+        answer = self.client.post(path, json=body, **options) if body is not None else self.client.post(path, **options)
+        return self._checked(answer, status)
+
+    def patch(self, path: str, body: Any, status: int = 200) -> Any:
+        return self._checked(self.client.patch(path, json=body), status)
+
+    def delete(self, path: str, status: int = 200) -> Any:
+        return self._checked(self.client.delete(path), status)
+
+    def sample(self) -> str:
+        """A project that is ready, with the objects drawer_1 and mug_1; its id."""
+        project = self.post("/api/projects/sample", {}, 202)["id"]
+        self.until(lambda: self.get(f"/api/projects/{project}")["status"] == "ready")
+        return str(project)
+
+    def job(self, job: int, *states: str) -> Any:
+        """The job, once it is in one of the states."""
+        self.until(lambda: self.get(f"/api/jobs/{job}")["state"] in states)
+        return self.get(f"/api/jobs/{job}")
+
+    @staticmethod
+    def until(condition: Callable[[], bool], seconds: float = 90.0) -> None:
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, "waited too long"
+            time.sleep(0.03)
+
+    @staticmethod
+    def _checked(answer: Any, status: int | None) -> Any:
+        wanted = (status,) if status else (200, 201, 202)
+        assert answer.status_code in wanted, f"{answer.status_code}: {answer.text[:500]}"
+        return answer.json()
+
+
+@contextmanager
+def running(
+    data_dir: Path, commands: Commands = FAKE_COMMANDS, viewer: Viewer | None = None, **options: Any
+) -> Iterator[Running]:
+    """The app on a data folder, and a browser that opened the printed address."""
+    given = {
+        "host": "127.0.0.1",
+        "min_free_bytes": 0,
+        "kill_grace_s": 0.5,
+        "user": "tester",
+        "import_roots": (data_dir.parent,),
+    }
+    settings = Settings(data_dir=data_dir, **{**given, **options})
+    app = create_app(settings, commands=commands, viewer_client=viewer)
+    with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
+        client.get(f"/?token={settings.launch_token}")
+        yield Running(app, client, settings)
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Callable[..., Any]:
+    """Start the app on this test's data folder; may be called again, as a restart."""
+
+    def begin(**options: Any) -> Any:
+        return running(tmp_path / "data", **options)
+
+    return begin
+
+
+@pytest.fixture
+def web(start: Callable[..., Any]) -> Iterator[Running]:
+    with start() as found:
+        yield found

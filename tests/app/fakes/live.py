@@ -1,0 +1,67 @@
+"""A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N`.
+
+A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded.
+"""
+
+import json
+import sys
+import threading
+import time
+from queue import Empty, Queue
+
+import numpy as np
+
+from app.jobs.mask_wire import mask_bits
+from r2c2r_core.geometry.masks import pack_mask
+
+FRAMES = (3, 0, 7)
+
+
+def say(**message: object) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+def rectangle(x: float, y: float) -> dict[str, object]:
+    mask = np.zeros((120, 160), bool)
+    mask[max(int(y) - 5, 0) : int(y) + 5, max(int(x) - 5, 0) : int(x) + 5] = True
+    return mask_bits(pack_mask(mask), 160)
+
+
+def main() -> None:
+    commands: Queue = Queue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            commands.put(json.loads(line))
+        commands.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    say(state="preparing", fraction=0.5, text="halfway")
+    say(state="ready", total=3)
+    while (command := commands.get()) is not None:
+        if command["cmd"] != "segment":
+            continue
+        number, key, point = command["object"], command["key"], command["prompt"]["points"][0]
+        if point["label"] == 0:
+            say(
+                object=number,
+                key=key,
+                end="failed",
+                error={"kind": "PromptError", "message": "nothing there", "hint": "click on it"},
+            )
+            continue
+        for frame in FRAMES:
+            say(object=number, key=key, frame=frame, confidence=0.9, area=0.005, mask=rectangle(point["x"], point["y"]))
+            time.sleep(0.3 if point["x"] >= 150 else 0)
+            try:
+                newer = commands.get_nowait()
+            except Empty:
+                continue
+            commands.put(newer)
+            break
+        else:
+            say(object=number, key=key, end="done")
+
+
+main()

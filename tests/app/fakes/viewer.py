@@ -1,0 +1,49 @@
+"""A viewer whose upstream echoes; opacity 0.123 kills it."""
+
+import json
+import sys
+import threading
+from http import HTTPStatus
+from typing import Any
+
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+from websockets.sync.server import ServerConnection, serve
+
+KEY = json.loads(sys.stdin.readline())["key"]
+PAGE = b"<html><head><title>3D</title></head></html>"
+
+
+def page(connection: ServerConnection, request: Request) -> Response | None:
+    if request.headers.get("X-R2C2R-Key") != KEY:
+        return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Length": "0"}), b"")
+    if request.headers.get("Upgrade") == "websocket":
+        return None
+    headers = Headers({"Content-Type": "text/html", "Content-Length": str(len(PAGE)), "Connection": "close"})
+    return Response(HTTPStatus.OK, "OK", headers, PAGE)
+
+
+def echo(connection: ServerConnection) -> None:
+    for message in connection:
+        connection.send(message)
+
+
+def choose(_: ServerConnection, offered: Any) -> Any:
+    return offered[0] if offered else None
+
+
+server = serve(echo, "127.0.0.1", 0, process_request=page, select_subprotocol=choose, compression=None)
+threading.Thread(target=server.serve_forever, daemon=True).start()
+port = server.socket.getsockname()[1]
+for line in sys.stdin:
+    command = json.loads(line)
+    if command.get("opacity") == 0.123:
+        sys.exit(1)
+    answer: dict[str, Any] = {"port": port}
+    if command["cmd"] == "show":
+        answer = {"mode": command["mode"], "text": "shown", "joints": []}
+    if command["cmd"] == "joints":
+        joints = [{"name": name, "lower": 0.0, "upper": 1.0, "value": value} for name, value in command["values"].items()]
+        answer = {"mode": "scene", "text": "moved", "joints": joints}
+    sys.stdout.write(json.dumps({"id": command["id"], "ok": answer}) + "\n")
+    sys.stdout.flush()

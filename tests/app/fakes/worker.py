@@ -1,0 +1,62 @@
+"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE`."""
+
+import json
+import signal
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+URDF = """<robot name="scene"><link name="world"/><link name="base"/><link name="front">
+<visual><geometry><box size="0.5 0.02 0.2"/></geometry></visual>
+<collision><geometry><box size="0.5 0.02 0.2"/></geometry></collision></link>
+<joint name="drawer_1_base" type="fixed"><parent link="world"/><child link="base"/><origin xyz="1 2 0.5"/></joint>
+<joint name="drawer_1_slide" type="prismatic"><parent link="base"/><child link="front"/><axis xyz="0 -1 0"/>
+<limit lower="0" upper="0.4" effort="50" velocity="1"/></joint></robot>"""
+
+
+def say(**message: object) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> int:
+    workdir, stage = Path(sys.argv[1]), sys.argv[3]
+    told = workdir.parent / "behave.json"
+    behaviour = json.loads(told.read_text()).get(stage, "done") if told.exists() else "done"
+    with (workdir.parent / "calls.txt").open("a") as handle:
+        handle.write(f"{stage}\n")
+    json.loads((workdir / "request.json").read_text())
+    say(stage=stage, fraction=0.5, text=f"half of {stage}")
+    if behaviour == "fail":
+        sys.stderr.write("a traceback that a person may want to read\n")
+        say(error={"kind": "ObjectNotSeen", "message": "no frame shows drawer_1", "hint": "click it on another frame"})
+        return 1
+    if behaviour == "crash":
+        sys.stderr.write("Segmentation fault, nearly\n")
+        sys.stderr.flush()
+        signal.raise_signal(signal.SIGKILL)
+    if behaviour in ("hang", "deaf"):
+        stopped: list[int] = []
+        signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number) if behaviour == "hang" else None)
+        (workdir.parent / "hanging").touch()
+        while not stopped:
+            time.sleep(0.02)
+        say(error={"kind": "Cancelled", "message": f"{stage}: cancelled", "hint": ""})
+        return 130
+    if stage == "export":
+        with zipfile.ZipFile(workdir / "bundle.zip", "w") as archive:
+            archive.writestr("scene.glb", b"glTF" + json.dumps(json.loads((workdir / "prompts.json").read_text())).encode())
+            archive.writestr("scene.urdf", URDF)
+            archive.writestr("manifest.json", json.dumps({"stages": [{"name": "segment", "backend": "fake", "seconds": 2.0}]}))
+            archive.writestr("preview.png", b"png")
+            archive.writestr("report.html", "<h1>report</h1>")
+            archive.writestr("report.json", json.dumps({"certificate": {"passed": True, "findings": [], "drift_m": 0.001}}))
+    say(done=stage, computed=[], failures={}, passed=True)
+    if behaviour == "lingers":
+        time.sleep(60)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+import errno
+
+import pytest
+
+from app.errors import KINDS, error_body, kind_of
+from r2c2r_core import errors as core
+from tests.app.conftest import Running
+
+SHAPE = {"kind", "message", "hint", "current"}
+
+
+def routes(web: Running) -> list[tuple[str, str]]:
+    document = web.app.openapi()
+    return [(method.upper(), path) for path, methods in document["paths"].items() for method in methods]
+
+
+def test_every_endpoint_says_what_is_wrong_in_the_one_shape(web: Running) -> None:
+    for method, path in routes(web):
+        filled = path.replace("{project}", "none").replace("{object}", "1").replace("{job}", "1").replace("{point}", "1")
+        filled = filled.replace("{frame}", "1").replace("{candidate}", "c0").replace("{version}", "1")
+        if "{" not in path:
+            continue
+        answer = web.client.request(
+            method, filled, params={"filename": "x.glb"}, json={} if method in ("POST", "PATCH") else None
+        )
+        assert 400 <= answer.status_code < 500, (method, path, answer.status_code)
+        assert set(answer.json()) == SHAPE, (method, path)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status", "kind"),
+    [
+        ("GET", "/nowhere", 404, "not-found"),
+        ("PUT", "/api/projects", 405, "method-not-allowed"),
+        ("GET", "/api/jobs/notanumber", 422, "invalid"),
+        ("GET", "/api/jobs/99999999999999999999999", 422, "invalid"),
+        ("GET", "/api/jobs?limit=99999999999999999999999", 422, "invalid"),
+    ],
+)
+def test_errors_of_the_framework_too(web: Running, method: str, path: str, status: int, kind: str) -> None:
+    answer = web.client.request(method, path)
+    assert (answer.status_code, answer.json()["kind"]) == (status, kind)
+    assert set(answer.json()) == SHAPE
+
+
+@pytest.mark.parametrize("body", [b"{", b"[]", b'{"seed": "x"}', b'{"seed": 1, "unknown": 2}', b'{"seed": NaN}', b"\xff\xfe"])
+def test_a_body_that_is_not_what_it_should_be_is_invalid(web: Running, body: bytes) -> None:
+    answer = web.client.post("/api/projects/sample", content=body, headers={"content-type": "application/json"})
+    assert (answer.status_code, answer.json()["kind"]) == (422, "invalid")
+    assert set(answer.json()) == SHAPE
+
+
+def test_an_unexpected_error_tells_the_log_and_not_the_browser(
+    web: Running, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def boom(*_: object) -> None:
+        raise RuntimeError("secret detail")
+
+    monkeypatch.setattr("app.services.projects.list_projects", boom)
+    answer = web.client.get("/api/projects")
+    assert (answer.status_code, answer.json()["kind"]) == (500, "internal")
+    assert "secret" not in answer.text
+    assert "secret detail" in caplog.text
+
+
+def test_every_error_of_the_core_has_a_kind_and_a_status() -> None:
+    def below(cls: type[core.R2C2RError]) -> list[type[core.R2C2RError]]:
+        return [cls, *(found for sub in cls.__subclasses__() for found in below(sub))]
+
+    for cls in below(core.R2C2RError):
+        error = cls("what", hint="next")
+        kind, status = kind_of(error)
+        assert kind.islower()
+        assert 400 <= status < 600
+        assert error_body(error)["hint"] == "next"
+
+
+def test_the_narrowest_class_decides() -> None:
+    seen: list[type[core.R2C2RError]] = []
+    for cls, _, _ in KINDS:
+        assert not any(issubclass(cls, earlier) for earlier in seen), cls
+        seen.append(cls)
+
+
+def test_every_route_has_a_name_of_its_own(web: Running) -> None:
+    names = [operation["operationId"] for methods in web.app.openapi()["paths"].values() for operation in methods.values()]
+    assert len(names) == len(set(names))
+
+
+def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = web.sample()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("anyio.open_file", full)
+    refused = web.client.post("/api/projects/upload?filename=a.r3d", content=b"PK\3\4abc")
+    assert (refused.status_code, refused.json()["kind"]) == (507, "no-space")
+    assert [p["id"] for p in web.get("/api/projects")] == [project]
+    monkeypatch.setattr("app.jobs.runner.Worker", full)
+    job = web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "failed")
+    assert job["error"]["kind"] == "no-space"
+    assert len(web.get(f"/api/projects/{project}/objects")) == 2
+
+
+def test_the_queue_goes_on_after_an_error_nobody_thought_of(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = web.sample()
+
+    def boom(*_: object) -> None:
+        raise ZeroDivisionError
+
+    with monkeypatch.context() as broken:
+        broken.setattr("app.jobs.runner.steps_of", boom)
+        job = web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "failed")
+    assert job["error"]["kind"] == "internal"
+    again = web.post(f"/api/jobs/{job['id']}/retry", status=202)
+    assert web.job(again["id"], "done")["state"] == "done"

@@ -1,0 +1,180 @@
+import io
+import stat
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.security import COOKIE
+from tests.app.conftest import Running
+
+
+def archive(*members: tuple[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in members:
+            made.writestr(name, content)
+    return buffer.getvalue()
+
+
+R3D = archive(("metadata", b"{}"), ("rgbd/0.jpg", b"x" * 1000))
+
+
+def upload(web: Running, content: bytes, name: str = "scan.r3d", status: int = 202) -> Any:
+    return web.post(f"/api/projects/upload?filename={name}", status=status, content=content)
+
+
+def left_behind(web: Running) -> list[Path]:
+    return [p for p in (web.settings.data_dir / "projects").rglob("*") if p.is_file()]
+
+
+def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> None:
+    project = upload(web, R3D, "My kitchen.r3d")
+    assert (project["name"], project["status"], project["job"]["kind"]) == ("My kitchen", "importing", "import")
+    web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "ready")
+    ready = web.get(f"/api/projects/{project['id']}")
+    assert (ready["capture"]["frame_count"], ready["notices"], ready["result"]) == (3, ["a notice"], "none")
+    assert [f["index"] for f in web.get(f"/api/projects/{project['id']}/frames")] == [0, 3, 7]
+
+
+def test_a_name_cannot_lead_out_of_the_project(web: Running) -> None:
+    project = upload(web, R3D, "..%2F..%2Fetc%2Fpasswd")
+    (stored,) = (web.settings.data_dir / "projects" / project["id"] / "source").iterdir()
+    assert stored.name == "passwd"
+
+
+def test_the_limit_is_shown_and_kept_for_announced_and_for_streamed_bytes(start: Callable[..., Any]) -> None:
+    with start(max_upload_bytes=5000) as web:
+        assert web.get("/api/system")["max_upload_bytes"] == 5000
+        assert upload(web, b"PK\3\4" + bytes(6000), status=413)["kind"] == "too-large"
+        pieces = (b"PK\3\4" + bytes(1000) for _ in range(9))
+        assert upload(web, pieces, status=413)["kind"] == "too-large"  # type: ignore[arg-type]  # no length announced
+        assert left_behind(web) == []
+        assert web.get("/api/projects") == []
+
+
+def test_a_full_disk_is_said_before_anything_is_stored(start: Callable[..., Any]) -> None:
+    with start(min_free_bytes=1 << 60) as web:
+        error = upload(web, R3D, status=507)
+        assert (error["kind"], "GB free" in error["message"]) == ("no-space", True)
+        assert web.post("/api/projects/sample", {}, 507)["kind"] == "no-space"
+
+
+def linked() -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as made:
+        info = zipfile.ZipInfo("rgb/link")
+        info.external_attr = (stat.S_IFLNK | 0o777) << 16
+        made.writestr(info, "/etc/passwd")
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "empty"),
+        (b"not an archive at all", "not a zip"),
+        (R3D[:-60], "cut short"),
+        (R3D.replace(b"PK\x01\x02", b"PK\x01\x03"), "damaged"),
+        (b"PK\3\4" + bytes(500), "cut short"),
+        (archive(("../../evil.sh", b"x")), "path"),
+        (archive(("/etc/cron.d/evil", b"x")), "path"),
+        (archive(("C:\\evil.exe", b"x")), "path"),
+        (linked(), "link"),
+        (archive(("bomb", bytes(80 << 20))), "times its size"),
+    ],
+)
+def test_a_hostile_or_broken_archive_is_refused_in_one_line_and_leaves_nothing(
+    web: Running, content: bytes, words: str
+) -> None:
+    error = upload(web, content, "scan.zip", 422)
+    assert set(error) == {"kind", "message", "hint", "current"}
+    assert words in error["message"]
+    assert "\n" not in error["message"]
+    assert left_behind(web) == []
+    assert web.get("/api/projects") == []
+
+
+def test_an_implausibly_large_table_of_contents_is_refused_before_it_is_parsed(web: Running) -> None:
+    end = b"PK\5\6" + bytes(8) + (0xFFFFFF0).to_bytes(4, "little") + bytes(6)
+    assert "table of contents" in upload(web, b"PK\3\4" + bytes(100) + end, status=422)["message"]
+
+
+def test_a_recording_is_taken_from_a_path_and_stays_there(web: Running, tmp_path: Path) -> None:
+    folder = tmp_path / "recordings" / "kitchen"
+    folder.mkdir(parents=True)
+    (folder / "frame.txt").write_text("x")
+    project = web.post("/api/projects/import", {"path": str(folder)}, 202)
+    web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "ready")
+    web.delete(f"/api/projects/{project['id']}")
+    assert (folder / "frame.txt").exists()
+
+
+def test_paths_outside_the_roots_are_refused_also_through_links(web: Running, tmp_path: Path) -> None:
+    (tmp_path / "out").symlink_to("/etc")
+    for path in ("/etc", "/etc/passwd", f"{tmp_path}/../..", str(tmp_path / "out"), "/proc/self/environ"):
+        assert web.post("/api/projects/import", {"path": path}, 403)["kind"] == "forbidden"
+        assert web.get("/api/browse", 403, params={"path": path})["kind"] == "forbidden"
+    assert web.post("/api/projects/import", {"path": str(tmp_path / "absent")}, 404)["kind"] == "not-found"
+
+
+def test_folders_below_a_root_can_be_looked_through(web: Running, tmp_path: Path) -> None:
+    (tmp_path / "b.r3d").write_bytes(b"xx")
+    (root,) = web.get("/api/browse")["entries"]
+    listing = web.get("/api/browse", params={"path": root["path"]})
+    names = {entry["name"]: entry["folder"] for entry in listing["entries"]}
+    assert names["b.r3d"] is False
+    assert names["data"] is True
+
+
+def test_a_recording_that_cannot_be_read_leaves_a_failed_project_with_the_reason(web: Running) -> None:
+    project = upload(web, R3D, "broken.r3d")["id"]
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "failed")
+    error = web.get(f"/api/projects/{project}")["error"]
+    assert (error["kind"], error["message"], error["hint"]) == ("capture", "no depth in it", "record again")
+    assert web.get(f"/api/projects/{project}/frames", 409)["kind"] == "not-ready"
+    assert web.post(f"/api/projects/{project}/run", {}, 409)["kind"] == "not-ready"
+
+
+def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) -> None:
+    project = web.sample()
+    folder = web.settings.data_dir / "projects" / project
+    size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
+    assert web.delete(f"/api/projects/{project}")["freed_bytes"] >= size > 0
+    assert not folder.exists()
+    web.get(f"/api/projects/{project}", 404)
+    assert web.get("/api/jobs") == []
+
+
+def test_renaming_is_kept_in_the_history(web: Running) -> None:
+    project = web.sample()
+    assert web.patch(f"/api/projects/{project}", {"name": "Aunt's kitchen"})["name"] == "Aunt's kitchen"
+    assert web.get(f"/api/projects/{project}/history")[0]["action"] == "rename"
+
+
+def test_a_sample_comes_with_its_clicks(web: Running) -> None:
+    project = web.sample()
+    assert [o["name"] for o in web.get(f"/api/projects/{project}/objects")] == ["drawer_1", "mug_1"]
+    assert web.get(f"/api/projects/{project}")["counts"] == {"objects": 2, "points": 2, "accepted": 0, "rejected": 0}
+
+
+def test_an_upload_whose_sender_leaves_is_forgotten(web: Running) -> None:
+    told = [{"type": "http.request", "body": R3D[:200], "more_body": True}, {"type": "http.disconnect"}]
+    said: list[Any] = []
+    cookie = f"{COOKIE}={web.client.cookies[COOKIE]}".encode()
+    headers = [(b"host", b"127.0.0.1"), (b"cookie", cookie), (b"x-requested-with", b"tests")]
+    scope = {"type": "http", "method": "POST", "path": "/api/projects/upload", "query_string": b"filename=scan.r3d"}
+    scope |= {"headers": headers, "http_version": "1.1", "scheme": "http", "server": ("127.0.0.1", 80), "app": web.app}
+
+    async def receive() -> Any:
+        return told.pop(0)
+
+    async def send(message: Any) -> None:
+        said.append(message)
+
+    web.client.portal.call(web.app, scope, receive, send)  # type: ignore[union-attr]  # open while the client is
+    assert said[0]["status"] == 422
+    assert left_behind(web) == []
+    assert web.get("/api/projects") == []

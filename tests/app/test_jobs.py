@@ -1,0 +1,237 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sqlmodel import select
+
+from app.db.engine import open_engine, writing
+from app.db.tables import Job
+from app.process import started_at
+from app.settings import Settings
+from tests.app.conftest import Running
+
+STAGES = ["segment", "generate", "align", "synthesize", "warp", "export"]
+
+
+def behave(web: Running, project: str, **stages: str) -> Path:
+    folder = web.settings.data_dir / "projects" / project
+    (folder / "behave.json").write_text(json.dumps(stages))
+    return folder
+
+
+def run(web: Running, project: str) -> int:
+    return int(web.post(f"/api/projects/{project}/run", {}, 202)["id"])
+
+
+def test_a_run_goes_through_every_stage_in_a_process_each_and_keeps_its_bundle(web: Running) -> None:
+    project = web.sample()
+    job = web.job(run(web, project), "done")
+    assert [s["name"] for s in job["stages"]] == STAGES
+    assert (job["progress"], job["error"], job["eta_s"]) == (1.0, None, None)
+    assert (web.settings.data_dir / "projects" / project / "calls.txt").read_text().split() == STAGES
+    (bundle,) = web.get(f"/api/projects/{project}/bundles")
+    assert (bundle["version"], bundle["passed"], bundle["current"]) == (1, True, True)
+    assert web.get(f"/api/projects/{project}/certificate")["drift_m"] == 0.001
+    assert web.get(f"/api/projects/{project}")["result"] == "current"
+    texts = [event["text"] for event in web.get(f"/api/jobs/{job['id']}/events")]
+    assert texts[:1] == ["segment"]
+    assert texts[-1] == "done"
+
+
+def test_a_change_makes_the_result_stale_and_the_next_run_a_new_version(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.patch(f"/api/projects/{project}/objects/{number}", {"category": "oven"})
+    assert web.get(f"/api/projects/{project}")["result"] == "stale"
+    web.job(run(web, project), "done")
+    assert [(b["version"], b["current"]) for b in web.get(f"/api/projects/{project}/bundles")] == [(2, True), (1, False)]
+
+
+def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    work = web.settings.data_dir / "projects" / project / "work"
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.patch(f"/api/projects/{project}/objects/{number}/override", {"hinge": "left", "joint_upper": 1.0, "joint_lower": 0.0})
+    web.until(lambda: web.get(f"/api/jobs?project={project}")[0]["state"] == "done")
+    overrides = json.loads((work / "overrides.json").read_text())
+    assert overrides["objects"] == {"drawer_1": {"hinge": "left", "joint_limits": [0.0, 1.0]}}
+    assert [o["name"] for o in json.loads((work / "prompts.json").read_text())["objects"]] == ["drawer_1", "mug_1"]
+
+
+def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(web: Running) -> None:
+    project = web.sample()
+    folder = behave(web, project, align="fail")
+    job = web.job(run(web, project), "failed")
+    assert job["error"] == {
+        "kind": "object-not-seen",
+        "message": "no frame shows drawer_1",
+        "hint": "click it on another frame",
+        "current": None,
+    }
+    assert [s["state"] for s in job["stages"]] == ["done", "done", "failed", "waiting", "waiting", "waiting"]
+    log = web.client.get(f"/api/jobs/{job['id']}/log")
+    assert "a traceback that a person may want to read" in log.text
+    (folder / "behave.json").unlink()
+    again = web.post(f"/api/jobs/{job['id']}/retry", status=202)
+    assert web.job(again["id"], "done")["state"] == "done"
+    web.post(f"/api/jobs/{again['id']}/retry", status=409)
+
+
+def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
+    project = web.sample()
+    behave(web, project, generate="crash")
+    job = web.job(run(web, project), "failed")
+    assert job["error"]["kind"] == "worker-died"
+    assert "signal 9" in job["error"]["message"]
+    assert "\n" not in job["error"]["message"]
+
+
+def test_a_worker_that_is_done_but_does_not_leave_is_done(web: Running) -> None:
+    project = web.sample()
+    behave(web, project, generate="lingers")
+    assert web.job(run(web, project), "done", "failed")["error"] is None
+
+
+def test_cancelling_answers_at_once_and_stops_within_the_grace(web: Running) -> None:
+    for number, behaviour in enumerate(("hang", "deaf")):  # a deaf one ignores SIGTERM
+        project = web.sample()
+        folder = behave(web, project, generate=behaviour)
+        job = run(web, project)
+        web.until(lambda folder=folder: (folder / "hanging").exists())
+        began = time.monotonic()
+        assert web.post(f"/api/jobs/{job}/cancel")["state"] in ("cancelling", "cancelled")
+        assert time.monotonic() - began < 1.0, number
+        assert web.post(f"/api/jobs/{job}/cancel")["state"] in ("cancelling", "cancelled")
+        web.job(job, "cancelled")
+        assert time.monotonic() - began < 3.0
+        assert web.get(f"/api/projects/{project}")["status"] == "ready"
+
+
+def test_one_heavy_job_at_a_time_and_the_others_know_their_place(web: Running) -> None:
+    first, second, third = web.sample(), web.sample(), web.sample()
+    folder = behave(web, first, segment="hang")
+    jobs = [run(web, project) for project in (first, second, third)]
+    web.until(lambda: (folder / "hanging").exists())
+    assert [web.get(f"/api/jobs/{job}")["position"] for job in jobs] == [None, 1, 2]
+    assert web.post(f"/api/jobs/{jobs[1]}/cancel")["state"] == "cancelled"
+    web.post(f"/api/jobs/{jobs[0]}/cancel")
+    assert web.job(jobs[2], "done")["state"] == "done"
+
+
+def test_asking_twice_for_the_same_run_is_asking_once(web: Running) -> None:
+    project = web.sample()
+    folder = behave(web, project, segment="hang")
+    job = run(web, project)
+    web.until(lambda: (folder / "hanging").exists())
+    assert run(web, project) == job
+    web.post(f"/api/jobs/{job}/cancel")
+
+
+def test_a_run_needs_a_click_and_known_backends(web: Running) -> None:
+    project = web.sample()
+    assert web.post(f"/api/projects/{project}/run", {"matcher": "magic"}, 422)["kind"] == "input"
+    for item in web.get(f"/api/projects/{project}/objects"):
+        web.delete(f"/api/projects/{project}/objects/{item['id']}")
+    assert web.post(f"/api/projects/{project}/run", {}, 422)["kind"] == "prompt"
+
+
+def test_deleting_a_project_stops_its_job(web: Running) -> None:
+    project = web.sample()
+    folder = behave(web, project, generate="hang")
+    run(web, project)
+    web.until(lambda: (folder / "hanging").exists())
+    web.delete(f"/api/projects/{project}")
+    assert not folder.exists()
+
+
+def test_stopping_the_server_in_order_puts_the_job_back_into_the_queue(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        folder = behave(web, project, generate="hang")
+        job = run(web, project)
+        web.until(lambda: (folder / "hanging").exists())
+    (folder / "behave.json").unlink()
+    with start() as web:
+        assert web.job(job, "done", "failed")["state"] == "done"
+
+
+def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        settings: Settings = web.settings
+    orphan = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"], start_new_session=True)
+    engine = open_engine(settings.database)
+    with writing(engine) as session:
+        lost = Job(project_id=project, kind="run", state="running", created=time.time(), attempts=1, stage="align")
+        lost.worker_pid, lost.worker_started = orphan.pid, started_at(orphan.pid)
+        session.add(lost)
+        session.flush()
+        number = lost.id or 0
+    engine.dispose()
+    with start() as web:
+        assert web.job(number, "done")["attempts"] == 2
+        assert orphan.wait(timeout=5) == -signal.SIGKILL
+
+
+def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        settings: Settings = web.settings
+    engine = open_engine(settings.database)
+    with writing(engine) as session:
+        session.add(Job(project_id=project, kind="run", state="running", created=time.time(), attempts=3))
+    engine.dispose()
+    with start() as web:
+        job = web.get(f"/api/jobs?project={project}")[0]
+        assert (job["state"], job["error"]["kind"]) == ("failed", "interrupted")
+
+
+SERVER = """
+import sys, uvicorn
+from pathlib import Path
+from app.main import create_app
+from app.settings import Settings
+from tests.app.conftest import FAKE_COMMANDS
+settings = Settings(data_dir=Path(sys.argv[1]), min_free_bytes=0, launch_token="t")
+uvicorn.run(create_app(settings, commands=FAKE_COMMANDS), port=0, log_level="error")
+"""
+
+
+def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start: Callable[..., Any], tmp_path: Path) -> None:
+    with start() as web:
+        project = web.sample()
+        folder = behave(web, project, generate="hang")
+        settings: Settings = web.settings
+    engine = open_engine(settings.database)
+    with writing(engine) as session:
+        session.add(Job(project_id=project, kind="run", state="queued", created=time.time()))
+    server = subprocess.Popen([sys.executable, "-c", SERVER, str(settings.data_dir)], cwd=Path(__file__).parents[2])
+    Running.until(lambda: (folder / "hanging").exists())
+    server.kill()
+    server.wait()
+    with writing(engine) as session:
+        (job,) = session.exec(select(Job).where(Job.kind == "run"))
+        assert job.state == "running"
+        worker = job.worker_pid or 0
+    engine.dispose()
+    (folder / "behave.json").unlink()
+    with start() as web:
+        assert web.job(job.id or 0, "done")["attempts"] == 2
+        assert len(web.get(f"/api/projects/{project}/objects")) == 2
+    Running.until(lambda: not _alive(worker))
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"

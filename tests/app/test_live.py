@@ -1,0 +1,157 @@
+import base64
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.app.conftest import ORIGIN, SOCKETS, Running
+
+CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
+
+
+@contextmanager
+def listening(web: Running, project: str | None, **query: Any) -> Iterator[Any]:
+    asked = "&".join(f"{key}={value}" for key, value in {"project": project, **query}.items() if value is not None)
+    with web.client.websocket_connect(f"{SOCKETS}/api/live?{asked}", headers={"origin": ORIGIN}) as socket:
+        yield socket
+
+
+def until(socket: Any, **wanted: Any) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Messages up to the one that has these fields."""
+    seen: list[dict[str, Any]] = []
+    for _ in range(300):
+        message = socket.receive_json()
+        if all(message.get(key) == value for key, value in wanted.items()):
+            return seen, message
+        seen.append(message)
+    raise AssertionError(f"no message with {wanted}: {[m['type'] for m in seen]}")
+
+
+def decoded(mask: dict[str, Any]) -> np.ndarray:
+    """As the browser does it."""
+    bits = np.unpackbits(np.frombuffer(zlib.decompress(base64.b64decode(mask["bits"])), np.uint8))
+    shape = (mask["box_height"], mask["box_width"])
+    return bits[: shape[0] * shape[1]].reshape(shape).astype(bool)
+
+
+def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        with listening(web, project) as socket:
+            assert socket.receive_json()["type"] == "hello"
+            made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+            seen, _ = until(socket, type="segment", object=made["id"], state="done")
+            masks = [m for m in seen if m["type"] == "mask"]
+            assert [m["frame"] for m in masks] == [3, 0, 7]
+            assert masks[0]["mask"]["width"] == 160
+            assert decoded(masks[0]["mask"]).sum() == 100
+            assert any(m["type"] == "segment" and m["restart"] for m in seen)
+            until(socket, type="object")
+    with start() as web:  # kept on disk
+        (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == made["id"]]
+        assert ([f["frame"] for f in lane["frames"]], lane["complete"], lane["source"]) == ([0, 3, 7], True, "live")
+        (shown,) = [m for m in web.get(f"/api/projects/{project}/masks/7") if m["object"] == made["id"]]
+        assert shown["mask"] == masks[2]["mask"]
+
+
+def test_a_newer_click_supersedes_the_masks_of_the_older(web: Running) -> None:
+    project = web.sample()
+    slow = {**CLICK, "x": 155.5}
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [slow]}, 201)
+    address = f"/api/projects/{project}/objects/{made['id']}/points/{made['points'][0]['id']}"
+    web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
+    web.patch(address, {"x": 30.5})
+    web.until(lambda: _object(web, project, made["id"])["segment"] == "done")
+    (mask,) = [m for m in web.get(f"/api/projects/{project}/masks/3") if m["object"] == made["id"]]
+    assert mask["mask"]["left"] == 25
+
+
+def test_undo_brings_the_older_masks_back_without_computing(web: Running) -> None:
+    project = web.sample()
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+    number = made["id"]
+    web.until(lambda: _object(web, project, number)["segment"] == "done")
+    web.patch(f"/api/projects/{project}/objects/{number}/points/{made['points'][0]['id']}", {"x": 30.5})
+    web.until(lambda: _object(web, project, number)["segment"] == "done")
+    back = web.post(f"/api/projects/{project}/undo", {"object": number})["object"]
+    assert (back["segment"], back["mask_frames"]) == ("done", 3)
+
+
+def test_a_batch_of_clicks_waits_to_be_asked(web: Running) -> None:
+    project = web.sample()
+    made = web.post(f"/api/projects/{project}/objects?infer=false", {"category": "drawer", "points": [CLICK]}, 201)
+    assert made["segment"] == "none"
+    assert web.get(f"/api/projects/{project}/live")["state"] == "off"
+    web.post(f"/api/projects/{project}/objects/{made['id']}/segment", status=202)
+    web.until(lambda: _object(web, project, made["id"])["segment"] == "done")
+    assert web.get(f"/api/projects/{project}/live")["state"] == "ready"
+
+
+def test_a_click_that_finds_nothing_says_so_on_the_object(web: Running) -> None:
+    project = web.sample()
+    points = [{**CLICK, "label": 0}, CLICK]
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": points}, 201)
+    web.until(lambda: _object(web, project, made["id"])["segment"] == "failed")
+    assert _object(web, project, made["id"])["notices"] == ["nothing there; click on it"]
+
+
+def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
+    project = web.sample()
+    points = [{**CLICK, "x": 155.5}]
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": points}, 201)
+    web.until(lambda: _object(web, project, made["id"])["mask_frames"] > 0)
+    stopped = web.post(f"/api/projects/{project}/objects/{made['id']}/segment/cancel")
+    assert stopped["segment"] == "partial"
+    assert stopped["mask_frames"] >= 1
+
+
+def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.jobs.live.IDLE_LOOK_S", 0.05)
+    with start(live_idle_s=0.6) as web:
+        project = web.sample()
+        web.post(f"/api/projects/{project}/live/open")
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "off")
+        web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] in ("ready", "off"))
+
+
+def test_a_tab_that_was_away_gets_what_it_missed_or_is_told_to_fetch_anew(web: Running) -> None:
+    project = web.sample()
+    with listening(web, project) as socket:
+        hello = socket.receive_json()
+        assert hello["reset"] is False
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.patch(f"/api/projects/{project}/objects/{number}", {"colour": 7})
+    with listening(web, project, since=hello["seq"], epoch=hello["epoch"]) as socket:
+        assert socket.receive_json()["reset"] is False
+        _, message = until(socket, type="object")
+        assert (message["object"]["colour"], message["seq"] > hello["seq"]) == (7, True)
+    with listening(web, project, since=3, epoch="of-another-server") as socket:
+        assert socket.receive_json()["reset"] is True
+
+
+def test_jobs_reach_every_tab_and_masks_only_those_that_look(web: Running) -> None:
+    first, second = web.sample(), web.sample()
+    with listening(web, second) as socket:
+        socket.receive_json()
+        made = web.post(f"/api/projects/{first}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+        web.until(lambda: _object(web, first, made["id"])["segment"] == "done")
+        web.post(f"/api/projects/{first}/run", {}, 202)
+        seen, message = until(socket, type="job")
+        assert message["job"]["project"] == first
+        assert not [m for m in seen if m["type"] in ("mask", "object", "segment")]
+        socket.send_json({"type": "watch", "project": first})
+        socket.send_text("not json")
+        socket.send_json(["not", "a", "table"])
+        web.until(lambda: web.get(f"/api/jobs?project={first}")[0]["state"] == "done")
+        web.patch(f"/api/projects/{first}/objects/{made['id']}", {"colour": 3})
+        until(socket, type="object")
+
+
+def _object(web: Running, project: str, number: int) -> Any:
+    (found,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["id"] == number]
+    return found

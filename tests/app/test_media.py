@@ -1,0 +1,59 @@
+from tests.app.conftest import Running
+from tests.app.test_jobs import run
+
+
+def test_frames_are_cached_for_ever_under_their_version(web: Running) -> None:
+    project = web.sample()
+    version = web.get(f"/api/projects/{project}")["media_version"]
+    answer = web.client.get(f"/media/{project}/frames/3.jpg?w=100&v={version}")
+    assert answer.headers["content-type"] == "image/jpeg"
+    assert "immutable" in answer.headers["cache-control"]
+    assert "max-age=31536000" in answer.headers["cache-control"]
+    assert "private" in answer.headers["cache-control"]
+    again = web.client.get(f"/media/{project}/frames/3.jpg?w=100", headers={"if-none-match": answer.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert "immutable" not in again.headers["cache-control"]
+
+
+def test_a_frame_comes_at_its_stored_bytes_or_at_a_kept_width(web: Running) -> None:
+    project = web.sample()
+    stored = web.settings.data_dir / "projects" / project / "work" / "capture" / "rgb" / "000003.jpg"
+    assert web.client.get(f"/media/{project}/frames/3.jpg").content == stored.read_bytes()
+    assert web.client.get(f"/media/{project}/frames/3.jpg?w=960").content == stored.read_bytes()  # never enlarged
+    previews = web.settings.data_dir / "projects" / project / "previews"
+    assert not previews.exists()
+    assert web.client.get(f"/media/{project}/thumbnail.jpg").status_code == 200
+
+
+def test_what_is_not_there_is_said_in_the_one_shape(web: Running) -> None:
+    project = web.sample()
+    for path in ("frames/1.jpg", "frames/99.jpg", "depth/1.png", "preview.png", "scene.glb", "bundles/1.zip"):
+        answer = web.client.get(f"/media/{project}/{path}")
+        assert answer.status_code in (404, 409), path
+        assert answer.json()["kind"] in ("not-found", "not-ready")
+
+
+def test_depth_is_a_coloured_picture(web: Running) -> None:
+    answer = web.client.get(f"/media/{web.sample()}/depth/3.png")
+    assert answer.content.startswith(b"\x89PNG")
+
+
+def test_a_bundle_download_can_go_on_where_it_stopped_and_is_known_by_its_checksum(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    (bundle,) = web.get(f"/api/projects/{project}/bundles")
+    whole = web.client.get(bundle["url"])
+    assert whole.headers["accept-ranges"] == "bytes"
+    assert whole.headers["etag"] == f'"{bundle["sha256"]}"'
+    assert bundle["file_name"] in whole.headers["content-disposition"]
+    assert len(whole.content) == bundle["size"]
+    tail = web.client.get(bundle["url"], headers={"range": "bytes=100-", "if-range": whole.headers["etag"]})
+    assert (tail.status_code, tail.content) == (206, whole.content[100:])
+
+
+def test_the_report_may_not_run_anything(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    policy = web.client.get(f"/media/{project}/report.html").headers["content-security-policy"]
+    assert policy.startswith("sandbox;")
+    assert "script-src" not in policy

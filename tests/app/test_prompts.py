@@ -1,0 +1,148 @@
+from collections.abc import Callable
+from typing import Any
+
+from tests.app.conftest import Running
+
+CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
+
+
+def test_a_click_is_stored_and_undone_and_redone_also_after_a_restart(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+        assert made["name"] == "drawer_2"
+        number = made["id"]
+        web.post(f"/api/projects/{project}/objects/{number}/points", {**CLICK, "x": 20.0, "label": 0}, 201)
+        edited = web.patch(f"/api/projects/{project}/objects/{number}", {"name": "top_drawer", "category": "cabinet"})
+        assert (edited["name"], edited["category"], len(edited["points"])) == ("top_drawer", "cabinet", 2)
+        undone = web.post(f"/api/projects/{project}/undo", {"object": number})
+        assert undone["object"]["name"] == "drawer_2"
+    with start() as web:
+        (kept,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["id"] == number]
+        assert (kept["name"], len(kept["points"]), kept["can_undo"], kept["can_redo"]) == ("drawer_2", 2, True, True)
+        undone = web.post(f"/api/projects/{project}/undo", {"object": number})
+        assert (len(undone["object"]["points"]), undone["frame"]) == (1, 3)
+        redone = web.post(f"/api/projects/{project}/redo", {"object": number})
+        assert [p["id"] for p in redone["object"]["points"]] == [p["id"] for p in kept["points"]]
+        redone = web.post(f"/api/projects/{project}/redo", {"object": number})
+        assert redone["object"]["name"] == "top_drawer"
+        web.post(f"/api/projects/{project}/redo", {"object": number}, 409)
+
+
+def test_undo_of_the_project_takes_the_last_change_of_any_object(web: Running) -> None:
+    project = web.sample()
+    first, second = (o["id"] for o in web.get(f"/api/projects/{project}/objects"))
+    web.post(f"/api/projects/{project}/objects/{first}/points", CLICK, 201)
+    web.post(f"/api/projects/{project}/objects/{second}/points", CLICK, 201)
+    web.patch(f"/api/projects/{project}/objects/{first}", {"category": "oven"})
+    assert web.post(f"/api/projects/{project}/undo", {})["object"]["id"] == first
+    assert web.post(f"/api/projects/{project}/undo", {})["object"]["id"] == second
+    assert web.post(f"/api/projects/{project}/redo", {})["object"]["id"] == second
+    assert web.post(f"/api/projects/{project}/redo", {})["object"]["category"] == "oven"
+
+
+def test_a_new_change_ends_what_could_be_redone(web: Running) -> None:
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.post(f"/api/projects/{project}/objects/{number}/points", CLICK, 201)
+    web.post(f"/api/projects/{project}/undo", {"object": number})
+    changed = web.patch(f"/api/projects/{project}/objects/{number}", {"category": "oven"})
+    assert not changed["can_redo"]
+    web.post(f"/api/projects/{project}/redo", {"object": number}, 409)
+
+
+def test_a_deleted_object_comes_back_whole(web: Running) -> None:
+    project = web.sample()
+    before = web.get(f"/api/projects/{project}/objects")[0]
+    assert web.delete(f"/api/projects/{project}/objects/{before['id']}")["deleted"]
+    assert len(web.get(f"/api/projects/{project}/objects")) == 1
+    back = web.post(f"/api/projects/{project}/undo", {"object": before["id"]})["object"]
+    assert (back["name"], back["points"], back["deleted"]) == (before["name"], before["points"], False)
+
+
+def test_undoing_a_deletion_whose_name_was_taken_says_so(web: Running) -> None:
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.delete(f"/api/projects/{project}/objects/{number}")
+    web.post(f"/api/projects/{project}/objects", {"name": "drawer_1", "category": "drawer"}, 201)
+    error = web.post(f"/api/projects/{project}/undo", {"object": number}, 409)
+    assert "drawer_1" in error["message"]
+
+
+def test_points_move_flip_and_go(web: Running) -> None:
+    project = web.sample()
+    made = web.get(f"/api/projects/{project}/objects")[0]
+    base, point = f"/api/projects/{project}/objects/{made['id']}", made["points"][0]["id"]
+    moved = web.patch(f"{base}/points/{point}", {"x": 10.25, "label": 0})["points"][0]
+    assert (moved["x"], moved["y"], moved["label"]) == (10.25, 60.5, 0)
+    assert web.delete(f"{base}/points/{point}")["points"] == []
+    web.delete(f"{base}/points/{point}", 404)
+
+
+def test_a_click_outside_the_recording_is_refused_in_one_line(web: Running) -> None:
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    for wrong, words in (({"x": 160.0}, "outside"), ({"y": -0.5}, "outside"), ({"frame": 1}, "no frame 1")):
+        error = web.post(f"/api/projects/{project}/objects/{number}/points", {**CLICK, **wrong}, 422)
+        assert error["kind"] == "prompt"
+        assert words in error["message"]
+    assert len(web.get(f"/api/projects/{project}/objects")[0]["points"]) == 1
+
+
+def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    assert "mug_1" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "mug_1"}, 422)["message"]
+    assert web.patch(f"/api/projects/{project}/objects/{number}", {"name": "a b"}, 422)["kind"] == "prompt"
+    web.post(f"/api/projects/{project}/objects", {"name": "MUG_1"}, 422)
+
+
+def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) -> None:
+    project = web.sample()
+    seen = web.get(f"/api/projects/{project}/objects")[0]
+    address = f"/api/projects/{project}/objects/{seen['id']}"
+    web.patch(address, {"category": "oven", "version": seen["version"]})
+    error = web.patch(address, {"category": "hood", "version": seen["version"]}, 409)
+    assert (error["kind"], error["current"]["category"]) == ("conflict", "oven")
+
+
+def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
+    project = web.sample()
+    made = web.post(f"/api/projects/{project}/objects", {"category": "  tea   pot "}, 201)
+    assert (made["name"], made["category"]) == ("tea_pot_1", "tea pot")
+    assert any("tea pot" in notice for notice in made["notices"])
+
+
+def test_prompts_file_goes_out_and_in(web: Running) -> None:
+    project = web.sample()
+    file = web.get(f"/api/projects/{project}/prompts.json")
+    assert file["objects"][0] == {"name": "drawer_1", "category": "drawer", "points": [CLICK]}
+    file["objects"][0]["points"].append({**CLICK, "x": 1.5})
+    file["objects"].append({"name": "new_1", "category": "oven", "points": [CLICK]})
+    assert len(web.post(f"/api/projects/{project}/prompts.json", file)) == 3
+    objects = {o["name"]: o for o in web.get(f"/api/projects/{project}/objects")}
+    assert (len(objects["drawer_1"]["points"]), len(objects)) == (2, 3)
+    twice = {"version": 1, "objects": [file["objects"][0], file["objects"][0]]}
+    assert web.post(f"/api/projects/{project}/prompts.json", twice, 422)["kind"] == "prompt"
+
+
+def test_history_says_who_did_what_and_what_was_undone(web: Running) -> None:
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.post(f"/api/projects/{project}/objects/{number}/points", CLICK, 201)
+    web.post(f"/api/projects/{project}/undo", {"object": number})
+    undo, click, *_ = web.get(f"/api/projects/{project}/history?object={number}")
+    assert (undo["action"], click["action"], click["who"], click["undone"]) == ("undo", "add point", "tester", True)
+
+
+def test_two_people_clicking_at_once_lose_nothing(web: Running) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    project = web.sample()
+    number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    address = f"/api/projects/{project}/objects/{number}/points?infer=false"
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda x: web.post(address, {**CLICK, "x": float(x)}, 201), range(12)))
+    kept = web.get(f"/api/projects/{project}/objects")[0]
+    assert sorted(p["x"] for p in kept["points"]) == [*range(12), 80.5]
+    assert kept["version"] == 2 + 12

@@ -1,0 +1,202 @@
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.serve import register_finished
+from tests.app.conftest import Running
+from tests.app.nouns import finish
+from tests.app.test_jobs import run
+
+
+@pytest.fixture
+def reviewed(web: Running) -> tuple[Running, str, int]:
+    """A project whose drawer_1 is finished: the app, the project, the object."""
+    project = web.sample()
+    web.job(run(web, project), "done")
+    finish(web.settings.data_dir / "projects" / project / "work")
+    (drawer,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "drawer_1"]
+    return web, project, drawer["id"]
+
+
+Reviewed = tuple[Running, str, int]
+
+
+def overrides(web: Running, project: str) -> Any:
+    path = web.settings.data_dir / "projects" / project / "work" / "overrides.json"
+    return json.loads(path.read_text())["objects"].get("drawer_1", {})
+
+
+def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    (group,) = web.get(f"/api/projects/{project}/candidates")
+    assert (group["object"], group["chosen"], group["chosen_by"], group["reason"]) == (
+        number,
+        "c0",
+        "consensus",
+        "closest to the others",
+    )
+    assert [c["id"] for c in group["candidates"]] == ["c0", "c1"]
+    assert group["candidates"][0]["metrics"] == {"volume": 1.0}  # what is not a number is left out
+    assert (group["placement"]["candidate"], group["placement"]["rms_m"], group["placement"]["votes"]) == (
+        "c0",
+        0.004,
+        {"3": 12, "7": 18},
+    )
+    web.get(f"/api/projects/{project}/objects/{number + 1}/candidates", 409)
+
+
+def test_a_candidates_mesh_and_picture_are_made_once_and_cached(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    (first, second) = web.get(f"/api/projects/{project}/objects/{number}/candidates")["candidates"]
+    mesh = web.client.get(first["glb"])
+    assert mesh.content.startswith(b"glTF")
+    assert "immutable" in mesh.headers["cache-control"]
+    assert web.client.get(second["thumbnail"]).content.startswith(b"\x89PNG")
+    assert web.client.get(f"/media/{project}/candidates/{number}/c9.glb").status_code == 404
+
+
+def test_accepting_the_chosen_one_is_recorded_and_needs_no_run(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    said = web.post(
+        f"/api/projects/{project}/objects/{number}/verdicts", {"candidate": "c0", "verdict": "accepted", "reason": "fits"}
+    )
+    assert (said["job"], said["group"]["accepted"]) == (None, "c0")
+    assert said["group"]["candidates"][0]["verdict_by"] == "tester"
+    assert web.get(f"/api/projects/{project}")["counts"]["accepted"] == 1
+
+
+def test_accepting_another_one_overrides_the_choice_and_runs(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    said = web.post(f"/api/projects/{project}/objects/{number}/verdicts", {"candidate": "c1", "verdict": "accepted"})
+    assert (said["group"]["chosen"], said["group"]["chosen_by"]) == ("c1", "person")
+    web.job(said["job"]["id"], "done")
+    assert overrides(web, project) == {"candidate": "c1"}
+
+
+def test_rejecting_is_recorded_with_its_reason_and_makes_new_ones(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    body = {"candidate": "c0", "verdict": "rejected", "reason": "the handle is missing"}
+    said = web.post(f"/api/projects/{project}/objects/{number}/verdicts", body)
+    assert said["group"]["candidates"][0]["verdict_reason"] == "the handle is missing"
+    web.job(said["job"]["id"], "done")
+    assert overrides(web, project) == {"rejected": ["c0"]}
+
+
+def test_verdicts_are_undone_and_redone_apart_from_clicks(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
+    web.post(f"{address}/verdicts", {"candidate": "c1", "verdict": "accepted", "rerun": False})
+    web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
+    group = web.get(f"{address}/candidates")
+    assert (group["accepted"], group["override"]["rejected"], group["override"]["candidate"]) == (None, ["c0"], None)
+    assert group["can_redo"]
+    web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
+    assert web.get(f"{address}/override")["rejected"] == []
+    web.post(f"/api/projects/{project}/redo", {"object": number, "scope": "review"})
+    assert web.get(f"{address}/candidates")["candidates"][0]["verdict"] == "rejected"
+    assert web.get(f"/api/projects/{project}/objects")[0]["points"]  # the clicks stay
+
+
+def test_a_verdict_can_be_taken_back(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "cleared", "rerun": False})
+    group = web.get(f"{address}/candidates")
+    assert (group["candidates"][0]["verdict"], group["override"]["rejected"]) == (None, [])
+    web.post(f"{address}/verdicts", {"candidate": "c7", "verdict": "rejected"}, 404)
+
+
+def test_corrections_are_checked_kept_and_cleared(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}/override"
+    web.patch(address, {"hinge": "left", "dimensions_m": [0.5, 0.6, 0.2], "rerun": False})
+    web.patch(address, {"dimensions_m": None, "rerun": False})
+    assert (web.get(address)["hinge"], web.get(address)["dimensions_m"]) == ("left", None)
+    for wrong in (
+        {"dimensions_m": [0.5, -0.6, 0.2]},
+        {"joint_lower": 1.0, "joint_upper": 0.5},
+        {"pose": [[1.0, 0.0], [0.0, 1.0]]},
+        {"candidate": "c9"},
+        {"candidate": "/etc/passwd"},
+        {"candidate": "pyproject.toml"},
+        {"joint_lower": 0.2},
+    ):
+        assert web.patch(address, wrong, 422)["kind"] == "override", wrong
+    outside = f"{web.settings.data_dir}/projects/{project}/uploads/../frames.json"
+    assert web.patch(address, {"candidate": outside}, 403)["kind"] == "forbidden"
+    assert web.patch(address, {"hinge": "diagonal"}, 422)["kind"] == "invalid"
+
+
+def test_an_uploaded_mesh_is_a_candidate(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}/candidates"
+    said = web.post(f"{address}?filename=../../mine.glb&rerun=false", content=b"glTF123", status=201)
+    path = said["group"]["override"]["candidate"]
+    assert path.startswith(str(web.settings.data_dir / "projects" / project / "uploads"))
+    assert web.post(f"{address}?filename=x.exe", content=b"MZ", status=422)["kind"] == "override"
+    assert web.post(f"{address}?filename=x.glb", content=b"", status=422)["kind"] == "override"
+
+
+def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    scene = web.get(f"/api/projects/{project}/scene")
+    (item,) = scene["items"]
+    assert (item["object"], item["dimensions_m"], item["mask_frames"], item["placement_rms_m"]) == (
+        number,
+        [0.5, 0.6, 0.2],
+        2,
+        0.004,
+    )
+    (joint,) = item["joints"]
+    assert (joint["name"], joint["upper"], joint["sources"]["limits"]) == ("drawer_1_slide", 0.4, "default")
+    assert scene["stages"] == [{"name": "segment", "backend": "fake", "seconds": 2.0}]
+    assert web.client.get(scene["glb"]).status_code == 200
+
+
+def test_masks_of_the_last_run_are_shown_while_its_clicks_are(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == number]
+    assert ([f["frame"] for f in lane["frames"]], lane["source"]) == ([3, 7], "run")
+    (shown,) = web.get(f"/api/projects/{project}/masks/7")
+    assert (shown["confidence"], shown["mask"]["box_width"]) == (0.4, 40)
+    click = {"frame": 3, "x": 1.0, "y": 1.0, "label": 0}
+    web.post(f"/api/projects/{project}/objects/{number}/points?infer=false", click, 201)
+    assert web.get(f"/api/projects/{project}/masks/7") == []
+
+
+def test_a_finished_workspace_becomes_a_project_once(start: Callable[..., Any], tmp_path: Path) -> None:
+    work = tmp_path / "demo" / "work"
+    work.mkdir(parents=True)
+    finish(work)
+    (work / "bundle.zip").write_bytes(b"PK")
+    prompts = tmp_path / "prompts.json"
+    points = [{"frame": 3, "x": 80.0, "y": 60.0, "label": 1}]
+    prompts.write_text(json.dumps({"version": 1, "objects": [{"name": "drawer_1", "category": "drawer", "points": points}]}))
+    given = {"name": "Sample kitchen", "source": tmp_path / "scan.r3d", "prompts": prompts, "workdir": work}
+    project = register_finished(tmp_path / "data", **given)
+    assert register_finished(tmp_path / "data", **given) == project
+    with start() as web:
+        (found,) = web.get("/api/projects")
+        assert (found["id"], found["status"], found["counts"]["objects"], found["result"]) == (project, "ready", 1, "current")
+        assert web.get(f"/api/projects/{project}/objects")[0]["segment"] == "done"
+        assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
+        web.delete(f"/api/projects/{project}")
+    assert work.exists()  # outside the data folder: not ours to delete
+
+
+def test_only_what_changes_the_result_makes_it_stale(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted"})
+    web.patch(f"/api/projects/{project}", {"name": "another name"})
+    web.patch(address, {"colour": 5})
+    assert web.get(f"/api/projects/{project}")["result"] == "current"
+    web.patch(f"{address}/override", {"hinge": "left", "rerun": False})
+    assert web.get(f"/api/projects/{project}")["result"] == "stale"
+    web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
+    assert web.get(f"/api/projects/{project}")["result"] == "current"

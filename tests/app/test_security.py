@@ -1,0 +1,156 @@
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from app.security import COOKIE, Keys
+from tests.app.conftest import ORIGIN, SOCKETS, Running
+
+
+def fresh(web: Running, **options: Any) -> TestClient:
+    """A browser without a session, on the same app."""
+    return TestClient(web.app, base_url=options.pop("base_url", ORIGIN), raise_server_exceptions=False, **options)
+
+
+def refused(code: int) -> Any:
+    return pytest.raises(WebSocketDisconnect, check=lambda error: error.code == code)
+
+
+def test_without_a_session_nothing_is_shown(web: Running) -> None:
+    other = fresh(web, headers={"X-Requested-With": "tests"})
+    for path in (
+        "/api/projects",
+        "/api/system",
+        "/api/openapi.json",
+        "/media/x/thumbnail.jpg",
+        "/viewer/t/",
+        "/p/x/annotate",
+        "/",
+    ):
+        assert other.get(path).status_code == 401, path
+    assert other.post("/api/projects/sample", json={}).status_code == 401
+    assert other.get("/api/health").json() == {"state": "ok"}
+
+
+def test_the_printed_token_becomes_a_cookie_and_leaves_the_address(web: Running) -> None:
+    other = fresh(web)
+    answer = other.get(f"/p/abc/annotate?token={web.settings.launch_token}", follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/p/abc/annotate")
+    cookie = answer.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=lax" in cookie
+    assert other.get("/api/projects").status_code == 200
+
+
+@pytest.mark.parametrize("token", ["", "wrong", "x" * 10_000, "é"])
+def test_a_wrong_token_opens_nothing(web: Running, token: str) -> None:
+    answer = fresh(web).get("/", params={"token": token}, follow_redirects=False)
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
+
+
+@pytest.mark.parametrize("value", ["", "x", "x.y", "." * 50, f"{'a' * 22}.{'0' * 64}", "ä.ö"])
+def test_a_made_up_cookie_is_no_session(web: Running, value: str) -> None:
+    other = fresh(web)
+    assert other.get("/api/projects", headers={"cookie": f"{COOKIE}={value}".encode()}).status_code == 401
+
+
+def test_a_session_outlives_the_server(start: Callable[..., Any]) -> None:
+    with start() as web:
+        cookie = web.client.cookies[COOKIE]
+    with start() as web:
+        other = fresh(web, cookies={COOKIE: cookie})
+        assert other.get("/api/projects").status_code == 200
+
+
+def test_the_signing_key_is_readable_by_its_owner_only(tmp_path: Path) -> None:
+    Keys(tmp_path)
+    assert (tmp_path / "session.key").stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[::1", "localhost.evil:8000", "10.0.0.7:8000"])
+def test_other_hosts_are_not_answered(web: Running, host: str) -> None:
+    assert web.client.get("/api/projects", headers={"host": host}).status_code == 421
+
+
+@pytest.mark.parametrize("host", ["localhost:8000", "127.0.0.1", "[::1]:8000", "LOCALHOST:1"])
+def test_loopback_names_are(web: Running, host: str) -> None:
+    assert web.client.get("/api/health", headers={"host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "http://localhost:8000"])
+def test_requests_from_other_sites_are_refused(web: Running, origin: str) -> None:
+    for method, path in (("POST", "/api/projects/sample"), ("GET", "/api/projects"), ("DELETE", "/api/projects/x")):
+        answer = web.client.request(method, path, headers={"origin": origin})
+        assert answer.status_code == 403, (method, path)
+        assert answer.json()["kind"] == "forbidden"
+
+
+def test_unsafe_requests_need_the_header_that_forms_cannot_send(web: Running) -> None:
+    del web.client.headers["X-Requested-With"]
+    for method in ("POST", "PATCH", "PUT", "DELETE"):
+        answer = web.client.request(method, "/api/projects/x", headers={"origin": ORIGIN})
+        assert answer.status_code == 403, method
+    assert web.client.get("/api/projects").status_code == 200
+
+
+@pytest.mark.parametrize("headers", [{}, {"origin": "http://evil.example"}, {"origin": "null"}])
+def test_sockets_need_our_origin(web: Running, headers: dict[str, str]) -> None:
+    for path in ("/api/live", "/viewer/token"):
+        with (
+            refused(4403),
+            web.client.websocket_connect(SOCKETS + path, headers=headers),
+        ):
+            pass
+
+
+def test_a_socket_needs_a_session(web: Running) -> None:
+    with (
+        refused(4401),
+        fresh(web).websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN}),
+    ):
+        pass
+
+
+def test_every_answer_carries_the_safe_headers(web: Running) -> None:
+    for path in ("/", "/api/projects", "/static/index.html", "/nowhere", "/api/projects/none"):
+        headers = web.client.get(path).headers
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "same-origin"
+        policy = headers["content-security-policy"]
+        assert "script-src 'self';" in policy
+        assert "unsafe" not in policy
+        assert "frame-ancestors 'self'" in policy
+
+
+ESCAPES = (
+    "/static/../app/main.py",
+    "/static/%2e%2e/pyproject.toml",
+    "/static/js/..%2f..%2fpackage.json",
+    "/static/package.json",
+    "/static/node_modules/typescript/package.json",
+    "/media/../../etc/passwd",
+    "/media/x/frames/..%2f..%2f1.jpg",
+    "/media/PROJECT/candidates/1/..%2f..%2f..%2fframes.glb",
+    "/media/PROJECT/candidates/1/%2e%2e%2fx.png",
+    "/media/PROJECT/bundles/..%2f1.zip",
+    "/media/PROJECT/frames/-1.jpg",
+    "/viewer/..%2f..%2fetc/passwd",
+    "/viewer/x/..%2f..%2fetc%2fpasswd",
+)
+
+
+def test_no_path_leads_out(web: Running) -> None:
+    project = web.sample()
+    for path in ESCAPES:
+        answer = web.client.get(path.replace("PROJECT", project))
+        assert 400 <= answer.status_code < 500, path
+        assert b"root:" not in answer.content
+
+
+def test_the_key_to_the_app_is_not_told_twice(web: Running) -> None:
+    assert web.settings.launch_token not in web.client.get("/api/system").text
+    assert web.settings.launch_token not in web.client.get("/api/openapi.json").text

@@ -1,0 +1,166 @@
+import http.client
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+from websockets.sync.client import connect
+
+from app.settings import Settings
+from app.viewer import contract
+from app.viewer.client import Viewer
+from tests.app.conftest import ORIGIN, SOCKETS, Running, fake, running
+from tests.app.nouns import finish
+from tests.app.test_jobs import run
+
+PROTOCOL = "viser-v1.1.1"
+
+
+@pytest.fixture
+def seen(tmp_path: Path) -> Iterator[Running]:
+    """An app whose viewer is a fake upstream that echoes."""
+    viewer = Viewer(Settings(data_dir=tmp_path / "data"), fake("viewer"))
+    with running(tmp_path / "data", viewer=viewer) as web:
+        yield web
+
+
+def test_the_page_comes_through_with_what_it_needs_to_live_in_a_frame(seen: Running) -> None:
+    session = seen.post(f"/api/projects/{seen.sample()}/viewer")
+    assert session["state"] == "ready"
+    page = seen.client.get(session["url"])
+    assert page.text.startswith("<html><head><script>document.hasFocus=()=>true</script><style>")
+    assert "[data-floating-window]" in page.text
+    policy = page.headers["content-security-policy"]
+    assert "worker-src blob:" in policy
+    assert "frame-ancestors 'self'" in policy
+    assert page.headers["x-content-type-options"] == "nosniff"
+
+
+def test_messages_go_both_ways_under_the_clients_own_protocol(seen: Running) -> None:
+    url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
+    with seen.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
+        assert socket.accepted_subprotocol == PROTOCOL
+        socket.send_bytes(b"\0\1" * 40_000)
+        assert socket.receive_bytes() == b"\0\1" * 40_000
+        socket.send_text("hello")
+        assert socket.receive_text() == "hello"
+
+
+def test_a_token_serves_the_session_it_was_made_for_only(seen: Running) -> None:
+    url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"]
+    other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
+    other.get(f"/?token={seen.settings.launch_token}")
+    assert other.get(url).status_code == 403
+    opening = other.websocket_connect(SOCKETS + url.rstrip("/"), headers={"origin": ORIGIN})
+    with pytest.raises(WebSocketDisconnect) as refused, opening:
+        pass
+    assert refused.value.code == 4403
+    assert seen.client.get("/viewer/madeup/").status_code == 403
+
+
+def test_the_same_session_gets_the_same_token(seen: Running) -> None:
+    project = seen.sample()
+    assert seen.post(f"/api/projects/{project}/viewer")["url"] == seen.post(f"/api/projects/{project}/viewer")["url"]
+
+
+def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
+    project = seen.sample()
+    url = seen.post(f"/api/projects/{project}/viewer")["url"]
+    seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud", "opacity": 0.123}, 503)  # the fake dies of it
+    answer = seen.client.get(url)
+    assert (answer.status_code, answer.json()["kind"]) == (503, "unavailable")
+    assert seen.post(f"/api/projects/{project}/viewer")["url"] == url
+    assert seen.client.get(url).status_code == 200
+
+
+def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any], tmp_path: Path) -> None:
+    broken = Viewer(Settings(data_dir=tmp_path / "data"), (sys.executable, "-c", "raise SystemExit(3)"))
+    with start(viewer=broken) as web:
+        project = web.sample()
+        web.job(run(web, project), "done")
+        session = web.post(f"/api/projects/{project}/viewer")
+        assert (session["state"], session["url"]) == ("down", None)
+        assert session["message"]
+        assert web.client.get(session["fallback_glb"]).status_code == 200
+        assert web.client.get(session["fallback_image"]).status_code == 200
+
+
+def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> None:
+    viewer = Viewer(Settings(data_dir=tmp_path / "data", viewer_idle_s=0.0), fake("viewer"))
+    with running(tmp_path / "data", viewer=viewer) as web:
+        project = web.sample()
+        url = web.post(f"/api/projects/{project}/viewer")["url"]
+        opening = web.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN})
+        with opening as socket:
+            viewer.close_idle()
+            socket.send_text("still there")
+            assert socket.receive_text() == "still there"
+            assert web.client.get(url).status_code == 200
+        web.until(lambda: not any(viewer._watching.values()))
+        viewer.close_idle()
+        assert web.client.get(url).status_code == 503
+        assert web.post(f"/api/projects/{project}/viewer")["url"] == url
+        assert web.client.get(url).status_code == 200
+
+
+def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
+    project = seen.sample()
+    seen.post(f"/api/projects/{project}/viewer")
+    shown = seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud"})
+    assert shown["mode"] == "cloud"
+    moved = seen.post(f"/api/projects/{project}/viewer/joints", {"values": {"door": 0.5}})
+    assert moved["joints"] == [{"name": "door", "lower": 0.0, "upper": 1.0, "value": 0.5}]
+    assert seen.post(f"/api/projects/{project}/viewer/show", {"mode": "dance"}, 422)["kind"] == "invalid"
+
+
+def test_the_installed_viser_keeps_the_contract() -> None:
+    assert contract.check() == []
+
+
+def test_the_raw_port_takes_only_those_who_know_the_key() -> None:
+    server = contract.open_server("the-key")
+    try:
+        port = server.get_port()
+        assert _status(port, {}) == 403
+        assert _status(port, {contract.KEY_HEADER: "guess"}) == 403
+        assert _status(port, {contract.KEY_HEADER: "the-key"}) == 200
+        with pytest.raises(Exception, match="403"):
+            connect(f"ws://127.0.0.1:{port}/", subprotocols=[PROTOCOL], origin="http://evil.example", proxy=None)  # type: ignore[list-item,arg-type]
+        key = {contract.KEY_HEADER: "the-key"}
+        with connect(f"ws://127.0.0.1:{port}/", subprotocols=[PROTOCOL], additional_headers=key, proxy=None) as socket:  # type: ignore[list-item]
+            assert socket.subprotocol == PROTOCOL
+    finally:
+        server.stop()
+
+
+def _status(port: int, headers: dict[str, str]) -> int:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    try:
+        connection.request("GET", "/", headers=headers)
+        return connection.getresponse().status
+    finally:
+        connection.close()
+
+
+def test_the_real_viewer_shows_the_scan_a_candidate_the_placement_and_a_scene_that_moves(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    finish(web.settings.data_dir / "projects" / project / "work")
+    (drawer,) = [o["id"] for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "drawer_1"]
+    url = web.post(f"/api/projects/{project}/viewer")["url"]
+    assert "document.hasFocus" in web.client.get(url).text
+    show = f"/api/projects/{project}/viewer/show"
+    assert "500 of 500 points" in web.post(show, {"mode": "cloud"})["text"]
+    assert "c1" in web.post(show, {"mode": "candidate", "object": drawer, "candidate": "c1"})["text"]
+    assert "1 placed mesh" in web.post(show, {"mode": "aligned", "opacity": 0.5})["text"]
+    scene = web.post(show, {"mode": "scene", "collision": True})
+    assert scene["joints"] == [{"name": "drawer_1_slide", "lower": 0.0, "upper": 0.4, "value": 0.0}]
+    moved = web.post(f"/api/projects/{project}/viewer/joints", {"values": {"drawer_1_slide": 9.0}})
+    assert moved["joints"][0]["value"] == 0.4  # clamped
+    web.post(f"/api/projects/{project}/viewer/joints", {"values": {"absent": 1.0}}, 422)
+    web.post(show, {"mode": "aligned", "object": drawer + 1}, 422)
+    with web.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
+        assert len(socket.receive_bytes()) > 0

@@ -1,0 +1,137 @@
+"""The journey: project, import, click, run, review, accept, download; in a real Chromium."""
+
+import json
+import os
+import re
+import zipfile
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: the journey leaves a screenshot of every page there
+LONG_MS = 600_000  # the pipeline on two busy cores
+
+
+def picture(page: Page, name: str) -> None:
+    if PICTURES:
+        page.screenshot(path=f"{PICTURES}/{name}.png", timeout=LONG_MS)  # a software GL is slow
+
+
+def click_of(sample: Path, category: str) -> tuple[int, float, float]:
+    for item in json.loads((sample / "prompts.json").read_text())["objects"]:
+        if item["category"] == category:
+            point = item["points"][0]
+            return point["frame"], point["x"], point["y"]
+    raise AssertionError(category)
+
+
+def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
+    """Click a pixel of the stored frame (480 x 360), wherever it is drawn."""
+    canvas = page.locator("r2c2r-frame-canvas canvas")
+    box = canvas.bounding_box()
+    assert box
+    scale = min(box["width"] / 480, box["height"] / 360)
+    left, top = (box["width"] - 480 * scale) / 2, (box["height"] - 360 * scale) / 2
+    canvas.click(position={"x": left + x * scale, "y": top + y * scale}, button=button)  # type: ignore[arg-type]
+
+
+def seek(page: Page, frame: int) -> None:
+    page.goto(re.sub(r"/annotate.*", f"/annotate?frame={frame}", page.url))
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text(f"frame {frame} ")
+
+
+def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Path) -> None:
+    # Projects: the empty state offers the sample
+    expect(page.get_by_role("button", name="Open the sample kitchen")).to_be_visible()
+    picture(page, "1-projects-empty")
+
+    # Import by upload
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Import a scan").first.click()
+    chooser.value.set_files(sample / "scan.r3d")
+    page.wait_for_url(re.compile(r"/p/\w+"))
+    page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
+    expect(page.get_by_text("480 × 360")).to_be_visible()
+    picture(page, "2-overview")
+
+    # Annotate: click, mask, name; a wrong click is undone
+    page.get_by_role("link", name="Annotate").click()
+    page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
+    frame, x, y = click_of(sample, "drawer")
+    seek(page, frame)
+    page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
+    click_frame(page, x, y)
+    expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
+    expect(page.locator("r2c2r-object-list")).to_contain_text(re.compile(r"1 click · \d+ frames"), timeout=LONG_MS)
+    picture(page, "3-annotate")
+    click_frame(page, 240, 20, button="right")
+    expect(page.locator("r2c2r-object-list")).to_contain_text("2 clicks")
+    page.keyboard.press("Control+z")
+    expect(page.locator("r2c2r-object-list")).to_contain_text("1 click ")
+    page.reload()  # nothing is lost
+    expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
+    page.get_by_role("button", name="drawer_1", exact=True).click()
+    page.get_by_label("Name of drawer_1").fill("top_drawer")
+    page.get_by_label("Name of drawer_1").press("Enter")
+    expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
+
+    # Run with live progress
+    page.get_by_role("link", name="Run", exact=True).click()
+    page.get_by_role("button", name="Run", exact=True).click()
+    expect(page.locator("r2c2r-job")).to_contain_text("segment")
+    picture(page, "4-running")
+    page.get_by_role("heading", name="Result").wait_for(timeout=LONG_MS)
+    expect(page.get_by_role("row", name=re.compile("top_drawer"))).to_contain_text("prismatic")
+    expect(page.get_by_role("heading", name=re.compile("Certificate"))).to_contain_text("passed")
+    picture(page, "5-result")
+
+    # Review: the viewer shows through our own origin; accept
+    page.get_by_role("link", name="Review").first.click()
+    expect(page.locator("iframe")).to_have_attribute("src", re.compile(r"^/viewer/\w"))
+    expect(page.frame_locator("iframe").locator("canvas").first).to_be_visible(timeout=60_000)
+    expect(page.get_by_label("top_drawer", exact=False).first).to_be_attached()
+    page.get_by_role("button", name="Open all").wait_for(timeout=60_000)
+    page.get_by_role("button", name="Open all").click()
+    page.wait_for_timeout(3000)
+    picture(page, "6-review-scene")
+    page.get_by_role("button", name=re.compile("^Accept")).first.click()
+    expect(page.get_by_text("1 of 1 object accepted")).to_be_visible(timeout=LONG_MS)
+    page.keyboard.press("2")
+    page.wait_for_timeout(3000)
+    picture(page, "7-review-aligned")
+
+    # Download
+    page.get_by_role("link", name="Download").first.click()
+    with page.expect_download() as download:
+        page.get_by_role("link", name=re.compile("^Bundle")).click()
+    saved = tmp_path / "bundle.zip"
+    download.value.save_as(saved)
+    picture(page, "8-download")
+    with zipfile.ZipFile(saved) as bundle:
+        assert bundle.testzip() is None
+        names = {name.removeprefix(f"{Path(bundle.namelist()[0]).parts[0]}/") for name in bundle.namelist()}
+        assert {"scene.urdf", "scene.xml", "scene.glb", "manifest.json", "report.html"} <= names | set(bundle.namelist())
+
+
+def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_path: Path) -> None:
+    page.goto(address)
+    bad = tmp_path / "notes.r3d"
+    bad.write_bytes(b"these are not the frames you are looking for")
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Import a scan").first.click()
+    chooser.value.set_files(bad)
+    message = page.get_by_role("alert").or_(page.locator(".toast.bad"))
+    expect(message.first).to_contain_text("notes.r3d", timeout=60_000)
+    picture(page, "9-refused")
+
+
+def test_the_help_lists_the_keys_and_dark_mode_is_kept(page: Page, address: str) -> None:
+    page.goto(address)
+    page.keyboard.press("?")
+    expect(page.get_by_role("heading", name="Keyboard and mouse")).to_be_visible()
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Dark or light").click()
+    theme = page.evaluate("document.documentElement.dataset.theme")
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("data-theme", theme)
+    picture(page, "10-other-theme")

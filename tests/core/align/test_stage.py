@@ -1,0 +1,160 @@
+"""A candidate in a random frame and unit comes back to where it stands."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.errors import Cancelled, InputError, PlacementFailed
+from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.progress import Progress
+
+MUG = Path(__file__).resolve().parents[3] / "../shared/data/meshes/ycb-025_mug"
+CONFIG = AlignConfig()
+LIGHT = AlignConfig(views=6, match_photos=4, match_views=50, settled=24, refined=5)
+
+
+def error(found: Similarity3, truth: Similarity3, middle_mesh: np.ndarray) -> tuple[float, float, float]:
+    """Turn in degrees, relative scale, metres at the middle of the mesh."""
+    turn = float(np.degrees(Rotation.from_matrix(found.rotation @ truth.rotation.T).magnitude()))
+    apart = np.linalg.norm(found.apply(middle_mesh[None]) - truth.apply(middle_mesh[None]))
+    return turn, abs(found.scale / truth.scale - 1.0), float(apart)
+
+
+def assert_placed(placement: Any, truth: Similarity3, asset: Any) -> None:
+    """Within 1.5 degrees, 2 % and 15 mm: the accuracy asked of the stage."""
+    turn, scale, apart = error(placement.world_from_mesh, truth, asset.mesh.vertices.mean(axis=0))
+    assert turn < 1.5
+    assert scale < 0.02
+    assert apart < 0.015
+    assert placement.mask_iou > 0.9
+    assert placement.rms_m < 0.006  # 4 mm depth noise
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_textured_box_returns_from_any_frame(bench: Any, seed: int) -> None:
+    thing, capture, track = bench.free_box(textured=True)
+    asset, truth = bench.as_candidate(thing, seed)
+    placement = place_mesh(capture, track, asset, "sift", CONFIG, seed=seed)
+    assert_placed(placement, truth, asset)
+    assert placement.inliers > 0.5 * placement.matches > 50
+    assert sum(v > 0 for v in placement.votes.values()) >= 4
+    assert not placement.unsure
+    assert placement.runner_up is not None
+    assert placement.runner_up < 0.95
+
+
+def test_a_blank_cabinet_is_placed_by_geometry_alone(bench: Any) -> None:
+    thing, capture, track = bench.blank_cabinet()
+    asset, truth = bench.as_candidate(thing, 2)
+    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    assert placement.inliers < 5
+    assert_placed(placement, truth, asset)
+
+
+def test_a_cabinet_without_a_handle_is_flat_and_its_orientation_unsure(bench: Any) -> None:
+    thing, capture, track = bench.blank_cabinet(handle=False)
+    asset, _ = bench.as_candidate(thing, 3)
+    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    assert placement.unsure
+    assert placement.condition > 1e4
+    assert any("flat" in w for w in placement.warnings)
+
+
+def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=False)
+    asset, _ = bench.as_candidate(thing, 4)
+    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    assert placement.unsure
+    assert placement.runner_up is not None
+    assert placement.runner_up > 0.99
+    assert any("orientation" in w for w in placement.warnings)
+    placed = np.sort(np.ptp(placement.world_from_mesh.apply(asset.mesh.vertices), axis=0))
+    np.testing.assert_allclose(placed, np.sort(np.ptp(thing.vertices, axis=0)), atol=0.008)
+
+
+def test_a_bottle_stands_upright_and_its_yaw_is_no_doubt(bench: Any) -> None:
+    thing, capture, track = bench.bottle()
+    asset, truth = bench.as_candidate(thing, 5)
+    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    turn = placement.world_from_mesh.rotation @ truth.rotation.T
+    assert np.degrees(np.arccos(min(turn[2, 2], 1.0))) < 1.5
+    assert placement.world_from_mesh.scale == pytest.approx(truth.scale, rel=0.02)
+    assert not placement.unsure
+
+
+def test_a_chair_is_placed(bench: Any) -> None:
+    thing, capture, track = bench.chair()
+    asset, truth = bench.as_candidate(thing, 6)
+    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    assert_placed(placement, truth, asset)
+    assert not placement.unsure
+
+
+@pytest.mark.skipif(not MUG.exists(), reason="the YCB mug is not on this machine")
+def test_a_mug_finds_its_handle(bench: Any) -> None:
+    thing, capture, track = bench.film_mug(MUG)
+    asset, truth = bench.as_candidate(thing, 7)
+    assert_placed(place_mesh(capture, track, asset, "sift", LIGHT), truth, asset)
+
+
+def test_a_wrong_mesh_shows_in_its_evidence(bench: Any) -> None:
+    _, capture, track = bench.chair()
+    wrong, _ = bench.as_candidate(bench.free_box(textured=True)[0], 8)
+    try:
+        placement = place_mesh(capture, track, wrong, "sift", LIGHT)
+    except PlacementFailed:
+        return
+    assert placement.mask_iou < 0.7 or placement.rms_m > 0.03
+    assert placement.warnings
+
+
+def test_the_same_seed_gives_the_same_placement(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=True)
+    asset, _ = bench.as_candidate(thing, 9)
+    quick = replace(CONFIG, views=4, match_views=30, settled=12, refined=3)
+    first, second = (place_mesh(capture, track, asset, "sift", quick, seed=1) for _ in range(2))
+    np.testing.assert_array_equal(first.world_from_mesh.matrix, second.world_from_mesh.matrix)
+    assert first.votes == second.votes
+
+
+def test_parameters_of_the_generator_are_not_looked_at(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=True)
+    asset, _ = bench.as_candidate(thing, 9)
+    quick = replace(CONFIG, views=4, match_views=30, settled=12, refined=3)
+    told = replace(asset, parameters={"yaw": 1.0, "scale": 3.0}, metrics={"mask_iou": 0.1}, frames=(1,))
+    first, second = (place_mesh(capture, track, a, "sift", quick) for a in (asset, told))
+    np.testing.assert_array_equal(first.world_from_mesh.matrix, second.world_from_mesh.matrix)
+
+
+def test_failures_say_what_to_do(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=False)
+    asset, _ = bench.as_candidate(thing, 0)
+    with pytest.raises(PlacementFailed, match="no frame"):
+        place_mesh(capture, replace(track, masks={}), asset, "sift", LIGHT)
+    empty = replace(asset, mesh=replace(asset.mesh, faces=np.zeros((0, 3), np.int64)))
+    with pytest.raises(PlacementFailed, match="no surface") as failure:
+        place_mesh(capture, track, empty, "sift", LIGHT)
+    assert failure.value.hint
+    with pytest.raises(InputError, match="unknown matcher"):
+        place_mesh(capture, track, asset, "nonesuch", CONFIG)
+
+
+def test_an_object_without_depth_fails_with_a_hint(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=False)
+    asset, _ = bench.as_candidate(thing, 0)
+    images = capture.images
+    blind = type(images)(images.rgbs, {k: d._replace(valid=np.zeros_like(d.valid)) for k, d in images.depths.items()})
+    with pytest.raises(PlacementFailed, match="depth points"):
+        place_mesh(replace(capture, images=blind), track, asset, "sift", LIGHT)
+
+
+def test_it_stops_when_asked(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=False)
+    asset, _ = bench.as_candidate(thing, 0)
+    with pytest.raises(Cancelled):
+        place_mesh(capture, track, asset, "sift", LIGHT, progress=Progress(is_cancelled=lambda: True))

@@ -1,0 +1,91 @@
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.export.loaders import EVERY_LOADER, SAPIEN_VARIABLE, differences, expected_readback, try_loaders
+from r2c2r_core.export.reading import read_urdf
+from r2c2r_core.model.report import LoaderResult
+
+
+def verdicts(folder: Path, sapien_python: str | None = None) -> dict[str, LoaderResult]:
+    results = try_loaders(folder, read_urdf(folder / "scene.urdf"), sapien_python)
+    assert tuple(r.loader for r in results) == EVERY_LOADER
+    return {r.loader: r for r in results}
+
+
+@pytest.fixture(autouse=True)
+def no_sapien(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(SAPIEN_VARIABLE, raising=False)
+
+
+def test_the_good_bundle_loads_in_yourdfpy_mujoco_and_pybullet(good_folder: Path) -> None:
+    found = verdicts(good_folder)
+    for name in ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet"):
+        assert found[name].state == "passed", found[name]
+        assert "4 joints, 9 links" in found[name].detail
+
+
+def test_a_loader_that_is_not_there_is_not_tried(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import importlib.util
+
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "pybullet" else real(name, *rest))
+    found = verdicts(good_folder)
+    assert found["PyBullet"].state == "not tried"
+    assert "pip install" in found["PyBullet"].detail
+    assert found["SAPIEN"].state == "not tried"
+    assert SAPIEN_VARIABLE in found["SAPIEN"].detail
+
+
+@pytest.mark.parametrize("python", ["/nowhere/python", "/bin/false"])
+def test_a_wrong_sapien_python_is_not_tried(good_folder: Path, python: str) -> None:
+    result = verdicts(good_folder, python)["SAPIEN"]
+    assert result.state == "not tried"
+    assert python in result.detail
+
+
+SAPIEN = os.environ.get(SAPIEN_VARIABLE, "")
+
+
+@pytest.mark.skipif(not Path(SAPIEN).is_file(), reason=f"no SAPIEN environment: set {SAPIEN_VARIABLE} to its python")
+def test_the_good_bundle_loads_in_sapien(good_folder: Path) -> None:
+    result = verdicts(good_folder, SAPIEN)["SAPIEN"]
+    assert result.state == "passed", result.detail
+
+
+def test_a_dropped_collider_is_noticed(good_folder: Path) -> None:
+    """PyBullet drops a mesh it cannot find in silence; the comparison does not."""
+    (good_folder / "meshes/bottle_1/bottle_1_body_col_0.obj").unlink()
+    found = verdicts(good_folder)
+    assert found["PyBullet"].state == "failed"
+    assert found["MuJoCo (URDF)"].state == "failed"
+    assert "\n" not in found["MuJoCo (URDF)"].detail
+
+
+def test_an_mjcf_that_says_something_else_fails(good_folder: Path) -> None:
+    document = ET.parse(good_folder / "scene.xml")
+    next(j for j in document.iter("joint") if j.get("name") == "drawer_1_slide").set("range", "0 0.9")
+    document.write(good_folder / "scene.xml")
+    found = verdicts(good_folder)
+    assert found["MuJoCo (MJCF)"].state == "failed"
+    assert "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42" in found["MuJoCo (MJCF)"].detail
+    assert found["MuJoCo (URDF)"].state == "passed"
+
+
+def test_differences_name_what_differs(good_folder: Path) -> None:
+    from dataclasses import replace
+
+    good = expected_readback(read_urdf(good_folder / "scene.urdf"))
+    assert differences(good, good) == []
+    poorer = replace(
+        good,
+        joints={k: v for k, v in good.joints.items() if k != "drawer_1_slide"},
+        masses=good.masses | {"bottle_1_body": 42.0},
+        colliders={k: 0 for k in good.colliders},
+    )
+    lines = differences(good, poorer)
+    assert lines[0] == "joint drawer_1_slide is missing"
+    assert any("bottle_1_body weighs 42 kg" in line for line in lines)
+    assert sum("colliders" in line for line in lines) == len(good.colliders)

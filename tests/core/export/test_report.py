@@ -1,0 +1,87 @@
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+
+from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.report import report_html, report_of
+from r2c2r_core.export.rules.table import finding
+from r2c2r_core.model.report import Certificate, JointResult, LoaderResult
+from tests.core.export.kitchen import kitchen, reconstruction
+
+EVIL = '<script>alert("x")</script>'
+
+
+def certificate(**changes: object) -> Certificate:
+    values = {
+        "passed": True,
+        "findings": (),
+        "loaders": (LoaderResult(loader="PyBullet", state="not tried", detail=f"not installed {EVIL}"),),
+        "joints": (JointResult(joint="cabinet_1_hinge", deepest_penetration_m=0.0001, travel_reached=1.0),),
+        "rest_penetration_m": 0.0,
+        "drift_m": 0.001,
+        "realtime_factor": 12.0,
+    }
+    return Certificate(**(values | changes))  # type: ignore[arg-type]
+
+
+def page(judged: Certificate, failures: dict[str, str] | None = None, **manifest_changes: object) -> str:
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None) | manifest_changes
+    return report_html(manifest, report_of(manifest, judged, failures or {}), {"cabinet_1": "pictures/cabinet_1.jpg"})
+
+
+class Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+
+
+def tags(text: str) -> Tags:
+    parser = Tags()
+    parser.feed(text)
+    return parser
+
+
+def test_nothing_from_data_becomes_markup() -> None:
+    hit = finding("tree", EVIL, EVIL)
+    capture = {"name": EVIL, "sha256": EVIL, "format": EVIL, "frames": EVIL}
+    text = page(certificate(findings=(hit,)), {EVIL: EVIL}, capture=capture, tool_version=EVIL, created=EVIL)
+    names = [tag for tag, _ in tags(text).seen]
+    assert "script" not in names
+    assert not [attrs for _, attrs in tags(text).seen if any(key.startswith("on") for key in attrs)]
+    assert "&lt;script&gt;" in text
+
+
+def test_pictures_are_relative_files() -> None:
+    sources = [attrs["src"] for tag, attrs in tags(page(certificate())).seen if tag == "img"]
+    assert sources == ["preview.png", "pictures/cabinet_1.jpg"]
+    assert not re.search(r"https?://", page(certificate()))
+
+
+def test_a_failed_certificate_and_its_reasons_are_on_the_page() -> None:
+    hit = finding("travel", "drawer_1_slide", "opens 3 % of its range under 30 N")
+    text = page(certificate(passed=False, findings=(hit,)), {"mug_1": "no frame shows it"})
+    for words in ("failed", "opens 3 % of its range", "mug_1", "no frame shows it", "not tried"):
+        assert words in text
+
+
+def test_what_was_not_measured_is_a_dash() -> None:
+    nan = float("nan")
+    text = page(certificate(passed=False, joints=(), rest_penetration_m=nan, drift_m=nan, realtime_factor=nan))
+    assert "nan" not in text.lower().replace("finance", "")
+    assert "–" in text
+
+
+def test_the_json_report_repeats_certificate_objects_and_losses_without_the_machines_speed() -> None:
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
+    report = report_of(manifest, certificate(), {"mug_1": "not seen"})
+    assert report["version"] == 1
+    assert "realtime_factor" not in report["certificate"]
+    assert [entry["name"] for entry in report["objects"]] == [item.name for item in kitchen().objects]
+    assert report["failures"] == {"mug_1": "not seen"}
+    assert set(report["losses"]) == {"scene.urdf", "scene.xml", "scene.glb"}
+    assert np.isfinite(report["objects"][0]["placement_rms_m"])

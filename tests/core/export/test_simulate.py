@@ -1,0 +1,140 @@
+"""MuJoCo as the oracle, against kitchens whose defects are known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from r2c2r_core.export.simulate import simulate, touches
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.scene import ArticulatedScene, Box, SceneObject
+from tests.core.export.conftest import write_folder
+from tests.core.export.kitchen import bottle, cabinet, counter, drawer, kitchen
+
+DEPTH_TOLERANCE_M = 5e-4
+
+
+def simulated(tmp_path: Path, *objects: SceneObject):
+    scene = ArticulatedScene(name="t", objects=objects, layout_moves_m={}, warnings=())
+    return simulate(write_folder(scene, tmp_path / "bundle") / "scene.xml")
+
+
+def moved(item: SceneObject, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> SceneObject:
+    pose = Rigid3(item.world_from_object.rotation, item.world_from_object.translation + np.array([x, y, z]))
+    return replace(item, world_from_object=pose)
+
+
+def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> None:
+    result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
+    assert result.findings == ()
+    assert {joint.joint for joint in result.joints} == {
+        "cabinet_1_hinge",
+        "drawer_1_slide",
+        "double_1_left_hinge",
+        "double_1_right_hinge",
+    }
+    for joint in result.joints:
+        assert joint.travel_reached >= 0.98
+        assert joint.deepest_penetration_m == 0.0
+    assert result.rest_penetration_m == 0.0
+    assert result.drift_m < 0.002  # the bottle settles through its half millimetre
+    assert result.realtime_factor > 1.0
+
+
+def test_a_door_without_a_gap_to_its_neighbours_jams(tmp_path: Path) -> None:
+    """Fronts that touch exactly: nothing penetrates in the sweep's first pose, yet friction holds the door."""
+    jammed = [cabinet(f"c_{k}", x=0.6 * k, front_gap_m=0.0, gap_m=0.0) for k in range(3)]
+    result = simulated(tmp_path, *jammed)
+    assert min(joint.travel_reached for joint in result.joints) < 0.98
+    assert "travel" in {f.rule for f in result.findings}
+
+
+@pytest.mark.parametrize("depth_m", [0.002, 0.01, 0.03])
+def test_a_drawer_that_runs_into_a_cabinet_is_found_with_its_depth(tmp_path: Path, depth_m: float) -> None:
+    """A post stands `depth_m` inside the open drawer's last stretch of travel."""
+    item = drawer("d")
+    front_y = -0.56 / 2 - 0.03  # the handle's outer face, closed
+    post = counter("post")
+    size = np.array([0.1, 0.1, 0.4])
+    link = replace(post.links[0], boxes=(Box(name="post", size_m=size, link_from_box=Rigid3()),))
+    inertia = replace(link.inertial, inertia=np.diag([1.0, 1.0, 1.0]), mass_kg=20.0, com_link=np.zeros(3))
+    at = np.array([0.0, front_y - item.joints[0].upper - 0.05 + depth_m, 0.7])
+    post = replace(post, dimensions_m=size, links=(replace(link, inertial=inertia),), world_from_object=Rigid3(np.eye(3), at))
+    result = simulated(tmp_path, item, post)
+    assert result.joints[0].deepest_penetration_m == pytest.approx(depth_m, abs=DEPTH_TOLERANCE_M)
+    assert "penetration-sweep" in {f.rule for f in result.findings}
+
+
+@pytest.mark.parametrize("depth_m", [0.001, 0.004, 0.012])
+def test_a_door_inside_its_neighbour_is_found_at_rest_with_its_depth(tmp_path: Path, depth_m: float) -> None:
+    first, second = cabinet("a"), cabinet("b", x=0.6 - 0.003 - depth_m)
+    result = simulated(tmp_path, first, second)
+    assert result.rest_penetration_m == pytest.approx(depth_m, abs=DEPTH_TOLERANCE_M)
+    assert "penetration-rest" in {f.rule for f in result.findings}
+
+
+def test_a_door_inside_its_own_carcass_is_found_though_the_mjcf_excludes_the_pair(tmp_path: Path) -> None:
+    result = simulated(tmp_path, cabinet("a", gap_m=-0.005))
+    assert result.rest_penetration_m == pytest.approx(0.005, abs=DEPTH_TOLERANCE_M)
+
+
+def test_a_thing_sunk_into_the_counter_is_found_with_its_depth(tmp_path: Path) -> None:
+    result = simulated(tmp_path, counter("counter_1"), bottle("b", bottom_z=0.865 - 0.004))
+    assert result.rest_penetration_m == pytest.approx(0.004, abs=DEPTH_TOLERANCE_M)
+
+
+def test_a_chair_before_a_door_is_named_and_does_not_fail_the_door(tmp_path: Path) -> None:
+    result = simulated(tmp_path, cabinet("c"), moved(bottle("b", x=0.1, bottom_z=0.0005), y=-0.35, z=0.0))
+    assert {(f.rule, f.severity, f.where) for f in result.findings} == {("blocked-by", "warning", "c_hinge")}
+    assert result.joints[0].travel_reached >= 0.98
+
+
+def test_a_thing_that_falls_is_reported_as_drift(tmp_path: Path) -> None:
+    """Over the counter's edge: its centre is not carried, a third of its foot is."""
+    result = simulated(tmp_path, counter("k"), bottle("b", bottom_z=0.9))
+    assert "drift" not in {f.rule for f in result.findings}  # a plate carries it
+    scene = ArticulatedScene(
+        name="t",
+        objects=(counter("k"), moved(bottle("b"), y=-0.235)),  # 5 mm of its foot still inside the edge, in plan
+        layout_moves_m={},
+        warnings=(),
+    )
+    folder = write_folder(scene, tmp_path / "falling")
+    text = (folder / "scene.xml").read_text()
+    assert "b_support" in text
+    scene_xml = folder / "scene.xml"
+    scene_xml.write_text(_without_body(text, "b_support"))
+    found = simulate(scene_xml)
+    assert {f.rule for f in found.findings} == {"drift"}
+    assert found.drift_m > 0.5
+
+
+def test_fixed_parts_that_overlap_are_a_warning(tmp_path: Path) -> None:
+    result = simulated(tmp_path, counter("a"), moved(counter("b"), z=0.02))
+    assert {(f.rule, f.severity) for f in result.findings} == {("overlap", "warning")}
+
+
+def test_a_scene_mujoco_cannot_compile_is_one_finding(tmp_path: Path) -> None:
+    folder = write_folder(kitchen(), tmp_path / "b")
+    scene = folder / "scene.xml"
+    scene.write_text(scene.read_text().replace('type="box"', 'type="bx"', 1))
+    result = simulate(scene)
+    assert [f.rule for f in result.findings] == ["mjcf-compile"]
+    assert np.isnan(result.drift_m)
+
+
+def test_touches_are_the_deepest_of_each_pair(tmp_path: Path) -> None:
+    folder = write_folder(kitchen(), tmp_path / "b")
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    assert touches(model, {}) == []
+
+
+def _without_body(text: str, name: str) -> str:
+    import xml.etree.ElementTree as ET
+
+    root = ET.fromstring(text)
+    world = root.find("worldbody")
+    world.remove(next(body for body in world if body.get("name") == name))
+    return ET.tostring(root, encoding="unicode")

@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.preview import poses_at
+from tests.core.export.kitchen import kitchen
+
+
+@pytest.fixture
+def model(good_folder: Path) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+
+
+def test_mjcf_and_urdf_agree_in_mujoco_on_masses_inertias_joints_and_poses(good_folder: Path, model: mujoco.MjModel) -> None:
+    other = mujoco.MjModel.from_xml_path(str(good_folder / "scene.urdf"))
+    names = {model.body(b).name for b in range(1, model.nbody)}
+    assert names == {other.body(b).name for b in range(1, other.nbody)}
+    for name in names:
+        a, b = model.body(name), other.body(name)
+        assert a.mass[0] == pytest.approx(b.mass[0], rel=1e-6)
+        np.testing.assert_allclose(np.sort(a.inertia), np.sort(b.inertia), rtol=1e-6)
+    for j in range(other.njnt):
+        a, b = model.joint(other.joint(j).name), other.joint(j)
+        assert a.type[0] == b.type[0]
+        np.testing.assert_allclose(a.range, b.range, atol=1e-6)
+        np.testing.assert_allclose(a.axis, b.axis, atol=1e-6)
+        for attribute in ("dof_damping", "dof_frictionloss"):
+            there, here = getattr(model, attribute)[a.dofadr[0]], getattr(other, attribute)[b.dofadr[0]]
+            assert there == pytest.approx(here)
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
+def test_mujoco_moves_every_body_where_the_plan_says(model: mujoco.MjModel, fraction: float) -> None:
+    plan = plan_bundle(kitchen())
+    data = mujoco.MjData(model)
+    for body in plan.bodies:
+        if body.joint is not None:
+            data.qpos[model.joint(body.joint_name).qposadr[0]] = fraction * body.joint.upper
+    mujoco.mj_kinematics(model, data)
+    for name, pose in poses_at(plan, fraction).items():
+        if name != "world":
+            np.testing.assert_allclose(data.body(name).xpos, pose.translation, atol=1e-6)
+            np.testing.assert_allclose(data.body(name).xmat.reshape(3, 3), pose.rotation, atol=1e-6)
+
+
+def test_visuals_touch_nothing_and_textures_arrive(model: mujoco.MjModel) -> None:
+    for g in range(model.ngeom):
+        visual = model.geom_group[g] == 2
+        assert visual == (model.geom_contype[g] == 0 and model.geom_conaffinity[g] == 0)
+    door = model.geom("cabinet_1_door_vis")
+    material = int(door.matid[0])
+    texture = model.mat_texid[material][int(mujoco.mjtTextureRole.mjTEXROLE_RGB)]
+    assert texture >= 0
+    assert (model.tex_width[texture], model.tex_height[texture]) == (64, 64)
+
+
+def test_parents_and_children_are_excluded_from_contact(model: mujoco.MjModel) -> None:
+    assert model.nexclude == 4

@@ -1,0 +1,102 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import GenerationFailed, OverrideError
+from r2c2r_core.generate.consensus import choose_candidate, chosen_by_person
+from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
+
+NOTHING = TexturedMesh(
+    vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int64), uv=np.zeros((0, 2)), texture=np.zeros((2, 2, 3), np.uint8)
+)
+
+
+def candidate(name, middle, short, filled, iou=0.9, residual=0.01, generator="completion"):
+    metrics = {"extent_middle": middle, "extent_short": short, "volume_ratio": filled}
+    if iou is not None:
+        metrics |= {"mask_iou": iou, "depth_residual_m": residual}
+    return MeshAsset(
+        object_name="mug_1",
+        candidate_id=name,
+        mesh=NOTHING,
+        generator=generator,
+        seed=0,
+        watertight=True,
+        frames=(),
+        metrics=metrics,
+        parameters={},
+        warnings=(),
+    )
+
+
+FIVE = [
+    candidate("c0", 0.60, 0.50, 0.80),
+    candidate("c1", 0.62, 0.52, 0.78),  # in the middle of the three that agree
+    candidate("c2", 0.64, 0.54, 0.76),
+    candidate("c3", 1.00, 0.99, 0.10),  # two wild ones, of which this one pulls the mean away
+    candidate("c4", 0.50, 0.40, 0.82),
+]
+
+
+def test_the_medoid_is_taken_among_planted_outliers():
+    chosen = choose_candidate(FIVE)
+    assert chosen.chosen_id == "c1"
+    assert set(chosen.ranking[-2:]) == {"c3", "c4"}
+
+
+def test_the_order_of_the_candidates_does_not_matter():
+    assert choose_candidate(FIVE[::-1]).chosen_id == "c1"
+
+
+def test_the_papers_mean_follows_the_outliers_the_medoid_does_not():
+    """Mean middle side 0.67, short 0.59, filled 0.65: c2 is nearest to it."""
+    assert choose_candidate(FIVE, rule="mean").chosen_id == "c2"
+
+
+def test_among_like_shapes_the_fit_to_masks_and_depth_decides():
+    alike = [
+        candidate(f"c{k}", 0.6, 0.5, 0.8, iou, residual)
+        for k, (iou, residual) in enumerate([(0.90, 0.01), (0.95, 0.01), (0.95, 0.03)])
+    ]
+    chosen = choose_candidate(alike)
+    assert chosen.chosen_id == "c1"
+    assert "0.95" in chosen.reason
+    assert "10 mm" in chosen.reason
+
+
+def test_rejected_candidates_neither_win_nor_pull():
+    chosen = choose_candidate(FIVE, rejected=("c1", "c3", "c4"))
+    assert chosen.chosen_id in ("c0", "c2")
+    assert len(chosen.candidates) == 5
+    assert set(chosen.ranking[2:]) == {"c1", "c3", "c4"}
+    assert "3 rejected" in chosen.reason
+
+
+def test_rejecting_everything_says_what_to_do():
+    with pytest.raises(GenerationFailed, match=r"mug_1: every candidate was rejected; .*upload"):
+        choose_candidate(FIVE, rejected=("c0", "c1", "c2", "c3", "c4"))
+
+
+def test_an_upload_is_judged_by_its_shape():
+    good = [*FIVE, candidate("upload0", 0.62, 0.52, 0.78, iou=None, generator="upload")]
+    assert "upload0" in choose_candidate(good).ranking[:2]
+    odd = [*FIVE, candidate("upload0", 0.2, 0.1, 0.3, iou=None, generator="upload")]
+    assert choose_candidate(odd).ranking[-1] == "upload0"
+
+
+def test_a_lone_upload_is_chosen_and_the_reason_says_why():
+    chosen = choose_candidate([candidate("upload0", 0.6, 0.5, 0.8, iou=None, generator="upload")])
+    assert chosen.chosen_id == "upload0"
+    assert "only candidate" in chosen.reason
+
+
+def test_a_person_overrules_the_consensus():
+    chosen = chosen_by_person(choose_candidate(FIVE), "c3")
+    assert (chosen.chosen_id, chosen.chosen_by) == ("c3", "person")
+    with pytest.raises(OverrideError, match="no candidate 'c9'"):
+        chosen_by_person(chosen, "c9")
+
+
+def test_equal_candidates_give_the_first():
+    assert choose_candidate([replace(FIVE[0], candidate_id=f"c{k}") for k in range(3)]).chosen_id == "c0"

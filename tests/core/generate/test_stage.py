@@ -1,0 +1,131 @@
+"""The stage as the pipeline calls it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import Cancelled, GenerationFailed, InputError, ObjectNotSeen
+from r2c2r_core.generate.completion import Completion
+from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates
+from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, oriented_extents, volume
+from r2c2r_core.progress import Progress
+
+FEW = GenerateConfig(count=3, pool_frames=10)
+
+
+@pytest.fixture(scope="module")
+def bottles(bottle_scene):
+    return generate_candidates(*bottle_scene, "completion", FEW)
+
+
+def test_every_candidate_is_closed_manifold_outward_and_textured(bottles, front_scene):
+    doors = generate_candidates(*front_scene, "completion", replace(FEW, count=2))
+    for asset in (*bottles.candidates, *doors.candidates):
+        mesh = asset.mesh
+        assert asset.watertight
+        assert is_watertight(mesh.vertices, mesh.faces)
+        assert is_manifold(mesh.vertices, mesh.faces)
+        assert volume(*join_vertices(mesh.vertices, mesh.faces)) > 0
+        assert len(mesh.uv) == len(mesh.vertices)
+        assert (mesh.uv >= 0).all()
+        assert (mesh.uv <= 1).all()
+        assert asset.metrics["seen_fraction"] > 0.1
+        assert mesh.texture.std() > 0
+
+
+def test_candidates_leave_in_frames_and_units_of_their_own(bottles):
+    """Unit cubes, all turned differently: no axis of a candidate is left where the generator had it."""
+    axes = []
+    for asset in bottles.candidates:
+        vertices = asset.mesh.vertices
+        assert np.ptp(vertices, axis=0).max() == pytest.approx(1.0)
+        assert np.abs(vertices.max(axis=0) + vertices.min(axis=0)).max() < 1e-9
+        direction = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2][0]
+        axes.append(direction)
+        assert abs(direction[2]) < 0.99  # a bottle that still stands upright would give the pose away
+    assert max(abs(axes[i] @ axes[j]) for i in range(3) for j in range(i)) < 0.99
+    assert len({round(float(oriented_extents(a.mesh.vertices)[0]), 3) for a in bottles.candidates}) == 3
+
+
+def test_the_same_seed_gives_the_same_meshes_and_another_seed_others(bottles, bottle_scene):
+    again = generate_candidates(*bottle_scene, "completion", FEW)
+    other = generate_candidates(*bottle_scene, "completion", replace(FEW, count=1), seed=1)
+    for a, b in zip(bottles.candidates, again.candidates, strict=True):
+        assert np.array_equal(a.mesh.vertices, b.mesh.vertices)
+        assert np.array_equal(a.mesh.faces, b.mesh.faces)
+        assert np.array_equal(a.mesh.texture, b.mesh.texture)
+        assert a.metrics == b.metrics
+    assert again.chosen_id == bottles.chosen_id
+    for a, b in zip(bottles.candidates, other.candidates, strict=False):
+        assert a.mesh.vertices.shape != b.mesh.vertices.shape or not np.allclose(a.mesh.vertices, b.mesh.vertices, atol=1e-3)
+        assert a.parameters != b.parameters
+
+
+def test_a_candidate_tells_what_was_varied_and_how_it_fits(bottles):
+    for asset in bottles.candidates:
+        assert {"frames", "erosion_px", "bbox_percentile", "carve_votes", "voxel_m", "depth_scale"} <= set(asset.parameters)
+        assert {"extent_middle", "extent_short", "volume_ratio", "faces", "seen_fraction", "mask_iou"} <= set(asset.metrics)
+        assert 6 <= len(asset.frames) <= 14
+        assert asset.metrics["mask_iou"] > 0.85
+        json.dumps([asset.parameters, asset.metrics])  # plain numbers
+    assert len({asset.frames for asset in bottles.candidates}) > 1
+
+
+def test_the_choice_has_a_reason_in_one_sentence_and_ranks_all(bottles):
+    assert bottles.chosen_by == "consensus"
+    assert bottles.ranking[0] == bottles.chosen_id
+    assert sorted(bottles.ranking) == ["c0", "c1", "c2"]
+    assert bottles.reason.startswith(bottles.chosen_id)
+    assert bottles.reason.count(". ") == 0
+
+
+def test_rejected_candidates_are_passed_over(bottles, bottle_scene):
+    other = generate_candidates(*bottle_scene, "completion", FEW, rejected=(bottles.chosen_id,))
+    assert other.chosen_id != bottles.chosen_id
+    assert other.ranking[-1] == bottles.chosen_id
+
+
+def test_a_failing_candidate_does_not_fail_the_object(bottle_scene, monkeypatch):
+    make = Completion.make
+
+    def sometimes(self, evidence, candidate_id, seed):
+        if candidate_id == "c1":
+            raise ValueError("planted")
+        return make(self, evidence, candidate_id, seed)
+
+    monkeypatch.setattr(Completion, "make", sometimes)
+    found = generate_candidates(*bottle_scene, "completion", FEW)
+    assert [c.candidate_id for c in found.candidates] == ["c0", "c2"]
+
+
+def test_when_all_fail_the_error_names_the_cause_and_the_next_step(bottle_scene, monkeypatch):
+    def never(self, evidence, candidate_id, seed):
+        raise ValueError("planted")
+
+    monkeypatch.setattr(Completion, "make", never)
+    with pytest.raises(GenerationFailed, match=r"bottle_1: all 3 candidates failed: planted; .*click"):
+        generate_candidates(*bottle_scene, "completion", FEW)
+
+
+def test_a_track_without_masks_is_an_object_nobody_sees(bottle_scene):
+    capture, track = bottle_scene
+    with pytest.raises(ObjectNotSeen, match="bottle_1"):
+        generate_candidates(capture, replace(track, masks={}), "completion", FEW)
+
+
+def test_cancelling_stops_between_candidates(bottle_scene):
+    with pytest.raises(Cancelled):
+        generate_candidates(*bottle_scene, "completion", FEW, progress=Progress(is_cancelled=lambda: True))
+
+
+@pytest.mark.parametrize("count", [0, 11])
+def test_the_count_is_one_to_ten(count):
+    with pytest.raises(InputError, match="1 to 10"):
+        GenerateConfig(count=count)
+
+
+def test_the_default_generator_needs_no_extra():
+    assert GENERATORS.default == "completion"
+    assert GENERATORS.available("completion") == (True, "ready")

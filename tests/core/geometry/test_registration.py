@@ -1,0 +1,169 @@
+"""Similarity fits: perturb a known truth and recover it, forward and inverse."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.geometry.registration import DegenerateFitError, icp, similarity_ransac, umeyama, umeyama_batch
+from r2c2r_core.geometry.transforms import Similarity3
+
+
+def random_similarity(seed: int) -> Similarity3:
+    rng = np.random.default_rng(seed)
+    return Similarity3(
+        float(np.exp(rng.uniform(-1.2, 1.2))), Rotation.random(random_state=seed).as_matrix(), rng.uniform(-2, 2, 3)
+    )
+
+
+def angle_deg(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.degrees(Rotation.from_matrix(a.T @ b).magnitude()))
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("flat", [False, True])
+def test_umeyama_recovers_the_similarity_and_its_inverse(seed: int, flat: bool) -> None:
+    truth = random_similarity(seed)
+    source = np.random.default_rng(seed + 100).normal(size=(12, 3)) * ([1, 1, 0] if flat else [1, 1, 1])
+    target = truth.apply(source)
+    forward, backward = umeyama(source, target), umeyama(target, source)
+    assert forward.scale == pytest.approx(truth.scale)
+    np.testing.assert_allclose(forward.rotation, truth.rotation, atol=1e-7)
+    np.testing.assert_allclose(backward.matrix, truth.inverse.matrix, atol=1e-6)
+
+
+def test_equations_4_and_5_as_printed_give_the_inverse_rotation() -> None:
+    truth = random_similarity(3)
+    p = np.random.default_rng(0).normal(size=(20, 3))
+    q = truth.apply(p)
+    p0, q0 = p - p.mean(axis=0), q - q.mean(axis=0)
+    u, _, vt = np.linalg.svd(q0.T @ p0)  # eq. 4: H = sum q p^T
+    printed = vt.T @ u.T  # eq. 5: R = V U^T
+    assert angle_deg(printed, truth.rotation.T) < 1e-4
+    assert angle_deg(printed, truth.rotation) > 5.0
+    assert angle_deg(umeyama(p, q).rotation, truth.rotation) < 1e-4
+
+
+def test_flat_noisy_fronts_never_come_out_mirrored() -> None:
+    rng = np.random.default_rng(1)
+    reflections = 0
+    for seed in range(60):
+        truth = random_similarity(seed)
+        source = rng.uniform(-0.5, 0.5, (12, 3)) * [1, 1, 0]
+        target = truth.apply(source) + rng.normal(0, 0.01 * truth.scale, source.shape)
+        u, _, vt = np.linalg.svd((target - target.mean(axis=0)).T @ (source - source.mean(axis=0)))
+        reflections += np.linalg.det(u @ vt) < 0
+        fit = umeyama(source, target)
+        assert np.linalg.det(fit.rotation) == pytest.approx(1.0)
+        assert angle_deg(fit.rotation, truth.rotation) < 5.0  # 1 cm noise on a metre
+    assert reflections > 10  # without the sign of the determinant
+
+
+def test_mirrored_clouds_are_not_matched_by_a_reflection() -> None:
+    source = np.random.default_rng(2).normal(size=(30, 3))
+    fit = umeyama(source, source * [-1, 1, 1])
+    assert np.linalg.det(fit.rotation) == pytest.approx(1.0)
+    assert np.linalg.norm(fit.apply(source) - source * [-1, 1, 1], axis=1).mean() > 0.2
+
+
+def test_points_on_a_line_fix_no_rotation() -> None:
+    line = np.outer(np.linspace(0, 1, 8), [1.0, 2.0, 3.0])
+    with pytest.raises(DegenerateFitError):
+        umeyama(line, line)
+
+
+def test_a_frozen_scale_stays() -> None:
+    source = np.random.default_rng(4).normal(size=(30, 3))
+    assert umeyama(source, 2.0 * source, scale=1.5).scale == 1.5
+
+
+def test_weights_silence_outliers() -> None:
+    truth = random_similarity(5)
+    source = np.random.default_rng(5).normal(size=(30, 3))
+    target = truth.apply(source)
+    target[:10] += 5.0
+    weights = np.repeat([0.0, 1.0], [10, 20])
+    np.testing.assert_allclose(umeyama(source, target, weights=weights).matrix, truth.matrix, atol=1e-7)
+
+
+def test_the_batch_equals_one_by_one() -> None:
+    rng = np.random.default_rng(6)
+    source, target = rng.normal(size=(5, 9, 3)), rng.normal(size=(5, 9, 3))
+    scales, rotations, shifts = umeyama_batch(source, target)
+    for k in range(5):
+        one = umeyama(source[k], target[k])
+        np.testing.assert_allclose(scales[k] * rotations[k], one.scale * one.rotation, atol=1e-9)
+        np.testing.assert_allclose(shifts[k], one.translation, atol=1e-9)
+
+
+def box_surface(count: int, rng: np.random.Generator) -> np.ndarray:
+    points = rng.uniform(-0.5, 0.5, (count, 3))
+    axis = rng.integers(0, 3, count)
+    points[np.arange(count), axis] = np.sign(points[np.arange(count), axis]) * 0.5
+    return points * [0.6, 0.54, 0.84]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("flat", [False, True])
+def test_ransac_survives_ninety_percent_outliers(seed: int, flat: bool) -> None:
+    rng = np.random.default_rng(seed)
+    truth = random_similarity(seed)
+    world = box_surface(600, rng) * ([1, 1, 1e-9] if flat else [1, 1, 1])
+    source = truth.inverse.apply(world)
+    target = world + rng.normal(0, 0.004, world.shape)
+    wrong = rng.permutation(600)[:540]
+    target[wrong] = rng.uniform(target.min(axis=0), target.max(axis=0), (540, 3))
+    for a, b, wanted, limit in ((source, target, truth, 0.015), (target, source, truth.inverse, 0.015 / truth.scale)):
+        fit = similarity_ransac(a, b, threshold=limit, rng=np.random.default_rng(seed))
+        assert fit is not None
+        assert angle_deg(fit.target_from_source.rotation, wanted.rotation) < 3.0
+        assert fit.target_from_source.scale == pytest.approx(wanted.scale, rel=0.02)
+
+
+def test_a_tiny_scale_cannot_win_by_collapsing_onto_a_cluster() -> None:
+    rng = np.random.default_rng(8)
+    source = box_surface(300, rng)
+    target = source * 2.0 + rng.normal(0, 0.004, source.shape)
+    target[:270] = rng.normal(0, 0.05, (270, 3))  # wrong matches pile up on one spot
+    limits = {"threshold": 0.05, "scale_range": (0.01, 10.0)}
+    absolute = similarity_ransac(source, target, rng=np.random.default_rng(0), **limits)
+    relative = similarity_ransac(source, target, rng=np.random.default_rng(0), relative_threshold=0.05, **limits)
+    assert absolute is not None
+    assert absolute.target_from_source.scale < 0.5
+    assert relative is not None
+    assert relative.target_from_source.scale == pytest.approx(2.0, rel=0.02)
+
+
+def test_unrelated_points_give_nothing() -> None:
+    rng = np.random.default_rng(9)
+    assert (
+        similarity_ransac(
+            rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), threshold=0.01, rng=rng, minimum_inliers=8, rounds=5
+        )
+        is None
+    )
+
+
+def test_ransac_does_the_same_twice() -> None:
+    rng = np.random.default_rng(10)
+    source = rng.normal(size=(50, 3))
+    target = source + rng.normal(0, 0.01, source.shape)
+    first, second = (similarity_ransac(source, target, threshold=0.05, rng=np.random.default_rng(1)) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    np.testing.assert_array_equal(first.target_from_source.matrix, second.target_from_source.matrix)
+
+
+@pytest.mark.parametrize("free_scale", [False, True])
+def test_icp_brings_a_complete_model_onto_a_partial_view(free_scale: bool) -> None:
+    rng = np.random.default_rng(11)
+    model = box_surface(6000, rng)
+    seen = model[(model @ [0.5, -0.8, 0.4]) > 0.12][:900]
+    nudge = Similarity3(
+        1.03 if free_scale else 1.0, Rotation.from_rotvec([0.02, 0.03, -0.04]).as_matrix(), np.array([0.02, -0.02, 0.015])
+    )
+    observed = seen + rng.normal(0, 0.002, seen.shape)
+    fit = icp(observed, model, nudge, free_scale=free_scale, iterations=60)
+    assert angle_deg(fit.model_pose.rotation, np.eye(3)) < 0.6
+    assert np.linalg.norm(fit.model_pose.translation) < 5e-3
+    assert fit.model_pose.scale == pytest.approx(1.0, abs=0.01)
+    assert np.median(fit.distance_m) < 6e-3  # half the spacing of the model's points, and 2 mm noise

@@ -1,0 +1,20 @@
+import functools
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).resolve().parents[3] / "../shared/data"
+
+
+@pytest.fixture(scope="session")
+def real():
+    """The folder of a real recording; the test is skipped where it is absent."""
+
+    @functools.cache
+    def find(name: str) -> Path:
+        path = DATA / name
+        if not path.exists():
+            pytest.skip(f"the real recording {name} is not beside the checkout")
+        return path.resolve()
+
+    return find

@@ -1,0 +1,140 @@
+"""Levelling: exact on an exact room, whichever way the recording's own world is turned."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.ingest.gravity import level_room
+from r2c2r_core.ingest.planes import SurfaceSample, find_planes
+from r2c2r_core.model.inputs import Overrides
+
+TILTS = [(0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (70.0, 12.0, -25.0), (-120.0, 40.0, 10.0)]
+
+
+def kitchen(noise_m: float = 0.004) -> SurfaceSample:
+    """Floor z = 0, two walls, and a base unit 0.9 m high along one of them; oriented points, +Z up."""
+    rng = np.random.default_rng(3)
+    rectangles = [  # origin, edge, edge, normal
+        ((0, 0, 0), (3, 0, 0), (0, 2.5, 0), (0, 0, 1)),
+        ((0, 2.5, 0), (3, 0, 0), (0, 0, 2.2), (0, -1, 0)),
+        ((3, 0, 0), (0, 2.5, 0), (0, 0, 2.2), (-1, 0, 0)),
+        ((0.3, 1.9, 0), (2, 0, 0), (0, 0, 0.9), (0, -1, 0)),
+        ((0.3, 1.9, 0.9), (2, 0, 0), (0, 0.6, 0), (0, 0, 1)),
+    ]
+    points, normals = [], []
+    for origin, a, b, normal in rectangles:
+        count = int(1500 * np.linalg.norm(np.cross(a, b)))
+        share = rng.random((count, 2))
+        spot = np.array(origin) + share @ np.array([a, b], dtype=float)
+        points.append(spot + rng.normal(0, noise_m, (count, 1)) * np.array(normal))
+        turned = np.array(normal) + rng.normal(0, 0.08, (count, 3))
+        normals.append(turned / np.linalg.norm(turned, axis=1, keepdims=True))
+    return SurfaceSample(points=np.vstack(points), normals=np.vstack(normals), area_each_m2=1 / 1500)
+
+
+def cameras() -> list[Rigid3]:
+    """A person at 1.5 m looking around the corner, 25 deg down."""
+    poses = []
+    for yaw in np.linspace(-20, 70, 10):
+        forward = np.array([np.sin(np.radians(yaw)), np.cos(np.radians(yaw)), -0.45])
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, [0, 0, 1.0])
+        right /= np.linalg.norm(right)
+        poses.append(Rigid3(np.column_stack([right, np.cross(forward, right), forward]), np.array([0.8, 0.4, 1.5])))
+    return poses
+
+
+def moved(sample: SurfaceSample, transform: Rigid3) -> SurfaceSample:
+    return SurfaceSample(
+        points=transform.apply(sample.points), normals=transform.turn(sample.normals), area_each_m2=sample.area_each_m2
+    )
+
+
+def levelled(euler_deg, file_up=None, overrides=None, yaw_deg=17.0):
+    world = Rigid3(Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix(), np.array([0.4, -1.2, 0.7]))
+    world = world @ Rigid3(rotation_about_z(np.radians(yaw_deg)), np.zeros(3))
+    up = world.rotation @ [0.0, 0.0, 1.0]
+    if file_up is not None:
+        file_up = Rotation.from_rotvec(np.radians(file_up) * np.cross(up, [0.31, 0.2, 0.9])).apply(up)
+    result = level_room(moved(kitchen(), world), [world @ c for c in cameras()], file_up, overrides, np.random.default_rng(0))
+    error_deg = np.degrees(np.arccos(np.clip((result.world_from_capture.rotation @ up)[2], -1, 1)))
+    return result, world, error_deg
+
+
+@pytest.mark.parametrize("euler_deg", TILTS)
+def test_up_and_floor_come_from_the_planes_when_the_file_knows_nothing(euler_deg):
+    result, world, error_deg = levelled(euler_deg)
+    assert result.room.up_source == "floor"
+    assert error_deg < 0.1
+    floor_points = (result.world_from_capture @ world).apply(kitchen(0.0).points[:3000])
+    assert np.abs(floor_points[:, 2]).max() < 0.008
+
+
+def test_a_files_gravity_is_corrected_a_little_and_never_a_lot():
+    for off in (1.8, 2.4):
+        result, _, error_deg = levelled((90, 0, 0), file_up=off)
+        assert result.room.up_source == "file"
+        assert error_deg < 0.1
+    _, _, error_deg = levelled((90, 0, 0), file_up=8.0)  # planes that far off are not the file's level planes
+    assert error_deg > 5.0
+
+
+def test_a_phones_gravity_is_kept_as_it_is():
+    result, _, error_deg = levelled((90, 0, 0), file_up=0.0)
+    assert error_deg < 1e-6
+    assert result.notices == ()
+
+
+def test_yaw_is_that_of_the_walls_modulo_a_quarter_turn():
+    for yaw_deg in (3.0, 31.0, 88.0):
+        result, world, _ = levelled((90, 0, 0), file_up=0.0, yaw_deg=yaw_deg)
+        axis = (result.world_from_capture.rotation @ world.rotation)[:, 0]
+        expected = np.mod(np.arctan2(axis[1], axis[0]), np.pi / 2)
+        off = np.mod(result.room.manhattan_yaw_rad - expected + np.pi / 4, np.pi / 2) - np.pi / 4
+        assert abs(np.degrees(off)) < 0.15
+
+
+def test_walls_are_found_and_face_the_room_and_fronts_are_no_walls():
+    result, world, _ = levelled((90, 0, 0), file_up=0.0)
+    here = result.world_from_capture @ world
+    assert len(result.room.walls) == 2
+    for normal, spot in (((0, -1, 0), (1, 2.5, 1)), ((-1, 0, 0), (3, 1, 1))):
+        facing, place = here.rotation @ np.array(normal, float), here.apply(np.array([spot], float))[0]
+        wall = max(result.room.walls, key=lambda w: w.normal @ facing)
+        assert wall.normal @ facing > 0.9999
+        assert wall.normal @ place == pytest.approx(wall.offset_m, abs=0.005)
+
+
+def test_what_a_person_says_is_taken():
+    up = Rotation.from_euler("x", 90, degrees=True).as_matrix() @ np.array([0.05, 0.0, 1.0])
+    overrides = Overrides(objects={}, up_capture=up, floor_m=0.25, manhattan_yaw_rad=0.4)
+    result, _, _ = levelled((90, 0, 0), file_up=0.0, overrides=overrides)
+    assert result.room.up_source == "person"
+    assert result.room.floor_found
+    assert result.room.manhattan_yaw_rad == pytest.approx(0.4)
+    assert np.allclose(result.world_from_capture.rotation @ (up / np.linalg.norm(up)), [0, 0, 1])
+    on_floor = up / np.linalg.norm(up) * 0.25
+    assert result.world_from_capture.apply(on_floor[None])[0, 2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_table_top_alone_is_not_taken_for_the_floor():
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0.73, 0.003, 4000)])
+    sample = SurfaceSample(points=points, normals=np.tile([0.0, 0.0, 1.0], (4000, 1)), area_each_m2=1e-3)
+    pose = Rigid3(cameras()[0].rotation, np.array([0.5, -0.5, 1.35]))
+    result = level_room(sample, [pose], np.array([0.0, 0.0, 1.0]), None, np.random.default_rng(0))
+    assert not result.room.floor_found
+    assert any("no floor" in n for n in result.notices)
+
+
+def test_without_planes_up_is_assumed_and_told():
+    sample = SurfaceSample(points=np.zeros((0, 3)), normals=np.zeros((0, 3)), area_each_m2=0.0)
+    result = level_room(sample, cameras(), None, None, np.random.default_rng(0))
+    assert result.room.up_source == "assumed"
+    assert result.room.walls == ()
+
+
+def test_planes_come_back_with_their_area():
+    planes = find_planes(kitchen(), np.random.default_rng(0))
+    assert [round(p.area_m2, 1) for p in planes] == pytest.approx([7.5, 6.6, 5.5, 1.8, 1.2], abs=0.3)

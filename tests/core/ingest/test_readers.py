@@ -1,0 +1,168 @@
+"""Every format is read to the same room: poses, cameras, depth and colour, in our conventions."""
+
+import lzfse
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.readers.protocol import Recording
+from r2c2r_core.ingest.readers.table import open_recording
+
+from .tiny import YUP_FROM_ZUP, TinyRoom, arkit_rows, write_exr, write_r3d, write_seven_scenes, write_tum, zip_folder
+
+ROOM = TinyRoom()
+HALF_STEP_M = 0.0011  # HALF steps by 2 mm between 2 and 4 m
+
+
+def write(kind, tmp_path):
+    if kind == "r3d":
+        return write_r3d(tmp_path / "scan.r3d", ROOM)
+    if kind == "r3d-folder":
+        import zipfile
+
+        zipfile.ZipFile(write_r3d(tmp_path / "scan.r3d", ROOM)).extractall(tmp_path / "scan")
+        return tmp_path / "scan"
+    if kind == "exr":
+        return write_exr(tmp_path / "EXR_RGBD", ROOM)
+    if kind == "exr-below":
+        write_exr(tmp_path / "EXR_RGBD", ROOM)
+        return tmp_path
+    if kind == "7scenes":
+        return write_seven_scenes(tmp_path / "kitchen", ROOM)
+    if kind == "7scenes-zip":
+        return zip_folder(write_seven_scenes(tmp_path / "kitchen", ROOM), tmp_path / "k.zip", top="kitchen/")
+    return write_tum(tmp_path / "tum", ROOM)
+
+
+KINDS = ("r3d", "r3d-folder", "exr", "exr-below", "7scenes", "7scenes-zip", "tum")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_format_gives_the_same_cameras_poses_and_depth(kind, tmp_path):
+    recording = open_recording(write(kind, tmp_path))
+    truth = ROOM.poses()
+    assert len(recording.frames) == len(truth)
+    stride = recording.frames[1].index
+    world = world_of(recording)
+    for frame in recording.frames:
+        expected = truth[frame.index // stride]
+        # TUM: interpolated across the bends of a polygonal walk; the nearest pose alone would be off by 12 mm
+        assert np.allclose((world @ frame.capture_from_camera.matrix), expected.matrix, atol=2e-3 if kind == "tum" else 1e-6)
+        assert frame.rgb_camera == ROOM.camera
+        depth = recording.depth_of(frame).metres
+        exact = ROOM.depth(expected, frame.depth_camera)
+        good = depth > 0
+        assert good.mean() > 0.99
+        assert np.abs(depth - exact)[good].max() < HALF_STEP_M
+
+
+def world_of(recording: Recording) -> np.ndarray:
+    """Our world (+Z up) from the recording's: known up to the first pose, which the test takes for granted."""
+    first = ROOM.poses()[0].matrix
+    return first @ np.linalg.inv(recording.frames[0].capture_from_camera.matrix)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_format_that_knows_gravity_says_so(kind, tmp_path):
+    recording = open_recording(write(kind, tmp_path))
+    up_world = world_of(recording)[:3, :3] @ recording.up_capture
+    assert np.degrees(np.arccos(np.clip(up_world[2], -1, 1))) < 0.02
+
+
+def test_a_gl_camera_looks_along_plus_z_afterwards(tmp_path):
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM))
+    forward = recording.frames[0].capture_from_camera.rotation[:, 2]
+    assert np.allclose(forward, YUP_FROM_ZUP @ ROOM.poses()[0].rotation[:, 2], atol=1e-9)
+
+
+def test_frames_are_matched_to_poses_by_number_not_by_position(tmp_path):
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, skip=(0, 3, 4)))
+    assert [f.index for f in recording.frames] == [1, 2, 5, 6, 7, 8, 9, 10, 11]
+    expected = YUP_FROM_ZUP @ ROOM.poses()[5].translation
+    assert np.allclose(recording.frames[2].capture_from_camera.translation, expected)
+    assert any("missing" in n for n in recording.notices)
+
+
+def test_calibration_per_frame_is_preferred(tmp_path):
+    rows = [[90.0 + k, 91.0 + k, 48.0, 62.0] for k in range(ROOM.count)]
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, perFrameIntrinsicCoeffs=rows))
+    frame = recording.frames[7]
+    assert (frame.rgb_camera.fx, frame.rgb_camera.fy) == (97.0, 98.0)
+    assert (frame.rgb_camera.cx, frame.rgb_camera.cy) == (48.5, 62.5)  # integer pixel centres become i + 0.5
+    assert frame.depth_camera.cx == pytest.approx(24.25)
+
+
+def test_an_older_app_without_depth_size_and_gravity_is_read(tmp_path):
+    poses = ROOM.poses()
+    relative = [poses[0].inverse @ p for p in poses]
+    gl = np.diag([1.0, -1.0, -1.0])
+    rows = [[*Rotation.from_matrix(gl @ p.rotation @ gl).as_quat(), *(gl @ p.translation)] for p in relative]
+    older = {"dw": None, "dh": None, "initPose": None, "frameTimestamps": None, "cameraType": None, "poses": rows}
+    recording = open_recording(write_r3d(tmp_path / "old.r3d", ROOM, **older))
+    assert recording.up_capture is None
+    assert (recording.frames[0].depth_camera.width, recording.frames[0].depth_camera.height) == ROOM.depth_size
+    assert recording.frames[6].timestamp_s == pytest.approx(0.1)
+    moved = recording.frames[0].capture_from_camera.inverse @ recording.frames[5].capture_from_camera
+    assert np.allclose(moved.matrix, (poses[0].inverse @ poses[5]).matrix, atol=1e-9)
+
+
+def test_init_pose_turns_gravity_into_the_recordings_own_world(tmp_path):
+    turn = Rotation.from_euler("x", 40, degrees=True)
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
+    assert np.allclose(turn.apply(recording.up_capture), [0, 1, 0])
+
+
+def test_depth_may_be_stored_raw(tmp_path):
+    recording = open_recording(write_r3d(tmp_path / "raw.r3d", ROOM, raw=True))
+    exact = ROOM.depth(ROOM.poses()[2], ROOM.depth_camera)
+    assert np.array_equal(recording.depth_of(recording.frames[2]).metres, exact)
+
+
+def test_an_empty_confidence_is_none(tmp_path):
+    import zipfile
+
+    whole = write_r3d(tmp_path / "whole.r3d", ROOM, conf=None)
+    with zipfile.ZipFile(whole, "a") as archive:
+        archive.writestr("rgbd/0.conf", b"")
+        archive.writestr("rgbd/1.conf", lzfse.compress(b""))
+    recording = open_recording(whole)
+    assert [recording.depth_of(f).confidence for f in recording.frames[:3]] == [None, None, None]
+
+
+def test_the_real_repacked_r3d_equals_its_exr_export(real):
+    exr = open_recording(real("record3d-exr-door-handle"))
+    r3d = open_recording(real("record3d-exr-door-handle/derived/door-handle-repacked.r3d"))
+    assert len(exr.frames) == 56
+    assert exr.frames[10].index == 66  # frame 60 is missing
+    assert len(r3d.frames) == 28
+    shared = 0
+    for frame in r3d.frames[::9]:
+        depth = r3d.depth_of(frame).metres
+        twin = min(exr.frames, key=lambda f: np.abs(f.capture_from_camera.matrix - frame.capture_from_camera.matrix).max())
+        assert np.allclose(twin.capture_from_camera.matrix, frame.capture_from_camera.matrix, atol=1e-12)
+        assert twin.rgb_camera == frame.rgb_camera
+        assert np.array_equal(exr.depth_of(twin).metres, depth)
+        shared += 1
+    assert shared == 4
+
+
+def test_clocks_that_share_nothing_are_matched_by_line_and_told(real):
+    recording = open_recording(real("cabinet-tum-fr3-58"))
+    assert len(recording.frames) == 58
+    assert any("by line" in n for n in recording.notices)
+    assert recording.frames[0].rgb_camera.cx == pytest.approx(320.6)
+
+
+def test_a_frame_without_a_finite_pose_is_left_out(tmp_path):
+    folder = write_seven_scenes(tmp_path / "k", ROOM)
+    (folder / "pose" / "000015.txt").write_text("\n".join(["-inf -inf -inf -inf"] * 4))
+    recording = open_recording(folder)
+    assert 15 not in [f.index for f in recording.frames]
+    assert any("pose" in n for n in recording.notices)
+
+
+def test_more_frames_than_poses_is_an_error(tmp_path):
+    rows = arkit_rows(ROOM.poses())[:6]
+    with pytest.raises(CaptureError, match="12 frames up to number 11, but 6 poses"):
+        open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, poses=rows))

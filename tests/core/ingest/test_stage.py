@@ -1,0 +1,381 @@
+"""A recording becomes a capture on disk; what cannot be read ends in one clear line."""
+
+import errno
+import json
+import stat
+import zipfile
+from pathlib import Path
+
+import cv2
+import lzfse
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import Cancelled, CaptureError, EnvironmentProblem
+from r2c2r_core.ingest import store as store_module
+from r2c2r_core.ingest.stage import IngestConfig, open_images, read_capture
+from r2c2r_core.progress import Progress
+
+from .tiny import TinyRoom, write_exr, write_r3d, write_seven_scenes, write_tum, zip_folder
+
+ROOM = TinyRoom()
+QUICK = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
+
+
+def read(source: Path, tmp_path: Path, **kwargs):
+    return read_capture(source, tmp_path / "store", QUICK, **kwargs)
+
+
+def rewritten(source: Path, target: Path, change) -> Path:
+    """The zip with its members passed through `change(name, content)`; None drops one."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = change(name, old.read(name))
+            if content is not None:
+                new.writestr(name, content)
+    return target
+
+
+@pytest.fixture
+def scan(tmp_path):
+    return write_r3d(tmp_path / "scan.r3d", ROOM)
+
+
+def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(scan, tmp_path):
+    capture = read(scan, tmp_path)
+    assert capture.name == "scan"
+    assert len(capture.frames) == ROOM.count
+    assert capture.room.up_source == "file"
+    assert capture.room.floor_found
+    truth = ROOM.poses()
+    for frame in capture.frames:
+        ours, expected = frame.world_from_camera, truth[frame.index]
+        assert ours.translation[2] == pytest.approx(expected.translation[2], abs=0.004)
+        assert np.allclose(ours.rotation[2], expected.rotation[2], atol=1e-6)
+    axis = (capture.frames[0].world_from_camera.rotation @ truth[0].rotation.T)[:, 0] @ [1, 0, 0]
+    assert axis == pytest.approx(1.0)  # a y-up world is only tipped over, not turned
+    assert np.degrees(capture.room.manhattan_yaw_rad) == pytest.approx(np.degrees(ROOM.yaw_rad), abs=1.0)
+    heights = np.quantile(capture.surface.vertices_world[:, 2], (0.01, 0.99))
+    assert heights[0] == pytest.approx(0.0, abs=0.02)
+
+
+def test_without_gravity_in_the_file_the_room_itself_tells_up(tmp_path):
+    capture = read(write_seven_scenes(tmp_path / "kitchen", ROOM, gravity=False), tmp_path)
+    assert capture.room.up_source == "floor"
+    expected = ROOM.poses()[3].rotation[2]
+    assert np.degrees(np.arccos(capture.frames[3].world_from_camera.rotation[2] @ expected)) < 0.3
+
+
+@pytest.mark.parametrize("write", [write_exr, write_seven_scenes, write_tum])
+def test_every_format_gives_the_same_surface(write, scan, tmp_path):
+    other = read_capture(write(tmp_path / "other", ROOM), tmp_path / "b", QUICK)
+    capture = read_capture(scan, tmp_path / "a", QUICK)
+    from scipy.spatial import cKDTree
+
+    # x and y start at each recording's own origin: compare the heights and the way to the camera instead
+    def around(c):
+        eye = c.frames[0].world_from_camera
+        return eye.inverse.apply(c.surface.vertices_world)
+
+    distance = cKDTree(around(capture)).query(around(other))[0]
+    assert np.median(distance) < 0.02
+
+
+def test_the_recordings_jpegs_are_stored_untouched(scan, tmp_path):
+    read(scan, tmp_path)
+    original = zipfile.ZipFile(scan).read("rgbd/7.jpg")
+    assert (tmp_path / "store" / "rgb" / "000007.jpg").read_bytes() == original
+
+
+def test_images_can_be_opened_again_and_are_shared_read_only(scan, tmp_path):
+    capture = read(scan, tmp_path)
+    images = open_images(tmp_path / "store", capture.frames)
+    depth = images.depth(5)
+    exact = ROOM.depth(ROOM.poses()[5], ROOM.depth_camera)
+    assert np.abs(depth.metres - exact)[depth.valid].max() < 0.00013  # an eighth of a millimetre
+    assert images.rgb(5).shape == (*ROOM.rgb_size[::-1], 3)
+    assert np.array_equal(images.rgb(5), capture.images.rgb(5))
+    with pytest.raises(ValueError, match="read-only"):
+        depth.metres[0, 0] = 1.0
+    (tmp_path / "store" / "rgb" / "000005.jpg").unlink()
+    with pytest.raises(CaptureError, match=r"000005\.jpg: missing"):
+        open_images(tmp_path / "store", capture.frames)
+
+
+def test_colours_are_red_green_blue(tmp_path):
+    folder = write_seven_scenes(tmp_path / "kitchen", ROOM)
+    for path in (folder / "color").iterdir():
+        cv2.imwrite(str(path), np.full((*ROOM.rgb_size[::-1], 3), (20, 60, 220), np.uint8))  # OpenCV writes BGR: this is red
+    capture = read(folder, tmp_path)
+    assert (capture.images.rgb(0)[..., 0] > 200).all()
+    assert np.median(capture.surface.colours, axis=0) == pytest.approx([220, 60, 20], abs=12)
+
+
+def test_low_confidence_is_dropped(tmp_path):
+    def half(depth):
+        confidence = np.full(depth.shape, 2)
+        confidence[:, :24] = 1
+        return confidence
+
+    capture = read(write_r3d(tmp_path / "scan.r3d", ROOM, conf=half), tmp_path)
+    assert not capture.images.depth(3).valid[:, :24].any()
+    assert capture.images.depth(3).valid[:, 30:].mean() > 0.9
+
+
+def test_medium_confidence_is_accepted_with_a_notice_when_little_else_is_left(tmp_path):
+    def mostly_medium(depth):
+        confidence = np.ones(depth.shape)
+        confidence[:5], confidence[-5:] = 2, 0
+        return confidence
+
+    capture = read(write_r3d(tmp_path / "scan.r3d", ROOM, conf=mostly_medium), tmp_path)
+    assert any("medium confidence" in n for n in capture.notices)
+    valid = capture.images.depth(3).valid
+    assert valid[10:50].mean() > 0.85
+    assert not valid[-5:].any()
+
+
+def test_nan_is_unknown(tmp_path):
+    capture = read(write_r3d(tmp_path / "scan.r3d", ROOM, nan=True), tmp_path)
+    depth = capture.images.depth(2)
+    assert not depth.valid[:4, :4].any()
+    assert np.isfinite(depth.metres).all()
+
+
+def test_the_identity_follows_the_content(scan, tmp_path):
+    folder = write_exr(tmp_path / "export", ROOM)
+    first = read_capture(folder, tmp_path / "a", QUICK).sha256
+    (folder / "notes.txt").write_text("not part of the recording")
+    assert read_capture(folder, tmp_path / "a", QUICK).sha256 == first
+    (folder / "rgb" / "3.jpg").write_bytes((folder / "rgb" / "2.jpg").read_bytes())
+    assert read_capture(folder, tmp_path / "a", QUICK).sha256 != first
+
+
+def test_reading_twice_gives_the_same(scan, tmp_path):
+    a, b = read_capture(scan, tmp_path / "a", QUICK), read_capture(scan, tmp_path / "b", QUICK)
+    assert np.array_equal(a.surface.vertices_world, b.surface.vertices_world)
+    assert np.array_equal(a.world_from_capture.matrix, b.world_from_capture.matrix)
+    assert a.sha256 == b.sha256
+
+
+def test_long_recordings_are_thinned_and_keep_their_numbers(scan, tmp_path):
+    capture = read_capture(scan, tmp_path / "store", IngestConfig(most_frames=5, finest_voxel_m=0.03, coarsest_voxel_m=0.03))
+    assert [f.index for f in capture.frames] == [0, 3, 6, 9]
+    assert any("one in 3" in n for n in capture.notices)
+
+
+def test_a_zip_of_a_folder_is_the_folder(tmp_path):
+    folder = write_exr(tmp_path / "EXR_RGBD", ROOM)
+    capture = read(zip_folder(folder, tmp_path / "export.zip", top="EXR_RGBD/"), tmp_path)
+    assert capture.format == "Record3D EXR+JPG"
+    assert len(capture.frames) == ROOM.count
+
+
+def test_a_damaged_jpeg_in_the_middle_is_skipped_with_a_notice(scan, tmp_path):
+    damaged = rewritten(scan, tmp_path / "d.r3d", lambda n, c: c[: len(c) // 2] if n == "rgbd/4.jpg" else c)
+    capture = read(damaged, tmp_path)
+    assert [f.index for f in capture.frames] == [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11]
+    assert any("rgbd/4.jpg" in n for n in capture.notices)
+
+
+@pytest.mark.parametrize(
+    ("name", "broken", "found"),
+    [
+        ("rgbd/{}.jpg", b"no image at all", "not an image"),
+        ("rgbd/{}.depth", b"bvx2 garbage", "damaged LZFSE"),
+        ("rgbd/{}.depth", b"\0" * 4000, "4000 bytes of float32, 48x64 needs 12288"),
+        ("rgbd/{}.conf", b"\1" * 100, "100 bytes of uint8"),
+        ("rgbd/{}.depth", lzfse.compress(bytes(200 * 2**20)), "209715200 bytes of float32, 48x64 needs 12288"),
+    ],
+)
+def test_too_many_damaged_frames_are_an_error_that_names_the_first(name, broken, found, scan, tmp_path):
+    bad = {name.format(k) for k in (2, 3, 7, 9)}
+    damaged = rewritten(scan, tmp_path / "d.r3d", lambda n, c: broken if n in bad else c)
+    with pytest.raises(CaptureError, match=found) as caught:
+        read(damaged, tmp_path)
+    assert name.format(2) in str(caught.value)
+    assert caught.value.hint
+
+
+def test_an_error_leaves_the_earlier_store_alone_and_nothing_half_written(scan, tmp_path):
+    capture = read(scan, tmp_path)
+    bad = rewritten(scan, tmp_path / "d.r3d", lambda n, c: b"x" if n.endswith(".jpg") and "icon" not in n else c)
+    with pytest.raises(CaptureError):
+        read(bad, tmp_path)
+    assert open_images(tmp_path / "store", capture.frames).rgb(3).any()
+    assert sorted(p.name for p in (tmp_path / "store").iterdir()) == ["depth", "rgb"]
+
+
+def test_cancelling_leaves_nothing_behind(scan, tmp_path):
+    calls = iter(range(1000))
+    with pytest.raises(Cancelled):
+        read(scan, tmp_path, progress=Progress(is_cancelled=lambda: next(calls) > 5))
+    assert list((tmp_path / "store").iterdir()) == []
+
+
+def test_a_full_disk_is_said_to_be_one(scan, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(store_module.Path, "write_bytes", full)
+    with pytest.raises(EnvironmentProblem, match="disk is full") as caught:
+        read(scan, tmp_path)
+    assert caught.value.exit_code == 1
+
+
+def foreign(tmp_path):
+    (tmp_path / "a.r3d").write_bytes(b"%PDF-1.7 this is no zip")
+    return tmp_path / "a.r3d"
+
+
+def truncated(tmp_path):
+    whole = write_r3d(tmp_path / "whole.r3d", ROOM).read_bytes()
+    (tmp_path / "a.r3d").write_bytes(whole[: len(whole) // 2])
+    return tmp_path / "a.r3d"
+
+
+def other_zip(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("holiday/beach.jpg", b"x")
+    return tmp_path / "a.zip"
+
+
+def escaping(name):
+    def write(tmp_path):
+        with zipfile.ZipFile(write_r3d(tmp_path / "a.r3d", ROOM), "a") as archive:
+            archive.writestr(name, b"x")
+        return tmp_path / "a.r3d"
+
+    return write
+
+
+def symlink(tmp_path):
+    with zipfile.ZipFile(write_r3d(tmp_path / "a.r3d", ROOM), "a") as archive:
+        info = zipfile.ZipInfo("rgbd/99.jpg")
+        info.external_attr = (stat.S_IFLNK | 0o777) << 16
+        archive.writestr(info, "/etc/passwd")
+    return tmp_path / "a.r3d"
+
+
+def bomb(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.r3d", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("metadata", "{}")
+        with archive.open("rgbd/0.depth", "w", force_zip64=True) as member:
+            for _ in range(260):
+                member.write(b"\0" * 2**20)
+    return tmp_path / "a.r3d"
+
+
+def no_depth(tmp_path):
+    return rewritten(
+        write_r3d(tmp_path / "whole.r3d", ROOM), tmp_path / "a.r3d", lambda n, c: None if n.endswith((".depth", ".conf")) else c
+    )
+
+
+def metadata(**changes):
+    return lambda tmp_path: write_r3d(tmp_path / "a.r3d", ROOM, **changes)
+
+
+def no_json(tmp_path):
+    return rewritten(
+        write_r3d(tmp_path / "whole.r3d", ROOM), tmp_path / "a.r3d", lambda n, c: b"\xff{" if n == "metadata" else c
+    )
+
+
+def rotated(tmp_path):
+    def turn(name, content):
+        if not name.endswith(".jpg"):
+            return content
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        return cv2.imencode(".jpg", cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE))[1].tobytes()
+
+    return rewritten(write_r3d(tmp_path / "whole.r3d", ROOM), tmp_path / "a.r3d", turn)
+
+
+def odd_depth(tmp_path):
+    whole = write_r3d(tmp_path / "whole.r3d", ROOM, dw=None, dh=None, raw=True)
+    return rewritten(whole, tmp_path / "a.r3d", lambda n, c: c[: 4 * 1001] if n.endswith(".depth") else c)
+
+
+def without(*names):
+    def write(tmp_path):
+        folder = write_seven_scenes(tmp_path / "kitchen", ROOM)
+        for name in names:
+            for path in sorted(folder.glob(name)):
+                path.unlink()
+        return folder
+
+    return write
+
+
+def leaving_link(tmp_path):
+    folder = write_seven_scenes(tmp_path / "kitchen", ROOM)
+    (tmp_path / "outside.txt").write_text((folder / "intrinsics_color.txt").read_text())
+    (folder / "intrinsics_color.txt").unlink()
+    (folder / "intrinsics_color.txt").symlink_to(tmp_path / "outside.txt")
+    return folder
+
+
+BAD = {
+    "absent": (lambda p: p / "nothing.r3d", "no such file"),
+    "foreign": (foreign, "not a readable zip"),
+    "truncated": (truncated, "not a readable zip"),
+    "other zip": (other_zip, r"found holiday/beach\.jpg; no known recording format"),
+    "empty folder": (lambda p: (p / "empty").mkdir() or p / "empty", "holds no file"),
+    "zip slip": (escaping("../../evil"), "points outside"),
+    "absolute": (escaping("/etc/evil"), "points outside"),
+    "drive": (escaping("C:/evil"), "points outside"),
+    "symlink": (symlink, "symbolic link"),
+    "bomb": (bomb, "256 MiB at most"),
+    "no depth": (no_depth, "12 colour images but no depth"),
+    "no poses": (metadata(poses=[]), "no poses"),
+    "poses are no table": (metadata(poses=[[1, 2], 3]), "rows of 7 numbers"),
+    "no calibration": (metadata(K=None), "'K' should hold 9 numbers, found nothing"),
+    "calibration of text": (metadata(K=["a"] * 9), "'K' should hold 9 numbers"),
+    "focal length 0": (metadata(K=[0.0] * 9), "focal length"),
+    "no size": (metadata(w=None), "'w' should be a positive number, found nothing"),
+    "no json": (no_json, "not JSON"),
+    "lost tracking": (metadata(poses=[[0.0] * 7] * ROOM.count), "no frame has a usable pose"),
+    "rotated images": (rotated, "another shape"),
+    "odd depth size": (odd_depth, "have no size of the shape"),
+    "kitchen without poses": (without("pose/*"), "no known recording format"),
+    "kitchen without depth": (without("depth/*"), "0 depth images"),
+    "link out of the folder": (leaving_link, "link that leaves"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_ends_in_one_clear_line(case, tmp_path):
+    write, found = BAD[case]
+    source = write(tmp_path)
+    with pytest.raises(CaptureError, match=found) as caught:
+        read(source, tmp_path)
+    line = str(caught.value)
+    assert source.name in line
+    assert "\n" not in line
+    assert caught.value.hint
+    assert not (tmp_path / "store" / "rgb").exists()
+
+
+def test_the_real_recording_without_frames_says_so(real, tmp_path):
+    with pytest.raises(CaptureError, match="49 frames but no rgbd"):
+        read(real("record3d-r3d-metadata-only/data.r3d"), tmp_path)
+
+
+def test_a_member_that_fails_its_checksum_costs_its_frame_only(scan, tmp_path):
+    content = bytearray(scan.read_bytes())
+    with zipfile.ZipFile(scan) as archive:
+        info = archive.getinfo("rgbd/6.depth")
+    start = info.header_offset + 30 + len(info.filename)
+    content[start + 40] ^= 0xFF
+    (tmp_path / "d.r3d").write_bytes(content)
+    capture = read(tmp_path / "d.r3d", tmp_path)
+    assert 6 not in [f.index for f in capture.frames]
+    assert any("rgbd/6.depth" in n for n in capture.notices)
+
+
+def test_metadata_with_a_wrong_type_is_an_error_not_a_crash(scan, tmp_path):
+    for metadata_json in ("[]", "3", json.dumps({"w": "wide", "h": 4})):
+        broken = rewritten(scan, tmp_path / "d.r3d", lambda n, c, m=metadata_json: m.encode() if n == "metadata" else c)
+        with pytest.raises(CaptureError):
+            read(broken, tmp_path)

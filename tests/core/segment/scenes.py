@@ -1,0 +1,188 @@
+"""A small kitchen of coloured boxes with known panels, filmed by a few exact cameras."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.fusion import DepthView, fuse_depth
+from r2c2r_core.geometry.raster import rasterize, subdivide_long_edges
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture, Depth, Frame, Room, SceneSurface, Wall
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+
+WIDTH, HEIGHT = 480, 360
+GAP_M = 0.003
+FRONT_Y = -0.60
+TOP_M, BOTTOM_M = 0.86, 0.12
+# left edge and width of each column of fronts
+DOORS = {"door_a": (0.0, 0.50), "door_b": (0.503, 0.50), "door_c": (1.006, 0.40)}
+DRAWERS = {
+    "drawer_top": (1.409, 0.45, 0.66, 0.20),
+    "drawer_mid": (1.409, 0.45, 0.36, 0.297),
+    "drawer_low": (1.409, 0.45, 0.12, 0.237),
+}
+POST = (0.62, 0.72)  # x range of a post that stands before door_b
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """The recording's images, in memory."""
+
+    colours: dict[int, np.ndarray]
+    depths: dict[int, np.ndarray]
+
+    def rgb(self, frame_index: int) -> np.ndarray:
+        return self.colours[frame_index]
+
+    def depth(self, frame_index: int) -> Depth:
+        metres = self.depths[frame_index]
+        return Depth(metres, metres > 0)
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Triangles with a colour and an object id each."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colours: np.ndarray
+    ids: np.ndarray  # a vertex: 0 none
+
+
+def kitchen() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """The capture, and the true mask of each named thing in each frame."""
+    shapes, names = _shapes()
+    colours: dict[int, np.ndarray] = {}
+    depths: dict[int, np.ndarray] = {}
+    truth: dict[str, dict[int, np.ndarray]] = {name: {} for name in names}
+    frames = []
+    rgb_camera = Intrinsics(fx=400.0, fy=400.0, cx=WIDTH / 2, cy=HEIGHT / 2, width=WIDTH, height=HEIGHT)
+    depth_camera = rgb_camera.resized(WIDTH // 2, HEIGHT // 2)
+    rng = np.random.default_rng(5)
+    for index, (x, y, z, target) in enumerate(_path()):
+        pose = look_at(np.array([x, y, z]), np.array(target))
+        fine = rgb_camera.resized(2 * WIDTH, 2 * HEIGHT)
+        picture = rasterize(shapes.vertices, shapes.faces, shapes.colours, fine, pose.inverse)
+        small = cv2.resize(picture.attributes, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        colours[10 * index] = (small + rng.normal(0, 1.5, small.shape)).clip(0, 255).astype(np.uint8)
+        seen = rasterize(shapes.vertices, shapes.faces, shapes.colours, depth_camera, pose.inverse).depth_m
+        depths[10 * index] = np.where(seen > 0, seen + rng.normal(0, 0.002, seen.shape), 0).astype(np.float32)
+        exact = rasterize(shapes.vertices, shapes.faces, np.repeat(shapes.ids[:, None], 3, 1), rgb_camera, pose.inverse)
+        label = np.round(exact.attributes[..., 0]).astype(int)
+        for number, name in enumerate(names, 1):
+            truth[name][10 * index] = label == number
+        frames.append(
+            Frame(
+                index=10 * index,
+                timestamp_s=None,
+                rgb_camera=rgb_camera,
+                depth_camera=depth_camera,
+                world_from_camera=pose,
+                sharpness=100.0,
+            )
+        )
+    views = [DepthView(depths[f.index], depth_camera, f.world_from_camera, _shrunk(colours[f.index])) for f in frames]
+    fused = fuse_depth(views, 0.012, depth_max_m=5.0)
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
+    capture = Capture(
+        name="boxes",
+        sha256="test",
+        format="test",
+        frames=tuple(frames),
+        world_from_capture=Rigid3(),
+        room=Room(up_source="file", floor_found=True, manhattan_yaw_rad=0.0, walls=(wall,)),
+        surface=SceneSurface(vertices_world=fused.vertices, faces=fused.faces, colours=fused.colours, voxel_m=0.012),
+        images=Pixels(colours, depths),
+        notices=(),
+    )
+    return capture, truth
+
+
+def click_on(capture: Capture, point_world: tuple[float, float, float], frame_index: int, label: int = 1) -> PromptPoint:
+    """The click that sees a world point in a frame."""
+    frame = capture.frame(frame_index)
+    x, y, z = frame.world_from_camera.inverse.apply(np.array([point_world]))[0]
+    camera = frame.rgb_camera
+    u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+    return PromptPoint(frame=frame_index, x=float(u), y=float(v), label=1 if label else 0)
+
+
+def prompt(name: str, category: str, *points: PromptPoint) -> ObjectPrompt:
+    return ObjectPrompt(name=name, category=category, points=points)
+
+
+def look_at(eye: np.ndarray, target: np.ndarray) -> Rigid3:
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return Rigid3(np.column_stack([right, np.cross(forward, right), forward]), eye)
+
+
+def _path() -> list[tuple[float, float, float, tuple[float, float, float]]]:
+    path = []
+    for step in range(14):
+        t = step / 13
+        path.append((0.0 + 1.9 * t, -2.1 + 0.25 * np.sin(5 * t), 1.15 + 0.25 * np.cos(4 * t), (0.35 + 1.1 * t, FRONT_Y, 0.6)))
+    return path
+
+
+def _shapes() -> tuple[Shapes, list[str]]:
+    boxes: list[tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]] = [
+        ((-1.5, 0.0, 0.0), (3.5, 0.02, 2.4), (200, 202, 198), None),  # wall
+        ((-1.5, -3.5, -0.02), (3.5, 0.0, 0.0), (120, 100, 80), None),  # floor
+        ((0.0, FRONT_Y + 0.02, 0.12), (1.859, 0.0, 0.86), (25, 24, 22), None),  # carcass, dark in the gaps
+        ((0.0, FRONT_Y + 0.07, 0.0), (1.859, 0.0, 0.12), (60, 60, 64), None),  # plinth
+        ((-0.02, FRONT_Y - 0.02, 0.865), (1.88, 0.0, 0.90), (70, 74, 80), None),  # worktop
+        ((POST[0], FRONT_Y - 0.25, 0.0), (POST[1], FRONT_Y - 0.20, 0.70), (40, 120, 60), None),
+    ]
+    names = list(DOORS) + list(DRAWERS) + ["carton"]
+    for name, (x, width) in DOORS.items():
+        boxes.append(((x, FRONT_Y, BOTTOM_M), (x + width, FRONT_Y + 0.018, TOP_M), (176, 60, 52), name))
+        at = x + width - 0.05 if name != "door_b" else x + 0.05
+        boxes.append(((at - 0.006, FRONT_Y - 0.036, 0.62), (at + 0.006, FRONT_Y - 0.024, 0.80), (210, 210, 214), name))
+    for name, (x, width, z, height) in DRAWERS.items():
+        boxes.append(((x, FRONT_Y, z), (x + width, FRONT_Y + 0.018, z + height), (176, 60, 52), name))
+        middle, level = x + width / 2, z + height / 2
+        boxes.append(
+            (
+                (middle - 0.08, FRONT_Y - 0.036, level - 0.006),
+                (middle + 0.08, FRONT_Y - 0.024, level + 0.006),
+                (210, 210, 214),
+                name,
+            )
+        )
+    boxes.append(((1.0, -0.36, 0.90), (1.12, -0.26, 1.10), (60, 90, 170), "carton"))
+    vertices, faces, attributes = [], [], []
+    count = 0
+    for low, high, colour, name in boxes:
+        v, f = _box(np.array(low), np.array(high))
+        shade = np.array(colour) * np.repeat([0.8, 0.9, 0.9, 0.95, 0.85, 1.0], 4)[:, None]
+        number = names.index(name) + 1 if name else 0
+        v, f, a = subdivide_long_edges(v, f, np.column_stack([shade, np.full(len(v), number)]), 0.3)
+        vertices.append(v)
+        faces.append(f + count)
+        attributes.append(a)
+        count += len(v)
+    packed = np.concatenate(attributes)
+    return Shapes(np.concatenate(vertices), np.concatenate(faces), packed[:, :3], packed[:, 3]), names
+
+
+def _box(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Six quads with vertices of their own, so that each face has its own shade."""
+    vertices, faces = [], []
+    for axis in range(3):
+        a, b = [k for k in range(3) if k != axis]
+        for side in (low, high):
+            start = len(vertices)
+            for s, t in ((low[a], low[b]), (high[a], low[b]), (high[a], high[b]), (low[a], high[b])):
+                corner = np.zeros(3)
+                corner[axis], corner[a], corner[b] = side[axis], s, t
+                vertices.append(corner)
+            faces += [[start, start + 1, start + 2], [start, start + 2, start + 3]]
+    return np.array(vertices), np.array(faces)
+
+
+def _shrunk(image: np.ndarray) -> np.ndarray:
+    return np.asarray(cv2.resize(image, (WIDTH // 2, HEIGHT // 2), interpolation=cv2.INTER_AREA))

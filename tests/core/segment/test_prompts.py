@@ -1,0 +1,85 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from r2c2r_core.errors import PromptError
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import PromptPoint, Prompts
+from r2c2r_core.segment.prompts import check_prompts, read_prompts
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import prompt
+
+POINT = {"frame": 60, "x": 100.0, "y": 50.5, "label": 1}
+OBJECT: dict[str, Any] = {"name": "drawer_1", "category": "drawer", "points": [POINT]}
+
+
+def written(tmp_path: Path, document: Any) -> Path:
+    path = tmp_path / "prompts.json"
+    path.write_text(document if isinstance(document, str) else json.dumps(document))
+    return path
+
+
+def test_a_good_file_is_read(tmp_path: Path) -> None:
+    prompts = read_prompts(written(tmp_path, {"version": 1, "objects": [OBJECT]}))
+    assert prompts.objects[0].name == "drawer_1"
+    assert prompts.objects[0].points == (PromptPoint(frame=60, x=100.0, y=50.5, label=1),)
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ("{", "not JSON"),
+        ([], "the document is a list"),
+        ({"objects": []}, "lacks 'version'"),
+        ({"version": 2, "objects": []}, "version 2 found, 1 expected"),
+        ({"version": 1, "objects": [], "notes": ""}, "unknown key 'notes'"),
+        ({"version": 1, "objects": {}}, "objects is an object, a list expected"),
+        ({"version": 1, "objects": [{**OBJECT, "colour": "red"}]}, "unknown key 'colour'"),
+        ({"version": 1, "objects": [{**OBJECT, "name": 3}]}, "name is a number"),
+        ({"version": 1, "objects": [{**OBJECT, "name": "oven door"}]}, "name 'oven door' found"),
+        ({"version": 1, "objects": [OBJECT, OBJECT]}, "two objects named 'drawer_1'"),
+        ({"version": 1, "objects": [{**OBJECT, "points": [{**POINT, "frame": 1.5}]}]}, "frame is 1.5, a whole number"),
+        ({"version": 1, "objects": [{**OBJECT, "points": [{**POINT, "x": "10"}]}]}, "x is '10', a number"),
+        ({"version": 1, "objects": [{**OBJECT, "points": [{**POINT, "label": 2}]}]}, "label is 2, 0 or 1 expected"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, document: Any, message: str) -> None:
+    with pytest.raises(PromptError) as caught:
+        read_prompts(written(tmp_path, document))
+    assert message in str(caught.value)
+    assert "prompts.json" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(PromptError, match="no such file"):
+        read_prompts(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("point", "message"),
+    [
+        (PromptPoint(frame=60, x=480.0, y=10.0, label=1), r"drawer: click at \(480, 10\) on frame 60 found, 0 <= x < 480"),
+        (PromptPoint(frame=60, x=10.0, y=-1.0, label=1), "0 <= y < 360 expected"),
+        (
+            PromptPoint(frame=61, x=10.0, y=10.0, label=1),
+            r"click on frame 61 found, a frame of 0\.\.130 expected; the nearest frame is 60",
+        ),
+        (PromptPoint(frame=60, x=10.0, y=10.0, label=0), "drawer: 1 clicks off it found"),
+    ],
+)
+def test_clicks_that_the_capture_cannot_serve_are_refused(
+    boxes: tuple[Capture, Truth], point: PromptPoint, message: str
+) -> None:
+    with pytest.raises(PromptError, match=message):
+        check_prompts(boxes[0], Prompts(objects=(prompt("drawer", "drawer", point),)))
+
+
+def test_no_objects_and_repeated_names_are_refused(boxes: tuple[Capture, Truth]) -> None:
+    with pytest.raises(PromptError, match="no objects found"):
+        check_prompts(boxes[0], Prompts(objects=()))
+    twice = prompt("drawer", "drawer", PromptPoint(frame=60, x=10.0, y=10.0, label=1))
+    with pytest.raises(PromptError, match="two objects named 'drawer'"):
+        check_prompts(boxes[0], Prompts(objects=(twice, twice)))

@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
+from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
+from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
+
+KITCHEN = [
+    Unit("cab_l", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=Handle(0.24, 0.2)),
+    Unit("cab_r", "cabinet", (0.602, 0.004, 0.5), (0.6, 0.58, 0.7), handle=Handle(-0.24, 0.2)),
+    Unit("drawer_1", "drawer", (1.2, 0, 0.75), (0.59, 0.58, 0.2), handle=Handle(0, 0, vertical=False)),
+    Unit("drawer_2", "drawer", (1.2, -0.005, 0.5), (0.59, 0.58, 0.298), handle=Handle(0, 0.02, vertical=False)),
+    Unit("pair", "double-door cabinet", (2.0, 0, 0.5), (0.8, 0.58, 0.7)),
+    Unit("wall", "wall_cabinet", (0, 0.1, 1.7), (0.6, 0.35, 0.7), handle=Handle(0.24, -0.2)),
+    Unit("fridge", "fridge", (-0.85, -0.03, 0.9), (0.6, 0.7, 1.8), handle=Handle(-0.24, 0.2, length=0.4), kind="appliance"),
+    Unit("dish", "dishwasher", (2.75, 0, 0.5), (0.6, 0.58, 0.78), handle=Handle(0, 0.3, length=0.4, vertical=False)),
+    Unit("oven", "range", (3.4, 0, 0.5), (0.6, 0.58, 0.72), handle=Handle(0, 0.22, length=0.4, vertical=False)),
+    Unit("micro", "microwave", (1.2, 0.05, 1.08), (0.5, 0.36, 0.28), yaw=0.05, handle=Handle(0.14, 0), kind="appliance"),
+    Unit("top", "counter", (1.7, -0.01, 0.915), (4.1, 0.62, 0.04), kind="thing"),
+    Unit("bottle", "bottle", (0.3, 0, 1.058), (0.08, 0.08, 0.24), kind="thing"),
+]
+
+
+def built(*units: Unit, overrides: Overrides | None = None, walls: tuple[Wall, ...] = ()) -> ArticulatedScene:
+    rng = np.random.default_rng(0)
+    tracks, placements, assets = zip(*[placed_unit(u, rng) for u in units], strict=True)
+    return build_scene(capture(walls), tracks, placements, assets, overrides or Overrides(objects={}), SynthesizeConfig())
+
+
+@pytest.fixture(scope="module")
+def kitchen() -> ArticulatedScene:
+    return built(*KITCHEN)
+
+
+def the(scene: ArticulatedScene, name: str) -> SceneObject:
+    return next(o for o in scene.objects if o.name == name)
+
+
+def test_nothing_touches_at_rest(kitchen: ArticulatedScene) -> None:
+    assert deepest_contact(compile_scene(kitchen)) < 5e-4
+
+
+def test_no_free_sweep_passes_through_anything(kitchen: ArticulatedScene) -> None:
+    depths = sweep(kitchen, compile_scene(kitchen))
+    assert len(depths) == 11
+    assert max(depths.values()) < 1e-3
+
+
+def test_every_joint_opens_under_a_hands_force(kitchen: ArticulatedScene) -> None:
+    shares = reached(kitchen, compile_scene(kitchen))
+    assert min(shares.values()) >= 0.98, shares
+
+
+def test_every_inertia_is_physical(kitchen: ArticulatedScene) -> None:
+    for item in kitchen.objects:
+        for link in item.links:
+            moments = np.linalg.eigvalsh(link.inertial.inertia)
+            assert moments[0] > 0
+            assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
+            com = link.object_from_link.apply(link.inertial.com_link[None])[0]
+            assert (np.abs(com) <= item.dimensions_m / 2 + 0.06).all()
+            assert 0.01 <= link.inertial.mass_kg < 120
+
+
+def test_masses_are_those_of_furniture(kitchen: ArticulatedScene) -> None:
+    fridge = sum(link.inertial.mass_kg for link in the(kitchen, "fridge").links)
+    assert 45 < fridge < 100
+    assert 3 < the(kitchen, "cab_l").links[1].inertial.mass_kg < 8
+
+
+def test_joints_are_of_the_categorys_type(kitchen: ArticulatedScene) -> None:
+    types = {o.name: {j.type for j in o.joints} for o in kitchen.objects}
+    assert types["drawer_1"] == {"prismatic"}
+    assert types["pair"] == types["micro"] == types["dish"] == {"revolute"}
+    assert types["top"] == types["bottle"] == set()
+
+
+def test_positive_opens_outwards(kitchen: ArticulatedScene) -> None:
+    """The middle of each moving part goes to -y of the object when its joint goes positive."""
+    for item in kitchen.objects:
+        for joint in item.joints:
+            link = next(k for k in item.links if k.name == joint.child)
+            middle = link.object_from_link.apply(link.boxes[0].link_from_box.translation[None])[0]
+            arm = middle - joint.origin_object
+            velocity = joint.axis_object if joint.type == "prismatic" else np.cross(joint.axis_object, arm)
+            assert velocity[1] < 0, joint.name
+
+
+def test_a_side_hinged_axis_is_the_outer_vertical_edge_of_the_front(kitchen: ArticulatedScene) -> None:
+    item = the(kitchen, "cab_l")
+    half = item.dimensions_m / 2
+    np.testing.assert_allclose(item.joints[0].origin_object[:2], [-half[0], -half[1]], atol=1e-9)
+    np.testing.assert_allclose(item.links[1].object_from_link.translation, item.joints[0].origin_object)
+
+
+def test_a_drawer_has_a_floor_and_sides(kitchen: ArticulatedScene) -> None:
+    assert sum(box.name.startswith("tray") for box in the(kitchen, "drawer_1").links[1].boxes) == 4
+
+
+def test_a_handle_can_be_held(kitchen: ArticulatedScene) -> None:
+    grip = next(box for box in the(kitchen, "cab_l").links[1].boxes if box.name == "handle")
+    assert grip.size_m.min() >= 0.008
+    assert grip.size_m.max() == pytest.approx(0.16)
+
+
+def test_limits_given_by_a_person_are_kept() -> None:
+    asked = Overrides(objects={"cab_l": ObjectOverride(joint_upper=1.0, hinge="right")})
+    joint = built(KITCHEN[0], overrides=asked).objects[0].joints[0]
+    assert joint.upper == 1.0
+    assert joint.axis_object[2] == 1.0
+    assert (joint.sources["limits"], joint.sources["axis"]) == ("person", "person")
+
+
+def test_a_wall_beside_the_hinge_limits_the_door() -> None:
+    wall = Wall(normal=np.array([1.0, 0.0, 0.0]), offset_m=-0.31, area_m2=6.0)
+    scene = built(KITCHEN[0], walls=(wall,))
+    joint = scene.objects[0].joints[0]
+    assert np.deg2rad(75) < joint.upper < np.deg2rad(100)
+    assert joint.sources["limits"] == "inferred"
+    assert any("a wall is in the way" in w for w in scene.objects[0].warnings)
+
+
+def test_an_unknown_category_is_a_rigid_object_with_advice() -> None:
+    scene = built(Unit("m", "Micro wave", (0, 0, 0.05), (0.09, 0.09, 0.1), kind="thing"))
+    assert scene.objects[0].category == "Micro wave"
+    assert scene.objects[0].fixture == "object"
+    assert scene.objects[0].movable
+    assert "did you mean microwave" in scene.objects[0].warnings[0]
+
+
+def test_every_fixture_builds_at_its_default_size() -> None:
+    for spec in FIXTURES:
+        if spec.build is not None:
+            unit = Unit("a", spec.name, (0, 0, 1.2), spec.dimensions_m, kind="appliance")
+            scene = built(unit)
+            assert scene.objects[0].fixture == spec.name
+            assert deepest_contact(compile_scene(scene)) < 5e-4
+
+
+@pytest.mark.parametrize(("said", "meant"), [("Double-door cabinet", "double_door_cabinet"), ("Fridge", "refrigerator")])
+def test_categories_are_recognised_however_they_are_written(said: str, meant: str) -> None:
+    assert fixture_for(said)[0].name == meant
+
+
+def test_building_twice_gives_the_same_scene() -> None:
+    first, second = built(*KITCHEN[:4]), built(*KITCHEN[:4])
+    for a, b in zip(first.objects, second.objects, strict=True):
+        np.testing.assert_array_equal(a.world_from_object.matrix, b.world_from_object.matrix)
+        np.testing.assert_array_equal(a.dimensions_m, b.dimensions_m)

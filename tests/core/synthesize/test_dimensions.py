@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
+from r2c2r_core.synthesize.fixtures.table import fixture_for
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
+
+
+def measure(
+    unit: Unit, *, override: ObjectOverride | None = None, walls: tuple[Wall, ...] = (), seed: int = 0
+) -> MeasuredObject:
+    track, placement, asset = placed_unit(unit, np.random.default_rng(seed))
+    spec, _ = fixture_for(unit.category)
+    return measure_object(capture(walls), track, placement, asset, spec, override or ObjectOverride())
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, 1.3, 2.6, -2.0])
+def test_a_yawed_box_is_measured_within_one_percent_without_its_handle(yaw: float) -> None:
+    unit = Unit("a", "cabinet", (0.3, 0.2, 0.5), (0.6, 0.58, 0.7), yaw=yaw, handle=Handle(0.24, 0.2), with_track_front=False)
+    at = (0.3 + 3 * np.sin(yaw), 0.2 - 3 * np.cos(yaw), 1.4)
+    track, placement, asset = placed_unit(unit, np.random.default_rng(1))
+    found = measure_object(capture(camera_at=at), track, placement, asset, fixture_for("cabinet")[0], ObjectOverride())
+    np.testing.assert_allclose(found.dimensions_m, unit.size, rtol=0.01)
+    np.testing.assert_allclose(found.world_from_object.rotation, unit.world_from_object.rotation, atol=0.01)
+    np.testing.assert_allclose(found.world_from_object.translation, unit.centre, atol=0.004)
+
+
+def test_the_mesh_alone_tells_where_its_handle_is() -> None:
+    found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=Handle(0.24, 0.2), with_track_front=False))
+    assert found.handle is not None
+    np.testing.assert_allclose(found.handle.centre, (0.24, 0.2), atol=0.01)
+    assert found.handle.protrusion_m == pytest.approx(0.035, abs=0.004)
+
+
+def test_what_the_frames_measured_replaces_the_meshs_width_and_height() -> None:
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0), stretch=(1.06, 1.0, 0.95))
+    found = measure_object(capture(), track, placement, asset, fixture_for("cabinet")[0], ObjectOverride())
+    np.testing.assert_allclose(found.dimensions_m[[0, 2]], [0.6, 0.7])
+    assert found.sources == ("measured", "inferred", "measured")
+
+
+def test_a_depth_that_passes_through_the_wall_ends_at_the_wall() -> None:
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-0.2, area_m2=4.0)  # the plane y = 0.2, seen from y < 0.2
+    found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7)), walls=(wall,))
+    assert found.dimensions_m[1] == pytest.approx(0.49, abs=0.004)
+    assert found.sources[1] == "inferred"
+
+
+def test_an_unbelievable_depth_becomes_the_categorys() -> None:
+    found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.05, 0.7)))
+    assert found.sources[1] == "default"
+    assert found.dimensions_m[1] == pytest.approx(0.58)
+
+
+def test_a_persons_size_and_pose_win() -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = (1.0, 2.0, 0.4)
+    override = ObjectOverride(dimensions_m=np.array([0.5, 0.5, 0.6]), pose=pose)
+    found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7)), override=override)
+    np.testing.assert_allclose(found.dimensions_m, [0.5, 0.5, 0.6])
+    np.testing.assert_allclose(found.world_from_object.translation, [1.0, 2.0, 0.4])
+    assert found.sources == ("person", "person", "person")
+
+
+def test_a_persons_size_leaves_the_front_face_where_it_was() -> None:
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
+    found = measure(unit, override=ObjectOverride(dimensions_m=np.array([0.5, 0.4, 0.6])))
+    np.testing.assert_allclose(found.front_centre, [0.0, -0.29, 0.5], atol=1e-6)

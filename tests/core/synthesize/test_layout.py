@@ -1,0 +1,159 @@
+import numpy as np
+
+from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
+from r2c2r_core.synthesize.fixtures.table import fixture_for
+from r2c2r_core.synthesize.layout import GAP_M, REST_GAP_M, Layout, arrange, overlapping_pairs
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
+
+
+def arranged(*units: Unit, overrides: dict[str, ObjectOverride] | None = None, manhattan: float = 0.3) -> Layout:
+    rng = np.random.default_rng(0)
+    items: list[MeasuredObject] = []
+    for unit in units:
+        override = (overrides or {}).get(unit.name, ObjectOverride())
+        items.append(measure_object(capture(), *placed_unit(unit, rng), fixture_for(unit.category)[0], override))
+    return arrange(items, manhattan, floor_found=True)
+
+
+def run_of_doors(noise_m: float, yaw_noise_rad: float) -> list[Unit]:
+    rng = np.random.default_rng(3)
+    return [
+        Unit(
+            f"d{i}",
+            "cabinet",
+            (0.503 * i, float(rng.normal() * noise_m), 0.5),
+            (0.5, 0.58, 0.7),
+            yaw=float(rng.normal() * yaw_noise_rad),
+            handle=Handle(0.2, 0.1),
+        )
+        for i in range(5)
+    ]
+
+
+def test_a_run_becomes_coplanar_and_parallel() -> None:
+    layout = arranged(*run_of_doors(0.004, 0.01))
+    fronts = np.array([o.front_centre @ o.outward for o in layout.objects])
+    yaws = np.array([np.arctan2(o.outward[1], o.outward[0]) for o in layout.objects])
+    assert np.ptp(fronts) < 1e-6
+    assert np.ptp(yaws) < 1e-9
+    assert abs(yaws[0] + np.pi / 2) < np.deg2rad(0.35)  # five fronts over 2 m, 4 mm noise each
+    assert max(layout.moves_m.values()) < 0.015
+
+
+def test_the_rooms_right_angle_wins_when_a_run_is_within_a_degree_of_it() -> None:
+    layout = arranged(*run_of_doors(0.002, 0.004), manhattan=0.0)
+    np.testing.assert_allclose([o.outward for o in layout.objects], [[0, -1, 0]] * 5, atol=1e-9)
+
+
+def test_a_front_that_stands_out_by_five_centimetres_stays_out() -> None:
+    units = [*run_of_doors(0.0, 0.0), Unit("tall", "cabinet", (2.52, -0.05, 0.5), (0.5, 0.58, 0.7))]
+    layout = arranged(*units)
+    assert abs(layout.objects[-1].front_centre[1] - (-0.34)) < 1e-3
+
+
+def test_small_overlaps_are_trimmed_and_leave_a_gap() -> None:
+    layout = arranged(
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.494, 0, 0.5), (0.5, 0.58, 0.7))
+    )
+    a, b = layout.objects
+    gap = (b.front_centre[0] - b.dimensions_m[0] / 2) - (a.front_centre[0] + a.dimensions_m[0] / 2)
+    assert GAP_M <= gap < 0.0031
+    assert abs(a.dimensions_m[0] - 0.5) < 0.006
+    assert max(layout.moves_m.values()) < 0.005
+
+
+def test_large_overlaps_are_moved_apart_and_the_moves_are_reported() -> None:
+    layout = arranged(
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.44, 0, 0.5), (0.5, 0.58, 0.7))
+    )
+    assert overlapping_pairs(layout.objects) == []
+    assert 0.02 < layout.moves_m["a"] < 0.04
+    assert 0.02 < layout.moves_m["b"] < 0.04
+
+
+def test_what_a_person_placed_stays_and_the_other_gives_way() -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = (0.0, 0.0, 0.5)
+    layout = arranged(
+        Unit("a", "cabinet", (0.01, 0, 0.5), (0.5, 0.58, 0.7)),
+        Unit("b", "cabinet", (0.44, 0, 0.5), (0.5, 0.58, 0.7)),
+        overrides={"a": ObjectOverride(pose=pose)},
+    )
+    np.testing.assert_allclose(layout.objects[0].world_from_object.translation, [0, 0, 0.5], atol=1e-9)
+    assert overlapping_pairs(layout.objects) == []
+
+
+def test_a_depth_nobody_saw_gives_way_before_a_measured_front_moves() -> None:
+    """Two runs meet in a corner: one cabinet's inferred depth runs into the other run."""
+    layout = arranged(
+        Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.7, 0.7)),
+        Unit("b", "cabinet", (0.0, 0.59, 0.5), (0.6, 0.5, 0.7), yaw=np.pi / 2),
+        manhattan=0.0,
+    )
+    assert overlapping_pairs(layout.objects) == []
+    assert max(layout.moves_m.values()) < 1e-6
+
+
+def test_things_come_to_rest_on_what_is_below_them() -> None:
+    layout = arranged(
+        Unit("top", "counter", (0, 0, 0.9), (1.2, 0.62, 0.04), kind="thing"),
+        Unit("bottle", "bottle", (0.1, 0, 1.052), (0.08, 0.08, 0.24), kind="thing"),
+        Unit("sunk", "mug", (-0.3, 0, 0.963), (0.09, 0.09, 0.1), kind="thing"),
+    )
+    counter, *things = layout.objects
+    top = counter.world_from_object.translation[2] + counter.dimensions_m[2] / 2
+    for thing in things:
+        bottom = thing.world_from_object.translation[2] - thing.dimensions_m[2] / 2
+        assert abs(bottom - top - REST_GAP_M) < 1e-6
+    assert overlapping_pairs(layout.objects) == []
+
+
+def test_a_wall_cabinet_hangs_where_it_was_measured() -> None:
+    layout = arranged(Unit("w", "wall_cabinet", (0, 0, 1.71), (0.6, 0.35, 0.7)), manhattan=0.0)
+    assert layout.moves_m["w"] < 1e-6
+
+
+def test_noisy_edges_of_a_run_end_on_shared_lines_and_seams() -> None:
+    """Edges off by 3 mm each: tops and bottoms become level, gaps 3 mm, and widths no worse than they were measured."""
+    rng = np.random.default_rng(5)
+    noisy = []
+    for i in range(5):
+        left, right, low, high = np.array([0.503 * i - 0.25, 0.503 * i + 0.25, 0.15, 0.85]) + rng.normal(size=4) * 0.003
+        noisy.append(Unit(f"d{i}", "cabinet", ((left + right) / 2, 0, (low + high) / 2), (right - left, 0.58, high - low)))
+    layout = arranged(*noisy, manhattan=0.0)
+    centres = np.array([o.world_from_object.translation for o in layout.objects])
+    sizes = np.array([o.dimensions_m for o in layout.objects])
+    assert np.ptp(centres[:, 2] + sizes[:, 2] / 2) < 1e-9
+    assert np.ptp(centres[:, 2] - sizes[:, 2] / 2) < 1e-9
+    gaps = (centres[1:, 0] - sizes[1:, 0] / 2) - (centres[:-1, 0] + sizes[:-1, 0] / 2)
+    np.testing.assert_allclose(gaps, 0.003, atol=1e-6)
+    measured_error = np.abs([u.size[0] - 0.5 for u in noisy]).mean()
+    assert np.abs(sizes[:, 0] - 0.5).mean() <= measured_error
+
+
+def test_a_shorter_neighbour_keeps_its_own_height() -> None:
+    layout = arranged(
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.503, 0, 0.45), (0.5, 0.58, 0.6))
+    )
+    np.testing.assert_allclose([o.dimensions_m[2] for o in layout.objects], [0.7, 0.6], atol=1e-9)
+
+
+def test_a_thing_beside_a_step_does_not_sink_into_it() -> None:
+    """Its support lies lower than the box it partly stands over, which carries too little of it to be its support."""
+    layout = arranged(
+        Unit("step", "counter", (0.0, 0, 0.9), (0.6, 0.6, 0.04), kind="thing"),
+        Unit("mug", "mug", (0.335, 0, 0.962), (0.1, 0.1, 0.1), kind="thing"),
+        Unit("low", "counter", (0.7, 0, 0.89), (0.6, 0.6, 0.04), kind="thing"),
+    )
+    assert overlapping_pairs(layout.objects) == []
+
+
+def test_furniture_does_not_give_way_to_what_stands_on_it() -> None:
+    layout = arranged(
+        Unit("d", "drawer", (0, 0, 0.8), (0.6, 0.58, 0.2)),
+        Unit("m", "microwave", (0, 0, 0.9 - 0.02 + 0.14), (0.5, 0.38, 0.28), kind="appliance"),
+        manhattan=0.0,
+    )
+    assert layout.moves_m["d"] < 1e-6
+    assert overlapping_pairs(layout.objects) == []

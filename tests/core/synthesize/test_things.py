@@ -1,0 +1,43 @@
+import numpy as np
+from trimesh.creation import annulus, cylinder, icosphere
+
+from r2c2r_core.synthesize.things import Solid, convex_pieces
+
+
+def solid(mesh) -> Solid:  # type: ignore[no-untyped-def]
+    return Solid(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+
+
+def test_a_convex_thing_is_one_piece_that_keeps_its_extents() -> None:
+    mesh = cylinder(radius=0.04, height=0.3, sections=200)
+    pieces = convex_pieces(solid(mesh), mesh.extents)
+    assert len(pieces) == 1
+    np.testing.assert_allclose(np.ptp(pieces[0].vertices_link, axis=0), mesh.extents, atol=1e-3)
+    assert np.abs(pieces[0].vertices_link).max(axis=0)[2] <= 0.15 + 1e-12
+
+
+def test_a_dense_hull_is_simplified_without_leaving_the_shape() -> None:
+    mesh = icosphere(subdivisions=4, radius=0.05)
+    (piece,) = convex_pieces(solid(mesh), mesh.extents)
+    assert len(piece.vertices_link) <= 140
+    assert (np.linalg.norm(piece.vertices_link, axis=1) <= 0.0501 + 0.006).all()
+
+
+def test_a_cup_stays_open() -> None:
+    """A tube's hull would fill its bore; its pieces must not."""
+    mesh = annulus(r_min=0.04, r_max=0.05, height=0.1, sections=24)
+    pieces = convex_pieces(solid(mesh), mesh.extents)
+    assert 4 <= len(pieces) <= 16
+    from scipy.spatial import Delaunay
+
+    axis_points = np.array([[0.0, 0.0, z] for z in np.linspace(-0.04, 0.04, 9)])
+    assert all((Delaunay(p.vertices_link).find_simplex(axis_points) < 0).all() for p in pieces)
+
+
+def test_uneven_feet_become_one_flat_underside() -> None:
+    mesh = cylinder(radius=0.04, height=0.2, sections=40)
+    vertices = np.asarray(mesh.vertices).copy()
+    low = vertices[:, 2] < 0
+    vertices[low, 2] += 0.004 * (vertices[low, 0] > 0)
+    (piece,) = convex_pieces(Solid(vertices=vertices, faces=np.asarray(mesh.faces)), np.array([0.08, 0.08, 0.2]))
+    assert (piece.vertices_link[:, 2] < -0.1 + 1e-9).sum() >= 10

@@ -1,0 +1,93 @@
+"""Resuming: what is computed again, and what is not."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.errors import EnvironmentProblem, ObjectNotSeen
+from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.ledger import Kept, Ledger, Reached
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.workspace import Workspace, content_key, explained_io, file_key, write_atomically
+
+
+def noun(area: int) -> PackedMask:
+    return PackedMask(height=1, width=1, left=0, top=0, box_width=0, box_height=0, bits=b"", area_px=area)
+
+
+def run(root: Path, areas: dict[str, int]) -> Workspace:
+    work = Workspace(root)
+    ledger = Ledger(work, SILENT)
+    items = {name: Kept(area, content_key(area)) for name, area in areas.items()}
+    ledger.each("segment", items, lambda name: (), lambda name, area, progress: noun(area))
+    return work
+
+
+def test_a_second_run_computes_nothing(tmp_path: Path) -> None:
+    assert run(tmp_path, {"a": 1, "b": 2}).computed == ["segment/a", "segment/b"]
+    assert run(tmp_path, {"a": 1, "b": 2}).computed == []
+
+
+def test_a_changed_prompt_recomputes_only_its_object(tmp_path: Path) -> None:
+    run(tmp_path, {"a": 1, "b": 2})
+    assert run(tmp_path, {"a": 1, "b": 3}).computed == ["segment/b"]
+
+
+def test_a_damaged_file_is_computed_again(tmp_path: Path) -> None:
+    work = run(tmp_path, {"a": 1})
+    path = work.noun_path("segment", "a")
+    path.write_bytes(path.read_bytes()[:-20])
+    assert run(tmp_path, {"a": 1}).computed == ["segment/a"]
+
+
+def test_one_failing_object_leaves_the_others(tmp_path: Path) -> None:
+    def compute(name: str, area: int, progress: Progress) -> PackedMask:
+        if name == "a":
+            raise ObjectNotSeen("a: no frame shows it")
+        return noun(area)
+
+    ledger = Ledger(Workspace(tmp_path), SILENT)
+    items = {name: Kept(1, "k") for name in "ab"}
+    assert list(ledger.each("segment", items, lambda name: (), compute)) == ["b"]
+    assert ledger.failures == {"a": "segment: a: no frame shows it"}
+
+
+def test_stages_after_the_last_wanted_one_are_not_begun(tmp_path: Path) -> None:
+    ledger = Ledger(Workspace(tmp_path), SILENT, until="segment")
+    with pytest.raises(Reached):
+        ledger.one("generate", (), lambda progress: noun(1))
+
+
+def test_two_runs_in_one_workspace_are_refused(tmp_path: Path) -> None:
+    first, second = Workspace(tmp_path), Workspace(tmp_path)
+    with first.locked(), pytest.raises(EnvironmentProblem, match="another run"), second.locked():
+        pass
+
+
+def test_a_full_disk_leaves_the_old_file_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "noun"
+    write_atomically(path, b"old")
+
+    def full(self: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(EnvironmentProblem, match="disk is full"):
+        write_atomically(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_other_io_errors_name_the_path(tmp_path: Path) -> None:
+    with pytest.raises(EnvironmentProblem, match="nowhere"), explained_io(tmp_path / "nowhere"):
+        (tmp_path / "nowhere" / "x").write_text("")
+
+
+def test_keys_follow_content(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("1")
+    before = file_key(tmp_path / "a"), file_key(tmp_path)
+    assert (file_key(tmp_path / "a"), file_key(tmp_path)) == before
+    (tmp_path / "a").write_text("22")
+    assert file_key(tmp_path / "a") != before[0]
+    assert file_key(tmp_path) != before[1]

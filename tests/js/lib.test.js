@@ -1,0 +1,67 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import { ago, bytes, counted, duration, jointValue } from "../../static/js/lib/format.js";
+import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
+import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
+import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
+
+const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
+
+test("no key has two meanings on a page", () => assert.deepEqual(clashes(), []));
+
+test("every key of the table finds its action", () => {
+  assert.equal(actionOf(key("ArrowRight"), "annotate"), "next-frame");
+  assert.equal(actionOf(key("ArrowRight", { shiftKey: true }), "annotate"), "forward-ten");
+  assert.equal(actionOf(key("Z", { ctrlKey: true, shiftKey: true }), "annotate"), "redo");
+  assert.equal(actionOf(key("z", { metaKey: true }), "review"), "undo");
+  assert.equal(actionOf(key("?", { shiftKey: true }), "review"), "help");
+  assert.equal(actionOf(key("ArrowRight"), "review"), null);
+  assert.ok(KEYMAP.every((binding) => binding.keys.length > 0));
+});
+
+test("keys that viser takes are free on the review page", () => {
+  for (const taken of ["w", "a", "s", "d", "q", "e", "ArrowLeft", "ArrowRight"]) assert.equal(actionOf(key(taken), "review"), null);
+});
+
+test("a packed mask comes out as it went in", async () => {
+  const packed = Uint8Array.from([0b10110000]); // 1 0 1 1 0 0 of a 3 x 2 box
+  const stream = new Blob([packed]).stream().pipeThrough(new CompressionStream("deflate"));
+  const bits = Buffer.from(await new Response(stream).arrayBuffer()).toString("base64");
+  const mask = { width: 9, height: 9, left: 1, top: 2, box_width: 3, box_height: 2, bits };
+  assert.deepEqual([...(await decodeBox(mask))], [1, 0, 1, 1, 0, 0]);
+});
+
+test("a mask is painted in its colour, opaque at the rim, clear outside", () => {
+  const full = new Uint8Array(25).fill(1);
+  const rgba = paintBox(full, 5, 5, [10, 20, 30], 0.5);
+  assert.deepEqual([...rgba.slice(0, 4)], [10, 20, 30, 255]);
+  assert.equal(rgba[4 * 12 + 3], 128);
+  assert.equal(paintBox(new Uint8Array(25), 5, 5, [1, 2, 3], 1)[3], 0);
+  assert.deepEqual(rgbOf("#0b61c4"), [11, 97, 196]);
+});
+
+test("zooming keeps the point under the cursor; screen and image are inverse", () => {
+  const view = fit({ width: 960, height: 720 }, { width: 500, height: 500 });
+  const at = { x: 123, y: 321 };
+  const before = toImage(view, at);
+  const after = toImage(zoom(view, 1.7, at, 0.1), at);
+  assert.ok(Math.abs(before.x - after.x) < 1e-9 && Math.abs(before.y - after.y) < 1e-9);
+  const there = toScreen(view, before);
+  assert.ok(Math.abs(there.x - at.x) < 1e-9 && Math.abs(there.y - at.y) < 1e-9);
+});
+
+test("the whole image is visible and centred when fitted", () => {
+  const view = fit({ width: 200, height: 100 }, { width: 400, height: 400 });
+  assert.deepEqual(view, { scale: 2, x: 0, y: 100 });
+});
+
+test("numbers read well", () => {
+  assert.equal(bytes(999), "999 B");
+  assert.equal(bytes(1_500_000), "1.5 MB");
+  assert.equal(duration(75), "1 min 15 s");
+  assert.equal(ago(0, 10), "just now");
+  assert.equal(ago(0, 7200), "2 h ago");
+  assert.equal(counted(1, "object"), "1 object");
+  assert.equal(jointValue("revolute", Math.PI / 2), "90°");
+  assert.equal(jointValue("prismatic", 0.42), "42 cm");
+});

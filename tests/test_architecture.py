@@ -1,0 +1,55 @@
+"""The house: contracts that import-linter cannot say, and documents that must stay true."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_import_contracts_hold() -> None:
+    lint = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run([lint], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_stages_never_import_each_other() -> None:
+    stages = ["ingest", "segment", "generate", "align", "synthesize", "warp", "export", "evaluate", "synthetic"]
+    for stage in stages:
+        for path in (ROOT / "r2c2r_core" / stage).rglob("*.py"):
+            for other in stages:
+                if other != stage:
+                    assert f"r2c2r_core.{other}" not in path.read_text(), f"{path} imports {other}"
+
+
+@pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main"])
+def test_importing_costs_nothing_heavy(module: str) -> None:
+    heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "pybullet", "viser"]
+    code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_base_install_needs_no_torch() -> None:
+    pinned = (ROOT / "constraints.txt").read_text().lower()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert "torch" not in pinned
+    assert not any("torch" in requirement for requirement in project["dependencies"])
+
+
+def test_alembic_folder_does_not_shadow_the_library() -> None:
+    assert not (ROOT / "alembic" / "__init__.py").exists()
+
+
+def test_no_large_file_is_tracked() -> None:
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False).stdout.decode().split("\0")
+    large = [name for name in listed if name and (ROOT / name).exists() and (ROOT / name).stat().st_size > 1_000_000]
+    assert large == []
+
+
+@pytest.mark.parametrize("command", ["serve", "demo", "sample", "info", "run", "check", "evaluate", "doctor"])
+def test_every_command_is_in_the_readme(command: str) -> None:
+    assert f"r2c2r {command}" in (ROOT / "README.md").read_text()
