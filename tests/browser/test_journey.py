@@ -71,6 +71,8 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     page.reload()  # nothing is lost
     expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
     page.get_by_role("button", name="drawer_1", exact=True).click()
+    page.get_by_label("Name of drawer_1").select_text()  # text selected in a field keeps the object chosen
+    page.wait_for_timeout(300)
     page.get_by_label("Name of drawer_1").fill("top_drawer")
     page.get_by_label("Name of drawer_1").press("Enter")
     expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()

@@ -1,6 +1,6 @@
 /**
- * The objects of a project. Emits "select" id|null, "rename" {id, name, version}, "categorise" {id, category, version},
- * "delete" id, "toggle" id, "resegment" id.
+ * The objects of a project. Emits "pick-object" id|null (not "select": fields fire that themselves, and it bubbles),
+ * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id.
  */
 
 import { h, icon, LiveElement } from "../dom.js";
@@ -18,7 +18,7 @@ export class ObjectList extends LiveElement {
 
   connected() {
     this.replaceChildren(this.#new, this.#list, this.#categories);
-    this.#new.addEventListener("click", () => this.emit("select", null), { signal: this.signal });
+    this.#new.addEventListener("click", () => this.emit("pick-object", null), { signal: this.signal });
     this.addEventListener("focusout", () => setTimeout(() => this.#waiting?.()), { signal: this.signal });
   }
 
@@ -73,7 +73,7 @@ export class ObjectList extends LiveElement {
    */
   #item(object, number, current, hidden, colour) {
     const pick = h("button", { type: "button", class: "pick", "aria-pressed": String(current) }, object.name);
-    pick.addEventListener("click", () => this.emit("select", object.id));
+    pick.addEventListener("click", () => this.emit("pick-object", object.id));
     const eye = h(
       "button",
       { type: "button", class: "quiet", "aria-label": `${hidden ? "Show" : "Hide"} ${object.name}` },

@@ -118,7 +118,7 @@ export class AnnotatePage extends LiveElement {
     on(this.#canvas, "remove-point", ({ id }) => this.#change(id, (object) => deletePoint(this.project, object, id)));
     on(this.#strip, "seek", (position) => this.#seek(position));
     on(this.#strip, "play", () => this.#play());
-    on(this.#list, "select", (id) => this.#select(id));
+    on(this.#list, "pick-object", (id) => this.#select(id));
     on(this.#list, "toggle", (id) => this.#toggle(id));
     on(this.#list, "delete", (id) => this.#delete(id));
     on(this.#list, "rename", ({ id, name, version }) => this.#patch(id, { name, version }));
