@@ -46,7 +46,7 @@ def read_capture(
     """Read a recording; its images are written below `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
     progress.at(0.0, "opening the recording")
     recording = open_recording(source)
-    raw, thinned = _thinned(recording.frames, config.most_frames)
+    raw, thinned = _thinned(_posed(recording), config.most_frames)
     least_confidence, unsure = _least_confidence(recording, raw, config)
     with new_store(store) as partial:
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
@@ -123,6 +123,7 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     )
     write_rgb(store, frame.index, jpeg)
     write_depth(store, frame.index, depth)
+    assert frame.capture_from_camera is not None, "frames without a pose were left out"
     return Frame(
         index=frame.index,
         timestamp_s=frame.timestamp_s,
@@ -131,6 +132,13 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
         world_from_camera=frame.capture_from_camera,
         sharpness=sharpness,
     )
+
+
+def _posed(recording: Recording) -> tuple[RawFrame, ...]:
+    frames = tuple(f for f in recording.frames if f.capture_from_camera is not None)
+    if not frames:
+        raise CaptureError(f"{recording.files.source}: no frame has a pose", hint="record again with tracking")
+    return frames
 
 
 def _thinned(frames: tuple[RawFrame, ...], most: int) -> tuple[tuple[RawFrame, ...], tuple[str, ...]]:

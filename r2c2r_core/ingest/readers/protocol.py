@@ -27,7 +27,7 @@ class RawFrame:
     timestamp_s: float | None
     rgb_camera: Intrinsics
     depth_camera: Intrinsics
-    capture_from_camera: Rigid3
+    capture_from_camera: Rigid3 | None  # None: the recording has no pose for it; ingest estimates those of a whole recording
     rgb_name: str
     depth_name: str
     confidence_name: str | None = None
