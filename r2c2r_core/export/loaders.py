@@ -21,7 +21,7 @@ from r2c2r_core.export.reading import Urdf
 from r2c2r_core.model.report import LoaderResult
 from r2c2r_core.progress import SILENT, Progress
 
-EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "SAPIEN")
+EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "SAPIEN", "USD")
 SAPIEN_VARIABLE = "R2C2R_SAPIEN_PYTHON"
 
 _PROBES = Path(__file__).parent / "probes"
@@ -56,6 +56,7 @@ def try_loaders(
         ("MuJoCo (MJCF)", lambda: _mujoco(folder / "scene.xml")),
         ("PyBullet", lambda: _pybullet(scene)),
         ("SAPIEN", lambda: _sapien(scene, python)),
+        ("USD", lambda: _usd(folder / "scene.usda")),
     )
     return tuple(_verdict(name, attempt, expected) for name, attempt in progress.each(attempts, "loaders"))
 
@@ -184,6 +185,16 @@ def _sapien(scene: Path, python: str | None) -> Readback:
     if present.returncode != 0:
         raise _NotThereError(f"{python} cannot import sapien")
     return _probe([python, str(_PROBES / "sapien_probe.py")], scene)
+
+
+def _usd(scene: Path) -> Readback:
+    if importlib.util.find_spec("pxr") is None:
+        raise _NotThereError("not installed: pip install usd-core")
+    if not scene.is_file():
+        raise FileNotFoundError(f"{scene.name} is not in the bundle")
+    from r2c2r_core.export.probes.usd import read_usd
+
+    return Readback(**read_usd(scene)._asdict())
 
 
 def _probe(command: list[str], scene: Path) -> Readback:

@@ -19,7 +19,8 @@ Metres, kilograms, radians, +Z up. Every joint is closed at 0 and opens towards 
 
 FILES
   scene.urdf     yourdfpy, PyBullet, SAPIEN, ROS, MuJoCo        scene.xml   MuJoCo
-  scene.glb      web viewers, Blender (+Y up, as glTF demands)  preview.png
+  scene.usda     Isaac Sim, Omniverse, anything that reads USD  preview.png
+  scene.glb      web viewers, Blender (+Y up, as glTF demands)
   manifest.json  where every number comes from                  report.html the certificate, for reading
   meshes/        textured OBJ to see (_vis), convex OBJ to touch (_col_); boxes stand in scene.urdf and scene.xml
 
@@ -31,6 +32,8 @@ LOADING  (unpack first; run in the bundle's folder)
              default motor off before pushing: setJointMotorControl2(..., VELOCITY_CONTROL, force=0).
   SAPIEN     loader = scene.create_urdf_loader(); loader.fix_root_link = True; loader.load("scene.urdf")
              Without a Vulkan GPU remove the <visual> elements first. Check joint friction: SAPIEN 3 halves it.
+  Isaac Sim  File > Open scene.usda, or add it as a reference. Each fixture with joints is one articulation; the drives damp
+             (stiffness 0): raise stiffness to hold a position. Joint friction is in PhysxJointAxisAPI (Isaac Sim 5, PhysX 5.6).
   ROS        give the text of scene.urdf to robot_state_publisher as robot_description. RViz wants absolute mesh paths:
              prefix the file names with file://<this folder>/ or package://<your package>/.
   Python     yourdfpy.URDF.load("scene.urdf").show()

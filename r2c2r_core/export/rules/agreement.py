@@ -1,6 +1,7 @@
 """Whether the manifest and scene.xml tell the same story as scene.urdf."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from typing import Any
@@ -14,15 +15,16 @@ from r2c2r_core.export.rules.table import finding
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.report import Finding
 
-REQUIRED_FILES = ("scene.urdf", "scene.xml", "scene.glb", "manifest.json", "preview.png", "README.txt")
+REQUIRED_FILES = ("scene.urdf", "scene.xml", "scene.usda", "scene.glb", "manifest.json", "preview.png", "README.txt")
 _KEYS = ("schema", "tool_version", "capture", "world_from_capture", "objects", "stages")
 _OBJECT_KEYS = ("name", "category", "dimensions_m", "world_from_object", "joint", "meshes", "mass_kg")
+_USD_ASSET = re.compile(r"@@@(.+?)@@@|@([^@\n]+)@")
 SUPPORT_SUFFIX = "_support"
 """Links of this ending hold a free-standing thing up; they belong to no object."""
 
 
 def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
-    """Required files, the manifest against the URDF, scene.xml against the URDF."""
+    """Required files, the manifest and scene.xml against the URDF, what scene.usda reads (its loader compares the rest)."""
     for name in REQUIRED_FILES:
         if not (files.folder / name).is_file():
             yield finding("file-missing", name, "it is not in the bundle")
@@ -32,6 +34,17 @@ def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
     scene = files.folder / "scene.xml"
     if scene.is_file():
         yield from _mjcf(urdf, scene.read_bytes())
+    layer = files.folder / "scene.usda"
+    if layer.is_file():
+        yield from _usd(layer.read_bytes())
+
+
+def _usd(content: bytes) -> Iterator[Finding]:
+    if not content.startswith(b"#usda 1."):
+        yield finding("usd-parse", "scene.usda", "does not begin with '#usda 1.'")
+    for triple, single in _USD_ASSET.findall(content.decode(errors="replace")):
+        if not is_inside((triple or single).removeprefix("./")):
+            yield finding("usd-path", "scene.usda", f"reads '{triple or single}'")
 
 
 def _manifest(urdf: Urdf, content: bytes) -> Iterator[Finding]:

@@ -58,6 +58,8 @@ RULES: dict[str, Rule] = {
     "mjcf-path": Rule("error", "scene.xml reads files from outside the bundle"),
     "mjcf-joint": Rule("error", "joints of scene.xml and of the URDF differ"),
     "mjcf-mass": Rule("error", "masses of scene.xml and of the URDF differ"),
+    "usd-parse": Rule("error", "scene.usda is no USD text"),
+    "usd-path": Rule("error", "scene.usda reads files from outside the bundle"),
 }
 
 SIMULATION_RULES: dict[str, Rule] = {
@@ -71,7 +73,7 @@ SIMULATION_RULES: dict[str, Rule] = {
     "blocked-by": Rule("warning", "a free-standing thing is in a joint's way"),
 }
 
-UNSAFE = ("mesh-path", "mjcf-path")
+UNSAFE = ("mesh-path", "mjcf-path", "usd-path")
 """With one of these, no loader is given the bundle: it would read files of this machine."""
 
 

@@ -8,10 +8,8 @@ from pathlib import Path
 
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.text import numbers, quat_wxyz_of
+from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
 from r2c2r_core.geometry.transforms import Rigid3
-
-ARMATURE = {"revolute": 0.005, "prismatic": 0.02}
-"""kg m^2 and kg added to a joint for the solver's sake: under 2 % of a cabinet door's or a drawer's own."""
 
 
 def write_mjcf(plan: Plan, path: Path) -> None:
@@ -48,7 +46,7 @@ def _add_defaults(root: ET.Element) -> None:
     seen = ET.SubElement(default, "default", {"class": "visual"})
     ET.SubElement(seen, "geom", group="2", contype="0", conaffinity="0", mass="0")
     touched = ET.SubElement(default, "default", {"class": "collision"})
-    ET.SubElement(touched, "geom", group="3", friction="0.7 0.01 0.001", rgba="0.5 0.6 0.7 0.4")
+    ET.SubElement(touched, "geom", group="3", friction=f"{SURFACE_FRICTION} 0.01 0.001", rgba="0.5 0.6 0.7 0.4")
 
 
 def _add_assets(root: ET.Element, plan: Plan) -> None:

@@ -8,6 +8,7 @@ from r2c2r_core.export.plan import Plan
 from r2c2r_core.export.writers.glb import write_glb
 from r2c2r_core.export.writers.mjcf import write_mjcf
 from r2c2r_core.export.writers.urdf import write_urdf
+from r2c2r_core.export.writers.usd import write_usd
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +34,15 @@ FORMATS = (
         file="scene.xml",
         write=write_mjcf,
         loses=("joint velocity limits (MuJoCo has none)", "where each number comes from: see manifest.json"),
+    ),
+    Format(
+        file="scene.usda",
+        write=write_usd,
+        loses=(
+            "fixtures without a joint are static: their mass is written, engines do not use it",
+            "dry friction and largest velocity of joints are in PhysX's words; other engines see damping and effort only",
+            "where each number comes from: see manifest.json",
+        ),
     ),
     Format(
         file="scene.glb",

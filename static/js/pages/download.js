@@ -12,6 +12,7 @@ import { live } from "../live.js";
 const CONTENT = [
   ["scene.urdf", "URDF for ROS, PyBullet, SAPIEN, MuJoCo and Isaac's importer"],
   ["scene.xml", "MJCF with textures, for MuJoCo"],
+  ["scene.usda", "USD with physics, for Isaac Sim and Omniverse"],
   ["scene.glb", "the scene for the web and for editors"],
   ["meshes/", "textured OBJ visuals and convex colliders, relative paths"],
   ["manifest.json", "every dimension and joint with where it came from"],

@@ -38,6 +38,10 @@ def manifest(edit: Callable[[dict], object]) -> Plant:
     return plant
 
 
+def text(name: str, old: str, new: str) -> Plant:
+    return lambda folder: edit_text(folder / name, old, new)
+
+
 def both(*plants: Plant) -> Plant:
     def plant(folder: Path) -> None:
         for one in plants:
@@ -276,6 +280,9 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         xml("scene.xml", lambda r: named(r, "body", "bottle_1_body").find("inertial").set("mass", "9")),
         set(),
     ),
+    ("usd-parse", "a binary layer", write("scene.usda", "PXR-USDC"), set()),
+    ("usd-path", "a texture elsewhere", text("scene.usda", "@./meshes/", "@../meshes/"), set()),
+    ("usd-path", "a layer by its address", text("scene.usda", "upAxis", "subLayers = [@@@/etc/x.usda@@@]\n    upAxis"), set()),
 ]
 
 

@@ -20,9 +20,9 @@ def no_sapien(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(SAPIEN_VARIABLE, raising=False)
 
 
-def test_the_good_bundle_loads_in_yourdfpy_mujoco_and_pybullet(good_folder: Path) -> None:
+def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: Path) -> None:
     found = verdicts(good_folder)
-    for name in ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet"):
+    for name in ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "USD"):
         assert found[name].state == "passed", found[name]
         assert "4 joints, 9 links" in found[name].detail
 
@@ -72,6 +72,27 @@ def test_an_mjcf_that_says_something_else_fails(good_folder: Path) -> None:
     assert found["MuJoCo (MJCF)"].state == "failed"
     assert "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42" in found["MuJoCo (MJCF)"].detail
     assert found["MuJoCo (URDF)"].state == "passed"
+
+
+USD_DEFECTS = (
+    ("physics:upperLimit = 0.42", "physics:upperLimit = 0.9", "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42"),
+    ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint", "is prismatic, not revolute"),
+    ('upAxis = "Z"', 'upAxis = "Y"', "up axis"),
+    ("physics:localPos1 = (0, 0, 0)", "physics:localPos1 = (0, 0, 0.1)", "its frame differs by 0.1"),
+    ("rel physics:body1 = </Scene/drawer_1/drawer_1_drawer>", "rel physics:body1 = </Scene/nowhere>", "USD's validators"),
+)
+
+
+@pytest.mark.parametrize(("old", "new", "says"), USD_DEFECTS, ids=[d[2] for d in USD_DEFECTS])
+def test_a_usd_that_says_something_else_fails(good_folder: Path, old: str, new: str, says: str) -> None:
+    scene = good_folder / "scene.usda"
+    text = scene.read_text()
+    assert old in text
+    scene.write_text(text.replace(old, new))
+    found = verdicts(good_folder)
+    assert found["USD"].state == "failed"
+    assert says in found["USD"].detail
+    assert found["yourdfpy"].state == "passed"
 
 
 def test_differences_name_what_differs(good_folder: Path) -> None:

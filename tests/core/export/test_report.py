@@ -83,5 +83,5 @@ def test_the_json_report_repeats_certificate_objects_and_losses_without_the_mach
     assert "realtime_factor" not in report["certificate"]
     assert [entry["name"] for entry in report["objects"]] == [item.name for item in kitchen().objects]
     assert report["failures"] == {"mug_1": "not seen"}
-    assert set(report["losses"]) == {"scene.urdf", "scene.xml", "scene.glb"}
+    assert set(report["losses"]) == {"scene.urdf", "scene.xml", "scene.usda", "scene.glb"}
     assert np.isfinite(report["objects"][0]["placement_rms_m"])

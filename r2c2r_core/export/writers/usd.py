@@ -1,0 +1,270 @@
+"""scene.usda: USD with UsdPhysics, for Isaac Sim, Omniverse and other readers of USD; +Z up, metres, kilograms.
+
+One articulation per object with joints, its root on the object's own prim (never on a body, never nested); bodies are siblings
+in world poses, joints beside them. UsdPhysics counts angles in degrees: limits, damping and velocities of hinges are converted.
+What UsdPhysics has no words for (dry friction, armature, largest velocity) is said in PhysX's schema PhysxJointAxisAPI, as
+plain attributes, so that no NVIDIA library is needed to write or to read it.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.text import quat_wxyz_of
+from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
+from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+
+ROOT = "/Scene"
+_FLOOR_M = 20.0
+_X = np.array([1.0, 0.0, 0.0])
+
+
+def write_usd(plan: Plan, path: Path) -> None:
+    """Write the plan as one USD text layer; textures are named relative to it."""
+    from pxr import Kind, Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    root = UsdGeom.Xform.Define(stage, ROOT)
+    stage.SetDefaultPrim(root.GetPrim())
+    Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.assembly)
+    _write_world(stage, plan)
+    looks = _write_looks(stage, plan)
+    for object_name in dict.fromkeys(body.object_name for body in plan.bodies):
+        _write_object(stage, [body for body in plan.bodies if body.object_name == object_name], looks)
+    stage.GetRootLayer().Export(str(path))
+
+
+def _write_world(stage: Any, plan: Plan) -> None:
+    """Gravity, the floor, and how surfaces touch."""
+    from pxr import Gf, UsdGeom, UsdPhysics, UsdShade
+
+    scene = UsdPhysics.Scene.Define(stage, f"{ROOT}/physics")
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1))
+    scene.CreateGravityMagnitudeAttr(9.81)
+    touch = UsdShade.Material.Define(stage, f"{ROOT}/touch")
+    surface = UsdPhysics.MaterialAPI.Apply(touch.GetPrim())
+    surface.CreateStaticFrictionAttr(SURFACE_FRICTION)
+    surface.CreateDynamicFrictionAttr(SURFACE_FRICTION)
+    surface.CreateRestitutionAttr(0.0)
+    floor = UsdGeom.Plane.Define(stage, f"{ROOT}/floor")
+    floor.CreateAxisAttr(UsdGeom.Tokens.z)
+    floor.CreateWidthAttr(_FLOOR_M)
+    floor.CreateLengthAttr(_FLOOR_M)
+    floor.CreateDisplayColorAttr([Gf.Vec3f(0.75, 0.74, 0.72)])
+    floor.AddTranslateOp().Set(Gf.Vec3d(0, 0, plan.floor_z_m))
+    UsdPhysics.CollisionAPI.Apply(floor.GetPrim())
+    _bind(floor.GetPrim(), touch, purpose="physics")
+
+
+def _write_looks(stage: Any, plan: Plan) -> dict[str, Any]:
+    """A preview material per texture; bodies of one object share it."""
+    from pxr import Sdf, UsdGeom, UsdShade
+
+    UsdGeom.Scope.Define(stage, f"{ROOT}/looks")
+    looks: dict[str, Any] = {}
+    for body in plan.bodies:
+        if body.visual_file is None or body.texture_file is None or body.texture_file in looks:
+            continue
+        material = UsdShade.Material.Define(stage, f"{ROOT}/looks/{body.name}_look")
+        base = str(material.GetPath())
+        uv = UsdShade.Shader.Define(stage, f"{base}/uv")
+        uv.CreateIdAttr("UsdPrimvarReader_float2")
+        uv.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+        picture = UsdShade.Shader.Define(stage, f"{base}/picture")
+        picture.CreateIdAttr("UsdUVTexture")
+        picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{body.texture_file}")
+        picture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+        picture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
+            uv.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        )
+        shader = UsdShade.Shader.Define(stage, f"{base}/surface")
+        shader.CreateIdAttr("UsdPreviewSurface")
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.9)
+        shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(
+            picture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+        )
+        material.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+        looks[body.texture_file] = material
+    return looks
+
+
+def _write_object(stage: Any, bodies: list[Body], looks: dict[str, Any]) -> None:
+    """An object's bodies and joints; without joints it is a free body or a part of the room that never moves."""
+    from pxr import Kind, Usd, UsdGeom, UsdPhysics
+
+    path = f"{ROOT}/{bodies[0].object_name}"
+    prim = UsdGeom.Xform.Define(stage, path).GetPrim()
+    Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
+    articulated = any(body.joint is not None for body in bodies)
+    if articulated:
+        UsdPhysics.ArticulationRootAPI.Apply(prim)
+        UsdGeom.Scope.Define(stage, f"{path}/joints")
+    for body in bodies:
+        moves = articulated and not body.is_support
+        _write_body(stage, f"{path}/{body.name}", body, looks, dynamic=moves or body.free)
+        if moves and not body.free:
+            _write_joint(stage, path, body)
+
+
+def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], *, dynamic: bool) -> None:
+    from pxr import Gf, UsdGeom, UsdPhysics
+
+    xform = UsdGeom.Xform.Define(stage, path)
+    _place(xform, body.world_from_body)
+    if dynamic:
+        UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
+    inertial = body.link.inertial
+    moments, axes = _principal(inertial.inertia)
+    mass = UsdPhysics.MassAPI.Apply(xform.GetPrim())
+    mass.CreateMassAttr(float(inertial.mass_kg))
+    mass.CreateCenterOfMassAttr(Gf.Vec3f(*map(float, inertial.com_link)))
+    mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*map(float, moments)))
+    mass.CreatePrincipalAxesAttr(_quatf(axes))
+    _write_visuals(stage, path, body, looks)
+    _write_colliders(stage, path, body)
+
+
+def _write_visuals(stage: Any, path: str, body: Body, looks: dict[str, Any]) -> None:
+    from pxr import Gf, Sdf, UsdGeom, Vt
+
+    visual = body.link.visual
+    if visual is None:
+        for number, box in enumerate(body.link.boxes):
+            cube = _cube(stage, f"{path}/visual_{number}", box.link_from_box, box.size_m)
+            cube.CreateDisplayColorAttr([Gf.Vec3f(*map(float, body.link.colour))])
+        return
+    mesh = _mesh(stage, f"{path}/visual", visual.vertices, visual.faces)
+    mesh.CreateDoubleSidedAttr(True)
+    uv = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
+    uv.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(visual.uv, dtype=np.float32)))
+    if body.texture_file is not None:
+        _bind(mesh.GetPrim(), looks[body.texture_file])
+
+
+def _write_colliders(stage: Any, path: str, body: Body) -> None:
+    """Convex pieces and panels, as guides: engines touch them, renderers leave them out."""
+    from pxr import UsdGeom, UsdPhysics, UsdShade
+
+    shapes = [_mesh(stage, f"{path}/collision_{k}", *_hull(p.vertices_link)) for k, p in enumerate(body.link.pieces)]
+    for shape in shapes:
+        UsdPhysics.MeshCollisionAPI.Apply(shape.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
+    for number, box in enumerate(body.link.boxes, start=len(shapes)):
+        shapes.append(_cube(stage, f"{path}/collision_{number}", box.link_from_box, box.size_m))
+    touch = UsdShade.Material.Get(stage, f"{ROOT}/touch")
+    for shape in shapes:
+        shape.CreatePurposeAttr(UsdGeom.Tokens.guide)
+        UsdPhysics.CollisionAPI.Apply(shape.GetPrim())
+        _bind(shape.GetPrim(), touch, purpose="physics")
+
+
+def _write_joint(stage: Any, object_path: str, body: Body) -> None:
+    """Between a body and its parent; a base is fixed to the world, which UsdPhysics says by naming no first body."""
+    from pxr import Gf, UsdPhysics
+
+    joint = body.joint
+    define = {"revolute": UsdPhysics.RevoluteJoint, "prismatic": UsdPhysics.PrismaticJoint}
+    kind = UsdPhysics.FixedJoint if joint is None else define[joint.type]
+    prim = kind.Define(stage, f"{object_path}/joints/{body.joint_name}")
+    if body.parent != WORLD:
+        prim.CreateBody0Rel().SetTargets([f"{object_path}/{body.parent}"])
+    prim.CreateBody1Rel().SetTargets([f"{object_path}/{body.name}"])
+    body_from_joint = np.eye(3) if body.axis_body is None else rotation_between(_X, body.axis_body)
+    prim.CreateLocalPos0Attr(Gf.Vec3f(*map(float, body.parent_from_body.translation)))
+    prim.CreateLocalRot0Attr(_quatf(body.parent_from_body.rotation @ body_from_joint))
+    prim.CreateLocalPos1Attr(Gf.Vec3f(0, 0, 0))
+    prim.CreateLocalRot1Attr(_quatf(body_from_joint))
+    if joint is None:
+        return
+    angular = joint.type == "revolute"
+    per_unit = 180.0 / np.pi if angular else 1.0  # degrees in a radian
+    prim.CreateAxisAttr("X")
+    prim.CreateLowerLimitAttr(joint.lower * per_unit)
+    prim.CreateUpperLimitAttr(joint.upper * per_unit)
+    instance = "angular" if angular else "linear"
+    drive = UsdPhysics.DriveAPI.Apply(prim.GetPrim(), instance)
+    drive.CreateTypeAttr("force")
+    drive.CreateTargetVelocityAttr(0.0)
+    drive.CreateStiffnessAttr(0.0)
+    drive.CreateDampingAttr(joint.damping / per_unit)
+    drive.CreateMaxForceAttr(joint.effort)
+    _say_physx(
+        prim.GetPrim(),
+        instance,
+        staticFrictionEffort=joint.friction,
+        dynamicFrictionEffort=joint.friction,
+        armature=ARMATURE[joint.type],
+        maxJointVelocity=joint.velocity * per_unit,
+    )
+
+
+def _say_physx(prim: Any, instance: str, **values: float) -> None:
+    from pxr import Sdf
+
+    prim.AddAppliedSchema(f"PhysxJointAxisAPI:{instance}")
+    for name, value in values.items():
+        prim.CreateAttribute(f"physxJointAxis:{instance}:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
+
+
+def _cube(stage: Any, path: str, link_from_box: Rigid3, size_m: np.ndarray) -> Any:
+    from pxr import Gf, UsdGeom
+
+    cube = UsdGeom.Cube.Define(stage, path)
+    cube.CreateSizeAttr(1.0)
+    cube.CreateExtentAttr([Gf.Vec3f(-0.5, -0.5, -0.5), Gf.Vec3f(0.5, 0.5, 0.5)])
+    _place(cube, link_from_box)
+    cube.AddScaleOp().Set(Gf.Vec3f(*map(float, size_m)))
+    return cube
+
+
+def _mesh(stage: Any, path: str, vertices: np.ndarray, faces: np.ndarray) -> Any:
+    from pxr import UsdGeom, Vt
+
+    points = np.ascontiguousarray(vertices, dtype=np.float32)
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(faces), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces, dtype=np.int32).ravel()))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    return mesh
+
+
+def _hull(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    hull = trimesh.convex.convex_hull(vertices)
+    return np.asarray(hull.vertices), np.asarray(hull.faces)
+
+
+def _bind(prim: Any, material: Any, purpose: str = "") -> None:
+    from pxr import UsdShade
+
+    api = UsdShade.MaterialBindingAPI.Apply(prim)
+    api.Bind(material, UsdShade.Tokens.weakerThanDescendants, purpose or UsdShade.Tokens.allPurpose)
+
+
+def _place(xform: Any, pose: Rigid3) -> None:
+    from pxr import Gf, UsdGeom
+
+    w, x, y, z = map(float, quat_wxyz_of(pose.rotation))
+    xform.AddTranslateOp().Set(Gf.Vec3d(*map(float, pose.translation)))
+    xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Quatd(w, x, y, z))
+
+
+def _quatf(rotation: np.ndarray) -> Any:
+    from pxr import Gf
+
+    return Gf.Quatf(*map(float, quat_wxyz_of(rotation)))
+
+
+def _principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (kg m^2) and the rotation from principal axes to the body's, right-handed."""
+    moments, axes = np.linalg.eigh(inertia)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes
