@@ -66,7 +66,7 @@ def front_panel(front: Front) -> FrontPanel:
         width_m=width,
         height_m=height,
         handle=handle,
-        confidence=_edge_confidence(front),
+        confidence=float(np.mean(edge_strengths(front))),
         roll_rad=front.run.roll_rad,
     )
 
@@ -212,8 +212,8 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
     )
 
 
-def _edge_confidence(front: Front) -> float:
-    """How clearly the four edges show, 0..1."""
+def edge_strengths(front: Front) -> tuple[float, ...]:
+    """How clearly each edge shows, 0..1: left, right, top, bottom."""
     cell, values = front.cell, []
     for axis, position in ((0, cell.left), (0, cell.right), (1, cell.top), (1, cell.bottom)):
         evidence = front.run.vertical if axis == 0 else front.run.horizontal
@@ -222,7 +222,7 @@ def _edge_confidence(front: Front) -> float:
         last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
         at = min(max(round(position), 1), evidence.score.shape[1] - 2)
         values.append(float(np.clip(evidence.score[first:last, at - 1 : at + 2].max(axis=1).mean() / 4, 0, 1)))
-    return float(np.mean(values))
+    return tuple(values)
 
 
 def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:

@@ -13,12 +13,14 @@ from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.categories import Kind, hint_for
 from r2c2r_core.segment.finders import find_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prompts import check_prompt
+from r2c2r_core.segment.proposals import propose_steps
 from r2c2r_core.segment.runs import Run, load_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.segment.stage import SegmentConfig
@@ -116,6 +118,10 @@ class GeometricSession:
             mask, trust = found.mask(frame)
             if np.count_nonzero(mask) >= self.config.least_area_px:
                 yield frame.index, pack_mask(mask), trust
+
+    def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
+        """Proposals so far, surest first, with the share of the work done; the last step has them all."""
+        return propose_steps(self)
 
     def find(self, prompt: ObjectPrompt) -> Found:
         """What the clicks mean, computed once a prompt."""

@@ -8,6 +8,7 @@ from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 
@@ -23,6 +24,9 @@ class SegmentSession(Protocol):
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
         """Frame, mask and confidence: the clicked frame first, then outwards both ways; only frames that see the object."""
+
+    def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
+        """Objects to confirm, surest first, found so far with the share of the work done; the last step has them all."""
 
 
 class Segmenter(Protocol):

@@ -1,0 +1,171 @@
+"""Panels of a run that look like fronts: closed by lines on four sides, flat, of a usual size, with a handle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.model.capture import Room
+from r2c2r_core.segment.cut import Cell
+from r2c2r_core.segment.fronts import Front, edge_strengths, find_front, front_corners
+from r2c2r_core.segment.naming import FrontLook, name_front
+from r2c2r_core.segment.runs import Run
+
+_SHALLOWEST_M = 0.15  # nearer to a wall is the wall, what hangs flat on it, or the back of a sink
+_DARK_LIGHTNESS = 60.0  # of 255
+_SMALLEST_M = 0.09
+_CORNER_M = 0.06  # how exactly a side starts where a front ends
+_DEEPEST_M = 0.8  # of a carcass
+_NO_POINTS = np.zeros((0, 3))
+_EQUAL_DOORS_M = 0.006  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """A panel that may be a front, with the evidence for it."""
+
+    front: Front
+    category: str
+    confidence: float
+
+    @property
+    def run(self) -> Run:
+        """The run it is part of."""
+        return self.front.run
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height."""
+        cell_m = self.run.grid.cell_m
+        return self.front.cell.width * cell_m, self.front.cell.height * cell_m
+
+    @property
+    def centre(self) -> Vector3:
+        """Its middle, in the world."""
+        cell = self.front.cell
+        return self.run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+
+    @property
+    def corners(self) -> Points:
+        """Its corners in the world: top left, then clockwise."""
+        return front_corners(self.front.cell, self.run.grid, (0.0, 0.0))
+
+
+def find_panels(run: Run, room: Room) -> list[Panel]:
+    """The run's panels that could be fronts, the doors of a pair joined."""
+    found: list[Panel] = []
+    mates: list[Cell] = []
+    for cell in sorted(run.cells, key=lambda cell: (cell.left, cell.top)):
+        if cell in mates or min(cell.width, cell.height) * run.grid.cell_m < _SMALLEST_M:
+            continue
+        panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=False), room)
+        mate = _mate(run, cell)
+        if panel is not None and panel.category == "cabinet" and mate is not None:
+            panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=True), room, pair=True)
+            mates.append(mate)
+        if panel is not None:
+            found.append(panel)
+    return found
+
+
+def without_sides(panels: list[Panel]) -> list[Panel]:
+    """The panels without those on the sides of carcasses: of two faces that meet at an outer corner, the better front stays."""
+    strength: dict[int, float] = {}
+    for panel in panels:
+        strength[id(panel.run)] = strength.get(id(panel.run), 0.0) + panel.confidence * _area(panel)
+    return [
+        panel
+        for panel in panels
+        if not any(strength[id(panel.run)] < strength[id(other.run)] and _is_side_of(panel, other) for other in panels)
+    ]
+
+
+def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | None:
+    """A front with its name and the evidence for it; None when it is too small for one."""
+    if front is None:
+        return None
+    run, cell, cell_m = front.run, front.cell, front.run.grid.cell_m
+    area = (slice(max(round(cell.top), 0), round(cell.bottom)), slice(max(round(cell.left), 0), round(cell.right)))
+    if min(cell.width, cell.height) * cell_m < _SMALLEST_M or not run.seen[area].size:
+        return None
+    bottom = float(run.grid.points_at(np.array([[cell.left, cell.bottom]]))[0, 2]) if room.floor_found else None
+    look = FrontLook(
+        width_m=cell.width * cell_m,
+        height_m=cell.height * cell_m,
+        bottom_m=bottom,
+        handle=front.handle,
+        dark=_dark_share(run, area),
+        pair=pair,
+    )
+    category, usual = name_front(look)
+    return Panel(front, category, usual * _evidence(front, area, room))
+
+
+def outlined(front: Front) -> float:
+    """0..1: lines on its four sides, and a handle."""
+    edges = edge_strengths(front)
+    lines = np.clip((np.mean(edges) - 0.45) / 0.45, 0, 1) * np.clip((min(edges) - 0.1) / 0.5, 0.3, 1)
+    return float(lines * (0.6 + 0.4 * (front.handle.confidence if front.handle is not None else 0.0)))
+
+
+def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
+    """0..1: outlined, flat where depth saw it, and no wall."""
+    flat = np.clip((front.run.seen[area].mean() - 0.3) / 0.5, 0, 1)
+    return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room) else 1.0))
+
+
+def is_on_wall(run: Run, room: Room) -> bool:
+    """Whether a run is a wall, or too near one that faces the same way to have a carcass behind it."""
+    middle = run.region.world_from_plane.translation
+    return any(
+        wall.normal @ run.grid.outward > 0.95 and abs(float(wall.normal @ middle - wall.offset_m)) < _SHALLOWEST_M
+        for wall in room.walls
+    )
+
+
+def _middle(run: Run, cell: Cell) -> Points:
+    return run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))
+
+
+def _mate(run: Run, cell: Cell) -> Cell | None:
+    """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
+    slack = 0.02 / run.grid.cell_m
+    for other, handle in zip(run.cells, run.handles, strict=True):
+        own = run.handles[run.cells.index(cell)]
+        if own is None or handle is None or abs(other.left - cell.right) > slack:
+            continue
+        level = abs(other.top - cell.top) < slack and abs(other.bottom - cell.bottom) < slack
+        equal = abs(other.width - cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
+        at_seam = (own.left + own.right) / 2 > cell.left + 0.7 * cell.width and (
+            handle.left + handle.right
+        ) / 2 < other.left + 0.3 * other.width
+        if level and equal and at_seam:
+            return other
+    return None
+
+
+def _dark_share(run: Run, area: tuple[slice, slice]) -> float:
+    colours = run.mosaic[area]
+    known = colours.any(axis=2)
+    return float((colours[known].mean(axis=1) < _DARK_LIGHTNESS).mean()) if known.any() else 0.0
+
+
+def _area(panel: Panel) -> float:
+    width, height = panel.size_m
+    return width * height
+
+
+def _is_side_of(side: Panel, front: Panel) -> bool:
+    """Whether a panel lies on the face that starts at a front's left or right edge and runs backwards."""
+    normal = front.run.grid.outward
+    if abs(float(normal @ side.run.grid.outward)) > 0.3:
+        return False
+    width, height = front.size_m
+    local = front.run.region.world_from_plane.rotation.T @ (side.corners - front.centre).T
+    x, behind, z = local
+    outward = float(front.run.region.world_from_plane.rotation[:, 0] @ side.run.grid.outward)
+    at_edge = abs(abs(float(x.mean())) - width / 2) < _CORNER_M and float(x.mean()) * outward > 0
+    # The side may end short of the front: a door stands before its carcass, or the cut took a piece of it.
+    is_behind = behind.min() > -_CORNER_M and behind.min() < 0.35 and behind.max() < _DEEPEST_M
+    overlap = min(float(z.max()), height / 2) - max(float(z.min()), -height / 2)
+    return at_edge and bool(is_behind) and overlap > 0.5 * min(height, float(np.ptp(z)))

@@ -1,0 +1,328 @@
+"""What is there before anyone clicks: fronts, appliances and free-standing things, each with the click that confirms it."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points, Vector3
+from r2c2r_core.errors import R2C2RError
+from r2c2r_core.geometry.camera import project
+from r2c2r_core.geometry.masks import pack_mask, unpack_mask
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.segment.categories import hint_for
+from r2c2r_core.segment.clutter import Clump, find_clumps
+from r2c2r_core.segment.finders import FoundAppliance, FoundFront
+from r2c2r_core.segment.fronts import front_mask
+from r2c2r_core.segment.naming import name_thing
+from r2c2r_core.segment.panels import Panel, find_panels, is_on_wall, outlined, without_sides
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.scene import Scene
+
+if TYPE_CHECKING:
+    from r2c2r_core.segment.geometric import Found, GeometricSession
+
+Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
+
+_LEAST_CONFIDENCE = 0.3
+_LEAST_PLANE_M2, _LEAST_SIDE_M = 0.02, 0.09
+_VIEWS = 5  # frames looked at for the one that shows an object best
+_MOST_THINGS = 24
+_SAME_PLANE_M = 0.12
+_BOX_SLACK_M = 0.03
+_BOX_KINDS = ("refrigerator", "microwave")
+
+
+def propose_steps(session: "GeometricSession") -> Steps:
+    """Proposals so far, surest first, after each bit of work, with the share of the work done. The last step has them all."""
+    panels: list[Panel] = []
+    planes = [plane for plane in session.planes if _worth_cutting(plane)]
+    for position, plane in enumerate(planes):
+        run = session.run_of(plane)
+        panels += find_panels(run, session.scene.capture.room) if run is not None else []
+        panels += _boxes(session, plane)
+        yield 0.5 * (position + 1) / len(planes), ()
+    panels = _apart(without_sides([panel for panel in panels if panel.confidence > 0.5 * _LEAST_CONFIDENCE]))
+    wanted = [panel for panel in panels if panel.confidence >= _LEAST_CONFIDENCE]
+    found: list[Proposal] = []
+    shown: list[tuple[Proposal, Panel]] = []
+    for position, panel in enumerate(wanted):
+        proposal = _present_panel(session, panel)
+        if proposal is not None:
+            found.append(proposal)
+            shown.append((proposal, panel))
+        yield 0.5 + 0.3 * (position + 1) / len(wanted), _ranked(found)
+    clumps = find_clumps(session.scene.capture, session.planes)[:_MOST_THINGS]
+    for position, clump in enumerate(clumps):
+        inside = any(_holds(proposal, panel, clump) for proposal, panel in shown)
+        proposal = None if inside else _present_clump(session, clump, found)
+        found += [proposal] if proposal is not None else []
+        yield 0.8 + 0.2 * (position + 1) / len(clumps), _ranked(found)
+    yield 1.0, _ranked(found)
+
+
+def is_taken(proposal: Proposal, masks: list[Mask]) -> bool:
+    """Whether one of the masks (of clicked objects, in the proposal's frame) already covers it."""
+    outline = unpack_mask(proposal.outline)
+    return any(np.count_nonzero(outline & mask) > 0.4 * np.count_nonzero(outline) for mask in masks)
+
+
+def _ranked(found: list[Proposal]) -> tuple[Proposal, ...]:
+    return tuple(sorted(found, key=lambda proposal: -proposal.confidence))
+
+
+def _worth_cutting(plane: PlaneRegion) -> bool:
+    return plane.area_m2 > _LEAST_PLANE_M2 and min(plane.width_m, plane.height_m) > _LEAST_SIDE_M
+
+
+def _apart(panels: list[Panel]) -> list[Panel]:
+    """No panel inside another on the same plane: boxes before their doors, then the surer one."""
+    kept: list[Panel] = []
+    for panel in sorted(panels, key=lambda panel: (panel.category not in _BOX_KINDS, -panel.confidence)):
+        if not any(_covers(other, panel.centre) or _covers(panel, other.centre) for other in kept):
+            kept.append(panel)
+    return kept
+
+
+def _covers(panel: Panel, point: Vector3) -> bool:
+    local = panel.run.region.world_from_plane.rotation.T @ (point - panel.centre)
+    width, height = panel.size_m
+    return bool(abs(local[1]) < _SAME_PLANE_M and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
+
+
+def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
+    """Whether a clump is part of the box behind a front."""
+    x, behind, z = panel.run.region.world_from_plane.rotation.T @ (clump.points.mean(axis=0) - panel.centre)
+    width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + _BOX_SLACK_M
+    return bool(abs(x) < width and abs(z) < height and -2 * _BOX_SLACK_M < behind < depth)
+
+
+# Boxes: refrigerators of several doors, microwaves
+
+
+def _boxes(session: "GeometricSession", plane: PlaneRegion) -> list[Panel]:
+    """The appliance whose front a whole plane could be."""
+    room = session.scene.capture.room
+    if not room.floor_found:
+        return []
+    middle = plane.world_from_plane.translation
+    bottom = float(middle[2]) - plane.height_m / 2
+    if 0.45 < plane.width_m < 1.0 and 1.25 < plane.height_m < 2.15 and bottom < 0.4:
+        category = "refrigerator"
+    elif 0.12 < plane.width_m < 0.72 and 0.12 < plane.height_m < 0.46 and 0.7 < bottom < 1.5:
+        category = "microwave"
+    else:
+        return []
+    found = _confirmed(session, category, _click_on(session.scene, middle, plane.outward))
+    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room):
+        return []
+    size = hint_for(category).appliance
+    assert size is not None
+    cell, cell_m = found.front.cell, found.front.run.grid.cell_m
+    off = np.log([cell.width * cell_m / size.width[1], cell.height * cell_m / size.height[1]]) / size.spread
+    return [Panel(found.front, category, outlined(found.front) * float(np.exp(-(off @ off) / 8)))]
+
+
+# Presenting: the frame that shows it best, and a click there that means it
+
+
+def _present_panel(session: "GeometricSession", panel: Panel) -> Proposal | None:
+    scene, is_box = session.scene, panel.category in _BOX_KINDS
+    views = _views(scene, panel.corners, panel.run.grid.outward)
+    shown = [(front_mask(panel.front, scene, frame), frame) for frame in views]
+    for (mask, _), frame in sorted(shown, key=lambda view: -np.count_nonzero(view[0][0])):
+        for click in _clicks(scene, panel, frame, mask):
+            found = _confirmed(session, panel.category, click)
+            if isinstance(found, FoundFront | FoundAppliance) and isinstance(found, FoundAppliance) == is_box:
+                if _overlap(panel, found) > 0.7:
+                    return _proposal(session, panel, found, frame, click)
+                break
+    return None
+
+
+def _proposal(
+    session: "GeometricSession", panel: Panel, found: FoundFront | FoundAppliance, frame: Frame, click: PromptPoint
+) -> Proposal:
+    width, height = panel.size_m
+    return Proposal(
+        kind=found.kind,
+        category=panel.category,
+        confidence=round(panel.confidence, 3),
+        click=click,
+        outline=pack_mask(found.mask(frame)[0]),
+        size_m=(width, found.front.depth_m, height),
+        centre_world=panel.centre,
+        handle_px=_handle_px(panel, frame),
+    )
+
+
+def _present_clump(session: "GeometricSession", clump: Clump, others: list[Proposal]) -> Proposal | None:
+    scene = session.scene
+    for click in _clump_clicks(scene, clump):
+        frame = scene.frame(click.frame)
+        floor = clump.base_m if scene.capture.room.floor_found else None
+        category = name_thing(clump.extent_m, floor)
+        found = _confirmed(session, category, click)
+        if found is None or found.kind != "thing":
+            continue
+        mask, box = found.mask(frame)[0], found.box()
+        if box is None or np.count_nonzero(mask) < session.config.least_area_px:
+            continue
+        if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
+            return None
+        width, depth, height = box.dimensions_m
+        return Proposal(
+            kind="thing",
+            category=category,
+            confidence=round(clump.confidence, 3),
+            click=click,
+            outline=pack_mask(mask),
+            size_m=(float(width), float(depth), float(height)),
+            centre_world=box.world_from_object.translation,
+            handle_px=(),
+        )
+    return None
+
+
+def _hits(mask: Mask, frame: Frame, others: list[Proposal]) -> bool:
+    return any(other.click.frame == frame.index and mask[int(other.click.y), int(other.click.x)] for other in others) or any(
+        _inside(mask, frame, other.centre_world) for other in others if other.kind != "front"
+    )
+
+
+def _inside(mask: Mask, frame: Frame, point: Vector3) -> bool:
+    local = frame.world_from_camera.inverse.apply(point[None])
+    if local[0, 2] < 0.1:
+        return False
+    u, v = project(local, frame.rgb_camera)[0]
+    return bool(0 <= u < mask.shape[1] and 0 <= v < mask.shape[0] and mask[int(v), int(u)])
+
+
+def _confirmed(session: "GeometricSession", category: str, click: PromptPoint | None) -> "Found | None":
+    """What a person would get from this click."""
+    if click is None:
+        return None
+    try:
+        return session.find(ObjectPrompt(name="proposal", category=category, points=(click,)))
+    except R2C2RError:
+        return None
+
+
+def _views(scene: Scene, corners: Points, outward: Vector3) -> list[Frame]:
+    """The frames that should show a rectangle largest, whole and sharp, best first."""
+    rated = []
+    centre = corners.mean(axis=0)
+    for frame in scene.frames:
+        local = frame.world_from_camera.inverse.apply(np.vstack([corners, centre]))
+        if local[:, 2].min() < 0.15:
+            continue
+        camera = frame.rgb_camera
+        uv = project(local, camera)
+        size = np.array([camera.width, camera.height])
+        if not ((uv[-1] > 0) & (uv[-1] < size)).all():
+            continue
+        inside = np.clip(uv[:4], 0, size)
+        x, y = inside.T
+        area = 0.5 * abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1)))
+        whole = float(((uv[:4] >= 0) & (uv[:4] <= size)).all(axis=1).mean())
+        away = frame.world_from_camera.translation - centre
+        facing = float(away @ outward) / float(np.linalg.norm(away))
+        if facing > 0.15:
+            rated.append((area * (0.2 + 0.8 * whole) ** 2 * facing * np.sqrt(max(frame.sharpness, 1e-3)), frame))
+    return [frame for _, frame in sorted(rated, key=lambda view: (-view[0], view[1].index))[:_VIEWS]]
+
+
+def _clicks(scene: Scene, panel: Panel, frame: Frame, mask: Mask) -> Iterator[PromptPoint]:
+    """Clicks in a frame that hit the panel's plane where nothing hides it, its handle avoided, from the middle outwards."""
+    cell, handle, grid = panel.front.cell, panel.front.handle, panel.run.grid
+    steps = sorted(((u, v) for u in _SPREAD for v in _SPREAD), key=lambda at: abs(at[0] - 0.5) + abs(at[1] - 0.5))
+    slide = np.array(panel.run.slide_of(frame.index, scene))
+    for u, v in steps:
+        at = np.array([cell.left + u * cell.width, cell.top + v * cell.height])
+        if handle is not None and _on_handle(at, handle.left, handle.top, handle.right, handle.bottom, 0.02 / grid.cell_m):
+            continue
+        click = _click_in(scene, grid.points_at((at - slide)[None])[0], frame)
+        if click is not None and mask[int(click.y), int(click.x)]:
+            yield click
+
+
+_SPREAD = (0.5, 0.35, 0.65, 0.2, 0.8)
+
+
+def _on_handle(at: np.ndarray, left: float, top: float, right: float, bottom: float, margin: float) -> bool:
+    return bool(left - margin < at[0] < right + margin and top - margin < at[1] < bottom + margin)
+
+
+def _click_on(scene: Scene, point: Vector3, outward: Vector3) -> PromptPoint | None:
+    """A click on a point of a plane, in the frame that shows its surroundings best."""
+    up = np.array([0.0, 0.0, 1.0])
+    right = np.cross(outward, up)
+    corners = point + 0.1 * np.array([right + up, up - right, -right - up, right - up])
+    clicks = (_click_in(scene, point, frame) for frame in _views(scene, corners, outward))
+    return next((click for click in clicks if click is not None), None)
+
+
+def _click_in(scene: Scene, point: Vector3, frame: Frame) -> PromptPoint | None:
+    """The pixel of a world point, when the frame sees it there."""
+    local = frame.world_from_camera.inverse.apply(point[None])
+    camera = frame.rgb_camera
+    if local[0, 2] < 0.1:
+        return None
+    u, v = (float(value) for value in project(local, camera)[0])
+    if not (1 <= u < camera.width - 1 and 1 <= v < camera.height - 1):
+        return None
+    hit = scene.pick(frame.index, u, v)
+    if hit is None or np.linalg.norm(hit - point) > 0.05 + 0.02 * local[0, 2]:
+        return None
+    return PromptPoint(frame=frame.index, x=round(u, 1), y=round(v, 1), label=1)
+
+
+def _clump_clicks(scene: Scene, clump: Clump) -> Iterator[PromptPoint]:
+    """Clicks on a clump's seen surface in the three frames that show most of it."""
+    rated = []
+    for frame in scene.frames:
+        local = frame.world_from_camera.inverse.apply(clump.points)
+        if local[:, 2].min() < 0.2:
+            continue
+        uv, camera = project(local, frame.rgb_camera), frame.rgb_camera
+        inside = ((uv > 4) & (uv < np.array([camera.width, camera.height]) - 4)).all(axis=1).mean()
+        rated.append((float(inside) ** 4 * np.sqrt(max(frame.sharpness, 1e-3)) / float(local[:, 2].mean()) ** 2, frame))
+    middle = np.median(clump.points, axis=0)
+    nearest = clump.points[np.argsort(np.linalg.norm(clump.points - middle, axis=1))]
+    for _, frame in sorted(rated, key=lambda view: (-view[0], view[1].index))[:3]:
+        towards = (frame.world_from_camera.translation - middle) @ (nearest - middle).T
+        for point in nearest[towards >= 0][:: max(1, len(nearest) // 12)][:6]:
+            click = _click_in(scene, point, frame)
+            if click is not None:
+                yield click
+                break
+
+
+def _overlap(panel: Panel, found: FoundFront | FoundAppliance) -> float:
+    """IoU of two rectangles on about the same plane."""
+    other, width, height = found.front, *panel.size_m
+    cell = other.cell
+    ends = other.run.grid.points_at(np.array([[cell.left, cell.top], [cell.right, cell.bottom]]))
+    (x0, y0, z1), (x1, y1, z0) = (panel.run.region.world_from_plane.rotation.T @ (end - panel.centre) for end in ends)
+    if max(abs(y0), abs(y1)) > _SAME_PLANE_M:
+        return 0.0
+    across = max(min(x1, width / 2) - max(x0, -width / 2), 0.0)
+    down = max(min(z1, height / 2) - max(z0, -height / 2), 0.0)
+    shared = across * down
+    return float(shared / (width * height + (x1 - x0) * (z1 - z0) - shared))
+
+
+def _handle_px(panel: Panel, frame: Frame) -> tuple[tuple[float, float], ...]:
+    handle = panel.front.handle
+    if handle is None:
+        return ()
+    corners = [
+        [handle.left, handle.top],
+        [handle.right, handle.top],
+        [handle.right, handle.bottom],
+        [handle.left, handle.bottom],
+    ]
+    local = frame.world_from_camera.inverse.apply(panel.run.grid.points_at(np.array(corners), -0.02))
+    return tuple((round(float(u), 1), round(float(v), 1)) for u, v in project(local, frame.rgb_camera))
