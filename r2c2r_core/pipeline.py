@@ -12,7 +12,7 @@ from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.errors import StageError
 from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.consensus import Rule, choose_candidate, chosen_by_person
-from r2c2r_core.generate.stage import GENERATORS, generate_candidates
+from r2c2r_core.generate.stage import GENERATORS, generate_candidates, marked
 from r2c2r_core.ingest.stage import read_capture
 from r2c2r_core.ledger import Kept, Ledger, Reached, Stage, keys_of
 from r2c2r_core.model.capture import Capture
@@ -20,6 +20,7 @@ from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.reconstruction import Reconstruction, StageRun
 from r2c2r_core.model.report import Certificate
+from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.overrides import NO_OVERRIDES
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.prompts import check_prompts
@@ -92,20 +93,7 @@ def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]
         lambda name: (tools.segmenter, config.segment, next(p for p in request.prompts.objects if p.name == name)),
         lambda name, prompt, p: session().track(prompt, progress=p),
     )
-    candidates = ledger.each(
-        "generate",
-        tracks,
-        lambda name: (tools.generator, config.generate, seed, _uploads(overrides, name)),
-        lambda name, track, p: generate_candidates(
-            capture.value,
-            track,
-            tools.generator,
-            config.generate,
-            uploads=_uploads(overrides, name),
-            seed=seed,
-            progress=p,
-        ),
-    )
+    candidates = make_candidates(request, ledger, capture.value, tracks)
     choices = ledger.sort_out(
         "generate", candidates, lambda name, found: select_candidate(found, overrides.of(name), config.generate.rule)
     )
@@ -151,6 +139,49 @@ def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]
         lambda p: write_bundle(result, work.bundle, config.export, progress=p),
     )
     return result, certificate.value
+
+
+def make_candidates(
+    request: Request, ledger: Ledger, capture: Capture, tracks: dict[str, Kept[MaskTrack]]
+) -> dict[str, Kept[CandidateSet]]:
+    """Every object's candidates. Where the chosen generator fails on one, the weight-free one stands in, with a warning.
+
+    The failure is not stored, so that the next run asks the chosen generator again.
+    """
+
+    def made_by(
+        generator: str, objects: dict[str, Kept[MaskTrack]], excuse: Mapping[str, str]
+    ) -> dict[str, Kept[CandidateSet]]:
+        return ledger.each(
+            "generate",
+            objects,
+            lambda name: (generator, config, request.seed, _uploads(request.overrides, name), excuse.get(name)),
+            lambda name, track, p: _marked(
+                generate_candidates(
+                    capture,
+                    track,
+                    generator,
+                    config,
+                    uploads=_uploads(request.overrides, name),
+                    seed=request.seed,
+                    progress=p,
+                ),
+                excuse.get(name),
+            ),
+        )
+
+    config, chosen = request.config.generate, request.tools.generator
+    made = made_by(chosen, tracks, {})
+    missing = {name: track for name, track in tracks.items() if name not in made}
+    if not missing or chosen == GENERATORS.default:
+        return made
+    excuses = {name: f"{chosen} made no mesh, {GENERATORS.default} stands in: {ledger.failures.pop(name)}" for name in missing}
+    stood_in = made_by(GENERATORS.default, missing, excuses)
+    return {name: {**made, **stood_in}[name] for name in tracks if name in made or name in stood_in}
+
+
+def _marked(found: CandidateSet, excuse: str | None) -> CandidateSet:
+    return found if excuse is None else marked(found, excuse)
 
 
 def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) -> CandidateSet:

@@ -26,11 +26,15 @@ class Progress:
 
     def at(self, fraction: float, text: str = "") -> None:
         """Report a fraction 0..1 of this span; raises Cancelled when the person asked to stop."""
-        if self.is_cancelled is not None and self.is_cancelled():
-            raise Cancelled(f"{self.stage or 'work'}: cancelled")
+        self.check()
         if self.report is not None:
             low, high = self.span
             self.report(self.stage, low + (high - low) * min(max(fraction, 0.0), 1.0), text)
+
+    def check(self) -> None:
+        """Raise Cancelled when the person asked to stop; reports nothing."""
+        if self.is_cancelled is not None and self.is_cancelled():
+            raise Cancelled(f"{self.stage or 'work'}: cancelled")
 
     def for_stage(self, stage: str) -> "Progress":
         """The same channel, reporting under another stage's name from zero."""

@@ -1,5 +1,7 @@
 """Reading a mesh file (GLB, OBJ, PLY, STL) into plain parts with their colours."""
 
+import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,21 +47,48 @@ def read_parts(path: Path) -> list[MeshPart]:
             f"{path.name}: {path.stat().st_size // 1_000_000} MB, at most {_MOST_BYTES // 1_000_000} MB expected"
         )
     try:
-        scene = trimesh.load_scene(path)
-        geometries = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+        geometries = _triangles(trimesh.load_scene(path))
     # the parsers behind trimesh raise whatever the broken bytes make them raise
     except Exception as error:
         raise OverrideError(
             f"{path.name}: not a readable {path.suffix[1:].upper()} mesh ({error})", hint="export it again"
         ) from error
+    _check_geometries(path.name, geometries)
+    return parts_of(geometries)
+
+
+def parts_of_glb(content: bytes, label: str) -> list[MeshPart]:
+    """The geometries of a binary glTF in memory; raises OverrideError, naming `label`, when it cannot be read."""
+    import trimesh
+
+    try:
+        geometries = _triangles(trimesh.load_scene(io.BytesIO(content), file_type="glb"))
+    except Exception as error:  # as in read_parts
+        raise OverrideError(f"{label}: not a readable GLB mesh ({error})") from error
+    _check_geometries(label, geometries)
+    return parts_of(geometries)
+
+
+def parts_of(geometries: Sequence[Any]) -> list[MeshPart]:
+    """Trimesh geometries as plain parts."""
+    return [_part(geometry) for geometry in geometries]
+
+
+def _triangles(scene: Any) -> list[Any]:
+    """Every geometry with faces, with its placement applied."""
+    import trimesh
+
+    return [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+
+
+def _check_geometries(label: str, geometries: Sequence[Any]) -> None:
     if not geometries:
-        raise OverrideError(f"{path.name}: no triangles found", hint="export the mesh with faces")
+        raise OverrideError(f"{label}: no triangles found", hint="export the mesh with faces")
     count = sum(len(g.faces) for g in geometries)
     if count > _MOST_FACES:
-        raise OverrideError(f"{path.name}: {count} triangles, at most {_MOST_FACES} expected", hint="simplify the mesh first")
+        raise OverrideError(f"{label}: {count} triangles, at most {_MOST_FACES} expected", hint="simplify the mesh first")
     if not all(np.isfinite(g.vertices).all() for g in geometries):
-        raise OverrideError(f"{path.name}: vertices that are not numbers", hint="export it again")
-    return [_part(geometry) for geometry in geometries]
+        raise OverrideError(f"{label}: vertices that are not numbers", hint="export it again")
 
 
 def sample_colours(parts: list[MeshPart], count: int, rng: np.random.Generator) -> tuple[Points, Colours]:

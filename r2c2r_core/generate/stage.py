@@ -1,15 +1,16 @@
 """§4.2: several candidate meshes of one object, and the one to take."""
 
 import logging
+import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 
-from r2c2r_core.errors import Cancelled, GenerationFailed, InputError, R2C2RError
+from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed, InputError, R2C2RError
 from r2c2r_core.generate.consensus import choose_candidate
 from r2c2r_core.generate.evidence import Evidence, gather_evidence
 from r2c2r_core.generate.protocol import MeshGenerator
@@ -30,6 +31,19 @@ GENERATORS = Registry(
             target="r2c2r_core.generate.completion:Completion",
             summary="fused visible surface, completed by symmetry, to the wall or the category's depth; no weights",
         ),
+        Backend(
+            name="trellis",
+            target="r2c2r_core.generate.trellis:Trellis",
+            needs=("trellis", "torch"),
+            licence="MIT (code and weights); its CUDA dependencies carry licences of their own, some non-commercial",
+            summary="TRELLIS in this process: several photos in, a textured mesh out; an NVIDIA GPU with 16 GB",
+        ),
+        Backend(
+            name="remote",
+            target="r2c2r_core.generate.remote:Remote",
+            licence="that of the generator served",
+            summary="a generator on another machine: serve_worker.py, or TRELLIS as NVIDIA NIM",
+        ),
     ),
 )
 
@@ -41,6 +55,8 @@ class GenerateConfig:
     count: int = 5  # the paper samples up to 10; 5 take about 4 s an object on one core
     pool_frames: int = 20  # the paper divides the images into 20 intervals (§4.2)
     rule: Literal["medoid", "mean"] = "medoid"  # "mean" is the paper's; see consensus.py for why not
+    weights: str = ""  # of a learned generator: a folder or a hub id
+    url: str = field(default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""))  # of the remote generator
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= 10:
@@ -62,10 +78,11 @@ def generate_candidates(
 ) -> CandidateSet:
     """Candidates of one object, each in an arbitrary frame and unit, and the consensus among those nobody rejected.
 
-    A candidate that fails is left out; raises GenerationFailed when none is left, and OverrideError for an unusable upload.
+    A candidate that fails is left out; raises GenerationFailed when none is left, OverrideError for an unusable upload, and
+    BackendUnavailable when the generator cannot be used on this machine at all.
     """
     given = [read_upload(path, track.name, f"upload{k}") for k, path in enumerate(uploads)]
-    backend: MeshGenerator = GENERATORS.load(generator)
+    backend = load_generator(generator, config, progress)
     progress.at(0.0, f"{track.name}: loading frames")
     evidence = gather_evidence(capture, track, config.pool_frames)
     made, failures = _make_all(backend, evidence, config.count, seed, progress.part(0.1, 1.0))
@@ -74,18 +91,44 @@ def generate_candidates(
             f"{track.name}: all {config.count} candidates failed: {failures[0]}",
             hint="add a click on a clearer frame, or upload a mesh",
         )
+    if not made:  # what the person gave stands alone; why is said with it
+        given = [_warned(asset, f"{generator} made no mesh: {failures[0]}") for asset in given]
     return choose_candidate([*made, *given], rejected=rejected, rule=config.rule)
+
+
+def load_generator(name: str, config: GenerateConfig, progress: Progress = SILENT) -> MeshGenerator:
+    """The generator of that name with its settings; raises BackendUnavailable with the next step."""
+    options: dict[str, dict[str, Any]] = {
+        "trellis": {"weights": config.weights},
+        "remote": {"url": config.url, "progress": progress},
+    }
+    backend: MeshGenerator = GENERATORS.load(name, **options.get(name, {}))
+    return backend
+
+
+def marked(found: CandidateSet, warning: str) -> CandidateSet:
+    """The same candidates, each with a warning more: it is shown wherever one of them is."""
+    return replace(found, candidates=tuple(_warned(asset, warning) for asset in found.candidates))
+
+
+def _warned(asset: MeshAsset, warning: str) -> MeshAsset:
+    return replace(asset, warnings=(warning, *asset.warnings))
 
 
 def _make_all(
     backend: MeshGenerator, evidence: Evidence, count: int, seed: int, progress: Progress
 ) -> tuple[list[MeshAsset], list[str]]:
-    """The candidates that could be made, and why the others could not."""
+    """The candidates that could be made, and why the others could not; a generator that is gone is not asked again."""
     made: list[MeshAsset] = []
     failures: list[str] = []
     for k in range(count):
         progress.at(k / count, f"{evidence.track.name}: candidate {k + 1} of {count}")
-        asset = _attempt(partial(backend.make, evidence, f"c{k}", seed), failures)
+        try:
+            asset = _attempt(partial(backend.make, evidence, f"c{k}", seed), failures)
+        except BackendUnavailable as error:
+            log.warning("%s: %s", evidence.track.name, error)
+            failures.append(str(error))
+            break
         if asset is not None:
             made.append(asset)
     progress.at(1.0, f"{evidence.track.name}: {len(made)} candidates")
@@ -96,7 +139,7 @@ def _attempt(make: Callable[[], MeshAsset], failures: list[str]) -> MeshAsset | 
     """The candidate, or None with the reason noted: one bad draw must not cost the object."""
     try:
         return make()
-    except Cancelled:
+    except (Cancelled, BackendUnavailable):
         raise
     except (R2C2RError, ValueError, RuntimeError, ArithmeticError, LookupError, cv2.error) as error:
         log.warning("candidate left out: %s", error, exc_info=not isinstance(error, R2C2RError))

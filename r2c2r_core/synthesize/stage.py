@@ -52,7 +52,7 @@ def build_scene(
     ):
         spec, notice = fixture_for(track.category)
         item = measure_object(capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed)
-        measured.append(replace(item, warnings=(*([notice] if notice else []), *item.warnings)))
+        measured.append(replace(item, warnings=(*([notice] if notice else []), *asset.warnings, *item.warnings)))
     progress.at(0.5, "arranging")
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     hinges = choose_hinges(layout.objects, overrides)

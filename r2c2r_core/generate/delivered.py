@@ -1,0 +1,47 @@
+"""A mesh made by a model elsewhere, as a candidate: checked, closed, and with what was done to it."""
+
+import zlib
+
+import numpy as np
+
+from r2c2r_core.errors import GenerationFailed, OverrideError
+from r2c2r_core.generate.asset import shape_metrics
+from r2c2r_core.generate.meshfile import MeshPart
+from r2c2r_core.generate.repair import mended
+from r2c2r_core.geometry.meshes import is_watertight, join_vertices
+from r2c2r_core.model.mesh import MeshAsset
+
+
+def delivered_asset(
+    parts: list[MeshPart],
+    *,
+    object_name: str,
+    candidate_id: str,
+    generator: str,
+    seed: int,
+    frames: tuple[int, ...],
+    parameters: dict[str, float],
+    metrics: dict[str, float] | None = None,
+    warnings: tuple[str, ...] = (),
+) -> MeshAsset:
+    """The parts as one closed candidate in a frame and unit of its own; raises GenerationFailed for what cannot be closed.
+
+    Its place is not kept: placing is the next stage's, and a +Y-up GLB is turned like everything else.
+    """
+    rng = np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode()), seed])
+    try:
+        mesh, notes = mended(parts, f"{generator} {candidate_id}", rng)
+    except OverrideError as error:
+        raise GenerationFailed(f"{object_name}: {error.message}", hint="another sample or generator may do better") from error
+    return MeshAsset(
+        object_name=object_name,
+        candidate_id=candidate_id,
+        mesh=mesh,
+        generator=generator,
+        seed=seed,
+        watertight=is_watertight(mesh.vertices, mesh.faces),
+        frames=frames,
+        metrics={**(metrics or {}), **shape_metrics(*join_vertices(mesh.vertices, mesh.faces))},
+        parameters={**parameters, "delivered_faces": float(sum(len(part.faces) for part in parts))},
+        warnings=(*warnings, *(f"{generator} mesh: {note}" for note in notes)),
+    )

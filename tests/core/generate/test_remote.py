@@ -1,0 +1,148 @@
+"""The remote generator against servers of both protocols, and against servers that misbehave."""
+
+import base64
+import io
+import json
+import threading
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed
+from r2c2r_core.generate import exchange
+from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.remote import Remote
+from r2c2r_core.geometry.meshes import is_watertight, oriented_extents
+from r2c2r_core.progress import Progress
+from tests.core.generate.stub import QUICK, answering, box_glb, said
+
+
+@pytest.fixture(scope="module")
+def evidence(bottle_scene):
+    return gather_evidence(*bottle_scene, 6)
+
+
+def nim(address, **options):
+    return Remote(url=f"{address}/v1/infer", patience=QUICK, **options)
+
+
+def nim_answer(glb, reason="SUCCESS"):
+    return said(200, {"artifacts": [{"base64": base64.b64encode(glb).decode(), "finishReason": reason, "seed": 7}]})
+
+
+def test_a_nim_gets_masked_pictures_and_its_glb_becomes_a_closed_candidate(evidence):
+    with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
+        asset = nim(address).make(evidence, "c3", 5)
+    method, path, _, body = asked[0]
+    request = json.loads(body)
+    assert (method, path) == ("POST", "/v1/infer")
+    assert request["mode"] == "image"
+    assert len(request["image"]) == len(asset.frames) >= 4
+    assert request["multiimage_algo"] in ("stochastic", "multidiffusion")
+    assert 10 <= request["ss_sampling_steps"] <= 50
+    assert request["ss_cfg_scale"] <= 10
+    assert request["seed"] > 0  # 0 lets the server draw one, and nobody could repeat it
+    assert None not in request.values()
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(request["image"][0].partition(",")[2]))))
+    assert picture.shape[2] == 4
+    assert set(np.unique(picture[..., 3])) == {0, 255}
+    assert (asset.object_name, asset.candidate_id, asset.generator, asset.seed) == ("bottle_1", "c3", "remote:trellis-nim", 5)
+    assert asset.watertight
+    assert is_watertight(asset.mesh.vertices, asset.mesh.faces)
+    extents = oriented_extents(asset.mesh.vertices)
+    assert extents / extents[0] == pytest.approx([1, 0.75, 0.5], rel=1e-4)
+    assert asset.mesh.texture.shape == (32, 32, 3)  # kept, not baked anew
+
+
+def test_every_candidate_is_another_sample_and_each_can_be_repeated(evidence):
+    with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
+        for candidate in ("c0", "c1", "c0"):
+            nim(address).make(evidence, candidate, 0)
+    first, other, again = (json.loads(body) for *_, body in asked)
+    assert first == again
+    assert first["seed"] != other["seed"]
+    assert first["ss_cfg_scale"] != other["ss_cfg_scale"]
+
+
+def test_a_busy_server_is_asked_again(evidence):
+    answers = iter([said(503, {}, **{"Retry-After": "0"}), said(502, {}), nim_answer(box_glb())])
+    with answering(lambda *request: next(answers)) as (address, asked):
+        assert nim(address).make(evidence, "c0", 0).watertight
+    assert len(asked) == 3
+
+
+def test_a_server_that_stays_busy_is_given_up_in_one_line(evidence):
+    busy = pytest.raises(BackendUnavailable, match=r"busy or down \(503\).*loading")
+    with answering(lambda *request: said(503, {"detail": "loading"})) as (address, asked), busy as refusal:
+        nim(address).make(evidence, "c0", 0)
+    assert len(asked) == QUICK.tries
+    assert "\n" not in str(refusal.value)
+
+
+def test_nobody_there_is_one_line_with_the_address(evidence):
+    with pytest.raises(BackendUnavailable, match=r"127\.0\.0\.1:9 cannot be reached.*start it"):
+        nim("http://127.0.0.1:9").make(evidence, "c0", 0)
+
+
+@pytest.mark.parametrize(
+    ("answer", "kind", "message"),
+    [
+        (said(401, {}), BackendUnavailable, "refused the token.*R2C2R_GENERATOR_TOKEN"),
+        (said(404, {}), BackendUnavailable, "has no /v1/infer"),
+        (said(302, {}, Location="http://elsewhere"), BackendUnavailable, "has no /v1/infer"),
+        (said(422, {"detail": "image: bad"}), GenerationFailed, "answered 422.*image: bad"),
+        (said(500, {"detail": "CUDA out of memory\nlong trace"}), GenerationFailed, "answered 500.*CUDA"),
+        ((200, {}, b"<html>"), GenerationFailed, "not JSON"),
+        ((200, {}, b"[]"), GenerationFailed, "a JSON object expected"),
+        (said(200, {}), GenerationFailed, "no mesh in its answer"),
+        (said(200, {"artifacts": [{"base64": "!!"}]}), GenerationFailed, "no mesh in its answer"),
+        (nim_answer(b"glTF", "CONTENT_FILTERED"), GenerationFailed, "CONTENT_FILTERED"),
+        (nim_answer(b"glTF\x02\x00\x00\x00broken"), GenerationFailed, "not a readable GLB"),
+    ],
+)
+def test_what_a_server_does_wrong_is_said_in_one_line(evidence, answer, kind, message):
+    with answering(lambda *request: answer) as (address, asked), pytest.raises(kind, match=message) as refusal:
+        nim(address).make(evidence, "c0", 0)
+    assert len(asked) == 1  # none of these passes by itself
+    assert "\n" not in str(refusal.value)
+
+
+def test_an_endless_answer_is_cut_off(evidence, monkeypatch):
+    monkeypatch.setattr(exchange, "MOST_BYTES", 1000)
+    with answering(lambda *request: (200, {}, b" " * 5000)) as (address, _), pytest.raises(GenerationFailed, match="over"):
+        nim(address).make(evidence, "c0", 0)
+
+
+def test_a_person_can_stop_a_request_that_hangs(evidence):
+    stop, released = threading.Event(), threading.Event()
+
+    def hang(*request):
+        stop.set()
+        released.wait(10)
+        return said(200, {})
+
+    with answering(hang) as (address, _):
+        started = time.monotonic()
+        with pytest.raises(Cancelled):
+            nim(address, progress=Progress(is_cancelled=stop.is_set)).make(evidence, "c0", 0)
+        waited = time.monotonic() - started
+        released.set()
+    assert waited < 5
+
+
+def test_the_token_travels_in_the_header_and_never_in_the_address(evidence, monkeypatch):
+    monkeypatch.setenv("R2C2R_GENERATOR_TOKEN", "secret")
+    with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
+        nim(address).make(evidence, "c0", 0)
+    assert asked[0][2]["Authorization"] == "Bearer secret"
+    with pytest.raises(BackendUnavailable, match="holds a password"):
+        Remote(url="http://user:pw@host/v1/infer")
+
+
+@pytest.mark.parametrize("url", ["", "gpu-machine", "ftp://host/v1/mesh", "http://host", "http://host/generate"])
+def test_an_address_without_a_protocol_is_refused_before_any_work(url):
+    with pytest.raises(BackendUnavailable, match="v1/mesh") as refusal:
+        Remote(url=url)
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,86 @@
+"""What the pipeline does when a backend fails on one object."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.config import ReconstructConfig
+from r2c2r_core.errors import BackendUnavailable
+from r2c2r_core.generate.stage import GenerateConfig
+from r2c2r_core.ledger import Kept, Ledger
+from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
+from r2c2r_core.pipeline import Request, Tools, make_candidates
+from r2c2r_core.progress import SILENT
+from r2c2r_core.workspace import Workspace
+from tests.core.generate import scenes
+from tests.core.generate.stub import answering, box_glb, said
+from tests.core.generate.test_remote import nim_answer
+
+
+@pytest.fixture(scope="module")
+def two_bottles():
+    """One capture, and two tracks of the same bottle."""
+    capture, track = scenes.bottle_scene()
+    return capture, {name: Kept(replace(track, name=name), name) for name in ("good_1", "bad_1")}
+
+
+def request_for(address: str, overrides: Overrides | None = None) -> Request:
+    config = ReconstructConfig(generate=GenerateConfig(count=1, pool_frames=6, url=f"{address}/v1/infer"))
+    return Request(
+        source=Path("scan"),
+        prompts=Prompts(objects=()),
+        overrides=overrides or Overrides(objects={}),
+        config=config,
+        tools=Tools(generator="remote"),
+    )
+
+
+def refusing_the_second(*_request):
+    refusing_the_second.count += 1
+    return nim_answer(box_glb()) if refusing_the_second.count == 1 else said(500, {"detail": "CUDA out of memory"})
+
+
+def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candidate_says_so(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    refusing_the_second.count = 0
+    with answering(refusing_the_second) as (address, asked):
+        ledger = Ledger(Workspace(tmp_path), SILENT)
+        found = make_candidates(request_for(address), ledger, capture, tracks)
+        assert list(found) == ["good_1", "bad_1"]
+        assert not ledger.failures
+        assert found["good_1"].value.chosen.generator == "remote:trellis-nim"
+        assert found["good_1"].value.chosen.warnings == ()
+        for asset in found["bad_1"].value.candidates:
+            assert asset.generator == "completion"
+            assert "remote made no mesh, completion stands in" in asset.warnings[0]
+            assert "CUDA out of memory" in asset.warnings[0]
+
+        # the failure is not kept: the next run asks the server for that object again, and only for that one
+        asked.clear()
+        refusing_the_second.count = 0
+        again = make_candidates(request_for(address), Ledger(Workspace(tmp_path), SILENT), capture, tracks)
+    assert len(asked) == 1
+    assert again["bad_1"].value.chosen.generator == "remote:trellis-nim"
+    assert again["bad_1"].key != found["bad_1"].key
+    assert again["good_1"].key == found["good_1"].key
+
+
+def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    (tmp_path / "box.glb").write_bytes(box_glb())
+    overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "box.glb"))})
+    with answering(lambda *request: said(500, {"detail": "broken"})) as (address, _):
+        ledger = Ledger(Workspace(tmp_path / "work"), SILENT)
+        found = make_candidates(request_for(address, overrides), ledger, capture, {"bad_1": tracks["bad_1"]})
+    (asset,) = found["bad_1"].value.candidates
+    assert asset.generator == "upload"
+    assert "remote made no mesh" in asset.warnings[0]
+
+
+def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles, tmp_path, monkeypatch):
+    monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
+    capture, tracks = two_bottles
+    request = replace(request_for("http://h"), config=ReconstructConfig())
+    with pytest.raises(BackendUnavailable, match="generator 'remote' has no address"):
+        make_candidates(request, Ledger(Workspace(tmp_path), SILENT), capture, tracks)
