@@ -19,6 +19,10 @@ from r2c2r_core.segment.scene import Scene
 _USUAL_PROTRUSION_M = 0.035
 _PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
 _SUPPORTED_SHARE = 0.25  # of a column or row of cells, for it to belong to the panel
+_OFF_PLANE_M = 0.06  # handles stand out by up to 5 cm
+_STEADY_M = 0.012  # clicks this near a border are within pose error of it
+_BORDER_M = 0.035  # and those this near correct it: no panel is so narrow
+_HULL_SHARE = 1.3  # two panels whose rectangle is larger than this times theirs do not belong together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,22 +37,21 @@ class Front:
 
 
 def find_front(run: Run, positives: Points, negatives: Points, *, pair: bool) -> Front | None:
-    """The panel under the clicks (world points); None when they miss the run's panels."""
-    cells = []
-    for column, row in run.grid.cells_of(positives):
-        cell = run.cell_at(float(column), float(row))
-        if cell is None:
-            return None
-        if cell not in cells:
-            cells.append(cell)
-    handles = [run.handles[run.cells.index(cell)] for cell in cells]
-    if pair and len(cells) == 1:
-        partner = _partner(run, cells[0])
-        if partner is not None:
-            cells.append(partner)
+    """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels."""
+    on, off = run.grid.cells_of(_near_plane(run, positives)), run.grid.cells_of(_near_plane(run, negatives))
+    first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
+    if first is None:
+        return None
+    cells = [first]
+    partner = _partner(run, first) if pair else None
+    cells += [partner] if partner is not None else []
     cell = joined(cells)
-    for column, row in run.grid.cells_of(negatives):
-        cell = _without(cell, float(column), float(row), run, run.grid.cells_of(positives))
+    for column, row in on[1:]:
+        cell, taken = _with(cell, float(column), float(row), run)
+        cells += taken
+    for column, row in off:
+        cell = _without(cell, float(column), float(row), run, on)
+    handles = (run.handles[run.cells.index(part)] for part in cells)
     handle = next((handle for handle in handles if handle is not None), None)
     lab, seen = as_lab(run.mosaic)
     return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
@@ -149,10 +152,51 @@ def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
     return score
 
 
+def _near_plane(run: Run, clicks: Points) -> Points:
+    """The clicks that lie on the panels' plane: others are on sides, or on things in front, and say nothing about panels."""
+    away = run.grid.world_from_plane.inverse.apply(clicks)[:, 1]
+    return clicks[np.abs(away) < _OFF_PLANE_M]
+
+
+def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[Cell]]:
+    """The cell made to hold a click, and the panels it took in.
+
+    Next to its border the click corrects the border; farther off it means the panel there, unless the two make no rectangle.
+    """
+    reached = joined([cell, Cell(column, row, column, row)])
+    outside = max(reached.width - cell.width, reached.height - cell.height) * run.grid.cell_m
+    if outside < _STEADY_M:
+        return cell, []
+    other = run.cell_at(column, row)
+    if outside < _BORDER_M or other is None:
+        return reached, []
+    both = joined([cell, other])
+    if _area(both) > _HULL_SHARE * (_area(cell) + _area(other)):
+        return reached, []
+    return both, [other]
+
+
+def _area(cell: Cell) -> float:
+    return cell.width * cell.height
+
+
 def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
-    """The cell cut along the clearest line between a click off it and the clicks on it."""
+    """The cell without a click: its border drawn in where the click is beside it, else cut along the clearest line."""
     if not cell.contains(column, row):
         return cell
+    room = (column - cell.left, row - cell.top, cell.right - column, cell.bottom - row)
+    nearest = int(np.argmin(room))
+    if room[nearest] * run.grid.cell_m < _STEADY_M:
+        return cell
+    if room[nearest] * run.grid.cell_m < _BORDER_M:
+        edges = [cell.left, cell.top, cell.right, cell.bottom]
+        edges[nearest] = (column, row)[nearest % 2]
+        return Cell(*edges)
+    return _cut_off(cell, column, row, run, kept)
+
+
+def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The part of the cell, of two along the clearest line between the clicks, that does not hold the click off it."""
     options: list[tuple[float, Cell]] = []
     for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
         profile = _profile(run, cell, axis)

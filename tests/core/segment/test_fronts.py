@@ -76,6 +76,23 @@ def test_a_second_click_joins_and_a_negative_click_cuts(session: GeometricSessio
     assert cut.width_m == pytest.approx(0.5, abs=6e-3)  # cut along the middle of the seam
 
 
+@pytest.mark.parametrize("label", [1, 0])
+def test_a_click_within_pose_error_of_the_border_takes_in_no_neighbour_and_cuts_nothing(
+    session: GeometricSession, boxes: Boxes, label: int
+) -> None:
+    beside = click_on(boxes[0], (0.508 if label else 0.495, FRONT_Y, 0.3), 60, label)
+    panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60), beside)).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(0.5, abs=4e-3)
+
+
+def test_a_click_on_what_stands_in_front_leaves_the_panel_whole(session: GeometricSession, boxes: Boxes) -> None:
+    on_post = click_on(boxes[0], (0.67, FRONT_Y - 0.25, 0.5), 60, label=0)
+    panel = session.find(prompt("b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60), on_post)).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(0.5, abs=4e-3)
+
+
 def test_tracks_do_not_depend_on_the_order_of_objects_nor_on_the_cache(boxes: Boxes, tmp_path: Path, cache: Path) -> None:
     capture = boxes[0]
     first = prompt("door_a", "cabinet", click_on(capture, (0.3, FRONT_Y, 0.4), 60))
