@@ -99,7 +99,7 @@ def _figures(matches: list[Match], truth: dict[str, Any], seconds: float) -> dic
     found = {match.name for match in matches if match.name in fronts and match.iou >= FOUND_IOU}
     flat = [match for match in matches if match.proposal.kind != "thing"]
     things = [match for match in matches if match.proposal.kind == "thing"]
-    named = [match for match in matches if match.name in found and match.iou >= FOUND_IOU]
+    named = {match.name: match for match in reversed(matches) if match.name in found and match.iou >= FOUND_IOU}
     return {
         "fronts": len(fronts),
         "fronts_found": len(found),
@@ -107,8 +107,8 @@ def _figures(matches: list[Match], truth: dict[str, Any], seconds: float) -> dic
         "flat_proposals": len(flat),
         "false": sum(match.name is None for match in flat),
         "not_found_or_twice": len(flat) - len({m.name for m in flat if m.name in fronts and m.iou >= FOUND_IOU}),
-        "category_right": sum(match.proposal.category == truth[match.name or ""]["category"] for match in named),
-        "with_handle": sum(bool(match.proposal.handle_px) for match in named),
+        "category_right": sum(match.proposal.category == truth[name or ""]["category"] for name, match in named.items()),
+        "with_handle": sum(bool(match.proposal.handle_px) for match in named.values()),
         "things": len(truth) - len(fronts),
         "things_found": len({match.name for match in things if match.name in truth and match.name not in fronts}),
         "thing_proposals": len(things),

@@ -11,8 +11,9 @@ from r2c2r_core.segment.planes import PlaneRegion
 
 _VOXEL_M = 0.02
 _MAP_M = 0.04  # of the heights of level surfaces
-_LEVEL_COS = 0.9
-_LEAST_LEVEL_M2 = 0.08
+_LEVEL_COS = 0.85
+_LEAST_LEVEL_M2 = 0.05  # glossy worktops lose most of their depth
+_BESIDE_M = 0.20  # a thing stands this near to where its support was seen: it hides the rest
 _CLEARANCE_M = 0.012
 _STANDS_M = 0.06  # the seen part of a thing starts this near its support
 _OFF_PLANE_M = 0.03
@@ -78,9 +79,8 @@ def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[flo
         cells = ((points[near, :2] - origin) / _MAP_M).astype(int)
         seen = np.zeros(shape, bool)
         seen[cells[:, 0], cells[:, 1]] = True
-        # What stands on a surface hides it, and its far side: holes of the size of a thing belong to it.
-        seen = np.asarray(ndimage.binary_closing(np.pad(seen, 5), iterations=4))[5:-5, 5:-5]
-        found.append((float(np.average(points[near, 2], weights=areas[near])), seen, origin))
+        beside = np.asarray(ndimage.binary_dilation(seen, iterations=round(_BESIDE_M / _MAP_M)))
+        found.append((float(np.average(points[near, 2], weights=areas[near])), beside, origin))
     return found
 
 
@@ -120,4 +120,4 @@ def _thing_sized(extent: np.ndarray, height: float) -> bool:
     on_floor = height < 0.15
     most_across, most_high = (1.2, 1.3) if on_floor else (0.6, 0.6)
     least = 0.15 if on_floor else 0.04
-    return bool(extent[2] > least and extent[:2].min() > 0.025 and extent[:2].max() < most_across and extent[2] < most_high)
+    return bool(extent[2] > least and extent[:2].max() > 0.04 and extent[:2].max() < most_across and extent[2] < most_high)

@@ -1,6 +1,7 @@
 """What is there before anyone clicks: fronts, appliances and free-standing things, each with the click that confirms it."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,9 +82,16 @@ def _apart(panels: list[Panel]) -> list[Panel]:
     """No panel inside another on the same plane: boxes before their doors, then the surer one."""
     kept: list[Panel] = []
     for panel in sorted(panels, key=lambda panel: (panel.category not in _BOX_KINDS, -panel.confidence)):
-        if not any(_covers(other, panel.centre) or _covers(panel, other.centre) for other in kept):
+        if not any(_covers(other, panel.centre) or _covers(panel, other.centre) or _same_box(panel, other) for other in kept):
             kept.append(panel)
     return kept
+
+
+def _same_box(panel: Panel, other: Panel) -> bool:
+    """Whether two faces belong to one appliance: no two of a kind stand corner to corner."""
+    if panel.category != other.category or panel.category not in _BOX_KINDS:
+        return False
+    return bool(np.linalg.norm(panel.centre - other.centre) < max(panel.size_m[0], other.size_m[0]))
 
 
 def _covers(panel: Panel, point: Vector3) -> bool:
@@ -122,7 +130,8 @@ def _boxes(session: "GeometricSession", plane: PlaneRegion) -> list[Panel]:
     assert size is not None
     cell, cell_m = found.front.cell, found.front.run.grid.cell_m
     off = np.log([cell.width * cell_m / size.width[1], cell.height * cell_m / size.height[1]]) / size.spread
-    return [Panel(found.front, category, outlined(found.front) * float(np.exp(-(off @ off) / 8)))]
+    front = replace(found.front, depth_m=min(found.front.depth_m, 1.5 * size.depth))
+    return [Panel(front, category, outlined(front) * float(np.exp(-(off @ off) / 8)))]
 
 
 # Presenting: the frame that shows it best, and a click there that means it
@@ -152,7 +161,7 @@ def _proposal(
         confidence=round(panel.confidence, 3),
         click=click,
         outline=pack_mask(found.mask(frame)[0]),
-        size_m=(width, found.front.depth_m, height),
+        size_m=(width, panel.front.depth_m or found.front.depth_m, height),
         centre_world=panel.centre,
         handle_px=_handle_px(panel, frame),
     )
