@@ -12,4 +12,4 @@ if ! command -v npm >/dev/null 2>&1; then
 fi
 [ -x node_modules/.bin/tsc ] || npm ci --silent --no-audit --no-fund
 node_modules/.bin/tsc -p tsconfig.json
-node_modules/.bin/prettier --check --log-level warn .
+node_modules/.bin/prettier --check --log-level warn . ../r2c2r_core/export/review_page

@@ -20,7 +20,7 @@ Metres, kilograms, radians, +Z up. Every joint is closed at 0 and opens towards 
 FILES
   scene.urdf     yourdfpy, PyBullet, SAPIEN, ROS, MuJoCo        scene.xml   MuJoCo
   scene.usda     Isaac Sim, Omniverse, anything that reads USD  preview.png
-  scene.glb      web viewers, Blender (+Y up, as glTF demands)
+  scene.glb      web viewers, Blender (+Y up, as glTF demands)  review.html the scene to open and turn, in any browser
   manifest.json  where every number comes from                  report.html the certificate, for reading
   meshes/        textured OBJ to see (_vis), convex OBJ to touch (_col_); boxes stand in scene.urdf and scene.xml
 

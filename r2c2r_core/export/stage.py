@@ -18,6 +18,7 @@ from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
+from r2c2r_core.export.review import review_html
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_meshes
 from r2c2r_core.export.writers.table import FORMATS
@@ -68,6 +69,8 @@ def write_bundle(
         pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4)) if config.pictures else {}
         certificate = certify(folder, progress=progress.part(0.4, 0.9))
         _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
+        review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
+        (folder / "review.html").write_text(review, encoding="utf-8")
         progress.at(0.9, "packing")
         write_zip(folder, scratch / "bundle.zip")
         (scratch / "bundle.zip").replace(destination)

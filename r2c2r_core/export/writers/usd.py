@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.meshes import convex_hull
 from r2c2r_core.export.writers.text import quat_wxyz_of
 from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
@@ -150,7 +151,10 @@ def _write_colliders(stage: Any, path: str, body: Body) -> None:
     """Convex pieces and panels, as guides: engines touch them, renderers leave them out."""
     from pxr import UsdGeom, UsdPhysics, UsdShade
 
-    shapes = [_mesh(stage, f"{path}/collision_{k}", *_hull(p.vertices_link)) for k, p in enumerate(body.link.pieces)]
+    shapes = [
+        _mesh(stage, f"{path}/collision_{k}", *convex_hull(p.vertices_link, f"{body.name}: {p.name}"))
+        for k, p in enumerate(body.link.pieces)
+    ]
     for shape in shapes:
         UsdPhysics.MeshCollisionAPI.Apply(shape.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
     for number, box in enumerate(body.link.boxes, start=len(shapes)):
@@ -232,13 +236,6 @@ def _mesh(stage: Any, path: str, vertices: np.ndarray, faces: np.ndarray) -> Any
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
     return mesh
-
-
-def _hull(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    import trimesh
-
-    hull = trimesh.convex.convex_hull(vertices)
-    return np.asarray(hull.vertices), np.asarray(hull.faces)
 
 
 def _bind(prim: Any, material: Any, purpose: str = "") -> None:

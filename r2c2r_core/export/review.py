@@ -1,0 +1,139 @@
+"""review.html: the scene in 3D, with its joints and findings, on a page that opens without a server or a network."""
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Image, Points, Vector3
+from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.meshes import box_mesh, convex_hull
+from r2c2r_core.model.report import Certificate, Finding
+
+_ASSETS = Path(__file__).parent / "review_page"
+_TEXTURE_PX = 1024  # longest side: a page of a few megabytes
+_JPEG_QUALITY = 85
+_STEPS = 65535  # positions are whole steps of their box: 0.03 mm on a fixture of 2 m
+
+
+def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> str:
+    """The page; `seen_from` is where the camera's path was, in the world, so that fronts face the reader."""
+    parts = {"STYLE": "page.css", "VIEWER": "viewer.js"}
+    page = (_ASSETS / "page.html").read_text(encoding="utf-8")
+    for mark, name in parts.items():
+        page = page.replace(f"/*{mark}*/", (_ASSETS / name).read_text(encoding="utf-8"))
+    document = json.dumps(_scene(plan, certificate, seen_from), allow_nan=False)
+    return page.replace("/*SCENE*/", document.replace("<", "\\u003c"))  # no name can end the script element
+
+
+def _scene(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> dict[str, Any]:
+    numbers = {body.name: k for k, body in enumerate(plan.bodies)}
+    pictures: dict[str, Image] = {}
+    for body in plan.bodies:
+        if body.link.visual is not None and body.texture_file is not None:
+            pictures.setdefault(body.texture_file, body.link.visual.texture)
+    files = list(pictures)
+    return {
+        "name": plan.name,
+        "passed": certificate.passed,
+        "yaw": _yaw(plan, seen_from),
+        "textures": [_jpeg_address(pictures[file]) for file in files],
+        "objects": [{"name": name, "text": _caption(plan, name)} for name in dict.fromkeys(b.object_name for b in plan.bodies)],
+        "findings": [_finding(one, plan) for one in certificate.findings],
+        "bodies": [_body(body, numbers, files) for body in plan.bodies],
+    }
+
+
+def _body(body: Body, numbers: dict[str, int], files: list[str]) -> dict[str, Any]:
+    joint = body.joint
+    said = None
+    if joint is not None and body.axis_body is not None:
+        said = {"name": body.joint_name, "kind": joint.type, "axis": body.axis_body.tolist(), "lower": joint.lower}
+        said["upper"] = joint.upper
+    return {
+        "name": body.name,
+        "object": body.object_name,
+        "parent": -1 if body.parent == WORLD else numbers[body.parent],
+        "pose": body.parent_from_body.matrix.T.ravel().round(7).tolist(),  # WebGL reads columns
+        "joint": said,
+        "surface": _surface(body, files),
+        "colliders": _packed(*_collider_mesh(body), colour=_tint(numbers[body.name])),
+    }
+
+
+def _surface(body: Body, files: list[str]) -> dict[str, Any] | None:
+    visual = body.link.visual
+    if visual is None or body.texture_file is None:
+        return _packed(*box_mesh(body), colour=body.link.colour)
+    number = files.index(body.texture_file)
+    return _packed(visual.vertices, visual.faces, uv=visual.uv, texture=number, colour=body.link.colour)
+
+
+def _packed(
+    vertices: Points, faces: Faces, *, colour: tuple[float, ...], uv: np.ndarray | None = None, texture: int = -1
+) -> dict[str, Any] | None:
+    if len(faces) == 0:
+        return None
+    low, span = vertices.min(axis=0), np.maximum(np.ptp(vertices, axis=0), 1e-6)
+    flat = np.zeros((len(vertices), 2)) if uv is None else uv
+    return {
+        "low": low.round(6).tolist(),
+        "span": span.round(6).tolist(),
+        "positions": _base64(np.rint((vertices - low) / span * _STEPS).astype("<u2")),
+        "uv": _base64(np.rint(np.clip(flat, 0, 1) * _STEPS).astype("<u2")),
+        "indices": _base64(faces.astype("<u4")),
+        "texture": texture,
+        "colour": [round(float(value), 4) for value in colour],
+    }
+
+
+def _collider_mesh(body: Body) -> tuple[Points, Faces]:
+    meshes = [box_mesh(body), *(convex_hull(piece.vertices_link, piece.name) for piece in body.link.pieces)]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    faces = [f + start for (_, f), start in zip(meshes, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
+
+
+def _finding(finding: Finding, plan: Plan) -> dict[str, Any]:
+    """A finding with the object it is about: the one whose link, joint or own name it gives."""
+    names = {body.object_name for body in plan.bodies}
+    owners = {key: body.object_name for body in plan.bodies for key in (body.name, body.joint_name)}
+    owner = finding.where if finding.where in names else owners.get(finding.where)
+    return {"severity": finding.severity, "message": f"{finding.where}: {finding.message}", "object": owner}
+
+
+def _caption(plan: Plan, object_name: str) -> str:
+    joints = sum(body.joint is not None for body in plan.of(object_name))
+    mass = sum(body.link.inertial.mass_kg for body in plan.of(object_name))
+    return f"{object_name}: {mass:.1f} kg" + (f", {joints} joint{'s' if joints > 1 else ''}" if joints else "")
+
+
+def _yaw(plan: Plan, seen_from: Vector3 | None) -> float:
+    """Direction in radians, in plan, from the scene's middle to where it was filmed from; a corner view without a camera."""
+    if seen_from is None:
+        return -1.1
+    middle = np.mean([body.world_from_body.translation for body in plan.bodies], axis=0)
+    towards = seen_from - middle
+    return float(np.arctan2(towards[1], towards[0]))
+
+
+def _tint(number: int) -> tuple[float, float, float]:
+    """Colours far apart for colliders of neighbouring bodies: turns of the hue by the golden angle."""
+    hue = np.array([[[int(number * 137.508 % 360 / 2), 110, 215]]], dtype=np.uint8)
+    red, green, blue = cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0] / 255.0
+    return float(red), float(green), float(blue)
+
+
+def _jpeg_address(image: Image) -> str:
+    scale = min(1.0, _TEXTURE_PX / max(image.shape[:2]))
+    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
+    _, encoded = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode()
+
+
+def _base64(values: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()

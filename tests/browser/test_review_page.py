@@ -1,0 +1,37 @@
+"""review.html of a bundle, opened as a file: the scene is drawn, and a joint moves what is seen."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from playwright.sync_api import Browser, Page, expect
+
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.review import review_html
+from tests.core.export.kitchen import kitchen
+from tests.core.export.test_report import certificate
+
+
+def shot(page: Page) -> np.ndarray:
+    image = cv2.imdecode(np.frombuffer(page.locator("#view").screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    return np.asarray(image, dtype=np.int32)
+
+
+def test_the_page_draws_the_scene_and_opens_a_door_without_a_server(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "review.html"
+    file.write_text(review_html(plan_bundle(kitchen()), certificate(), np.array([0.0, -3.0, 1.5])), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 900, "height": 600})
+    thrown: list[str] = []
+    page.on("pageerror", lambda error: thrown.append(str(error)))
+    page.goto(file.as_uri())
+    page.wait_for_timeout(1500)
+    closed = shot(page)
+    assert closed[:, :500].std() > 15  # not an empty sky
+    page.get_by_label("cabinet_1_hinge").fill("1.5")
+    page.wait_for_timeout(1000)
+    assert (np.abs(shot(page) - closed)[:, :500].max(axis=2) > 30).mean() > 0.005
+    page.get_by_role("button", name="Close all").click()
+    expect(page.locator("output").first).to_have_text("0°")
+    assert thrown == []
+    page.close()
