@@ -69,7 +69,7 @@ def _backends() -> list[MachineFinding]:
     for registry in registries:
         for backend in registry.backends:
             ready, reason = registry.available(backend.name)
-            detail = f"{reason}; {backend.licence}"
+            detail = f"{reason}; licence: {backend.licence}"
             findings.append(MachineFinding(f"{registry.seam} {backend.name}", "ok" if ready else "absent", detail))
     return findings
 

@@ -79,6 +79,8 @@ def reconstruct(request: Request, work: Workspace, *, until: Stage = "export", p
 def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]:
     config, tools, overrides, work, seed = request.config, request.tools, request.overrides, ledger.work, request.seed
 
+    if ledger.until != "ingest":  # known at once, not after minutes of reading
+        SEGMENTERS.require(tools.segmenter, config.segment.weights)
     capture = ledger.one(
         "ingest",
         (file_key(request.source), config.ingest, overrides.up_capture, overrides.floor_m, overrides.manhattan_yaw_rad),
@@ -86,11 +88,12 @@ def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]
     )
     if ledger.until != "ingest":  # a recording may be looked at before anyone clicked
         check_prompts(capture.value, request.prompts)
+    weights = SEGMENTERS.weights_named(tools.segmenter, config.segment.weights)
     session = _session_on_demand(capture.value, request, work, ledger.progress)
     tracks = ledger.each(
         "segment",
         {prompt.name: Kept(prompt, capture.key) for prompt in request.prompts.objects},
-        lambda name: (tools.segmenter, config.segment, next(p for p in request.prompts.objects if p.name == name)),
+        lambda name: (tools.segmenter, weights, config.segment, next(p for p in request.prompts.objects if p.name == name)),
         lambda name, prompt, p: session().track(prompt, progress=p),
     )
     candidates = make_candidates(request, ledger, capture.value, tracks)

@@ -1,11 +1,24 @@
-"""Backends by name: "module:Class" strings, loaded on first use, so that importing costs nothing."""
+"""Backends by name: "module:Class" strings, loaded on first use, so that importing costs nothing; and where weights lie."""
 
 import importlib
 import importlib.util
+import os
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 from r2c2r_core.errors import BackendUnavailable, InputError
+
+LicenceClass = Literal["open", "restricted"]  # restricted: gated, non-commercial, or bound to a field of use
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """What a learned backend loads: a folder or a hub id that the person names, else the usual id."""
+
+    usual: str  # a hub id
+    variable: str  # of the environment; names a folder or another hub id
+    gated: bool = False  # the hub asks to accept a licence first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,7 +29,9 @@ class Backend:
     target: str  # "module:Class"
     extra: str | None = None  # the extra of pyproject.toml that brings its libraries
     needs: tuple[str, ...] = ()  # modules that must be importable
+    weights: Weights | None = None
     licence: str = "Apache-2.0 (this project)"
+    licence_class: LicenceClass = "open"
     summary: str = ""
 
 
@@ -40,19 +55,78 @@ class Registry:
         choices = ", ".join(b.name for b in self.backends)
         raise InputError(f"unknown {self.seam} '{name}'", hint=f"choose one of: {choices}")
 
-    def available(self, name: str) -> tuple[bool, str]:
-        """Whether the backend's libraries are importable, and the next step if not; imports nothing heavy."""
+    def available(self, name: str, weights: str = "") -> tuple[bool, str]:
+        """Whether the backend's libraries and weights are here, and the next step if not; imports nothing heavy."""
+        try:
+            self.require(name, weights)
+        except BackendUnavailable as error:
+            return False, f"{error.message.partition(': ')[2]}: {error.hint}"
+        return True, "ready"
+
+    def require(self, name: str, weights: str = "") -> Path | None:
+        """The folder of the backend's weights (None when it needs none); raises BackendUnavailable with the next step.
+
+        `weights` names a folder or a hub id; empty takes the backend's variable, then its usual id.
+        """
         backend = self.get(name)
         missing = [m for m in backend.needs if importlib.util.find_spec(m) is None]
-        if not missing:
-            return True, "ready"
-        extra = f"pip install 'r2c2r[{backend.extra}]'" if backend.extra else f"install {', '.join(missing)}"
-        return False, f"missing {', '.join(missing)}: {extra}"
+        if missing:
+            step = f"pip install 'r2c2r[{backend.extra}]'" if backend.extra else f"install {', '.join(missing)}"
+            raise BackendUnavailable(f"{self.seam} '{name}' is not available: missing {', '.join(missing)}", hint=step)
+        if backend.weights is None:
+            return None
+        named = self.weights_named(name, weights)
+        folder = find_weights(named)
+        if folder is None:
+            raise BackendUnavailable(
+                f"{self.seam} '{name}' is not available: no weights at {named}", hint=_how_to_get(backend.weights, named)
+            )
+        return folder
+
+    def weights_named(self, name: str, weights: str = "") -> str:
+        """The folder or hub id that the backend's weights come from; empty when it needs none."""
+        wanted = self.get(name).weights
+        return "" if wanted is None else weights or os.environ.get(wanted.variable) or wanted.usual
 
     def load(self, name: str, **options: Any) -> Any:
-        """A new instance of the backend; raises BackendUnavailable with the extra to install."""
-        ready, reason = self.available(name)
-        if not ready:
-            raise BackendUnavailable(f"{self.seam} '{name}' is not available: {reason}")
+        """A new instance of the backend; raises BackendUnavailable with the extra to install or the weights to fetch.
+
+        A backend with weights takes their folder as `weights`.
+        """
+        folder = self.require(name, options.pop("weights", ""))
+        if folder is not None:
+            options["weights"] = folder
         module_name, class_name = self.get(name).target.split(":")
         return getattr(importlib.import_module(module_name), class_name)(**options)
+
+
+def find_weights(named: str) -> Path | None:
+    """The folder that holds the weights called `named`, itself a folder or a hub id already downloaded; never downloads."""
+    folder = Path(named).expanduser()
+    if folder.is_dir():
+        return folder if _is_model(folder) else None
+    repository = hub_cache() / f"models--{named.replace('/', '--')}"
+    try:
+        newest = (repository / "refs" / "main").read_text().strip()
+        snapshots = [repository / "snapshots" / newest]
+    except OSError:
+        snapshots = sorted((repository / "snapshots").glob("*"))
+    return next((snapshot for snapshot in snapshots if _is_model(snapshot)), None)
+
+
+def hub_cache() -> Path:
+    """Where Hugging Face's tools keep what they downloaded (HF_HUB_CACHE, HF_HOME, else the user's cache folder)."""
+    home = os.environ.get("HF_HOME") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "huggingface"
+    return Path(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub").expanduser()
+
+
+def _is_model(folder: Path) -> bool:
+    return (folder / "config.json").is_file() and any(folder.glob("*.safetensors"))
+
+
+def _how_to_get(weights: Weights, named: str) -> str:
+    where = f"name a folder or hub id in {weights.variable} or segment.weights"
+    if Path(named).expanduser().is_absolute() or named.startswith("."):
+        return f"a folder with config.json and *.safetensors is expected; {where}"
+    first = f"accept the licence at https://huggingface.co/{named} and log in (hf auth login), " if weights.gated else ""
+    return f"{first}hf download {named}; or {where}"

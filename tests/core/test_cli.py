@@ -72,8 +72,20 @@ def test_a_bundle_that_is_no_bundle_is_named(tmp_path: Path) -> None:
     assert "b.zip" in r2c2r("check", tmp_path / "b.zip", code=2)[1]
 
 
+def test_a_segmenter_without_weights_says_how_to_get_them_before_reading_anything(tmp_path: Path, prompts: Path) -> None:
+    (tmp_path / "scan.r3d").write_bytes(b"")
+    config = tmp_path / "config.json"
+    config.write_text(json.dumps({"segment": {"weights": str(tmp_path / "nowhere")}}))
+    given = ("run", tmp_path / "scan.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", "--config", config)
+    said = one_line(r2c2r(*given, "--segmenter", "sam2", code=1)[1])
+    assert "no weights at" in said
+    assert "R2C2R_SAM2_WEIGHTS" in said
+
+
 def test_doctor_names_every_backend_and_licence(tmp_path: Path) -> None:
     said, _ = r2c2r("doctor", "--data", tmp_path, "--json", tmp_path / "d.json", code=0)
-    assert "geometric" in said
+    for name in ("geometric", "sam2", "edgetam", "sam3"):
+        assert f"segmenter {name}" in said
+    assert "SAM License" in said
     assert "licence" in said.lower() or "Apache" in said
     assert json.loads((tmp_path / "d.json").read_text())["version"] == 1

@@ -1,0 +1,159 @@
+"""From masks to measures: the front's rectangle and handle, an appliance's box, a thing's box, whoever drew the masks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.segment.appliances import appliance_box, measure_depth
+from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
+from r2c2r_core.segment.consensus import Body, vote, voting_frames
+from r2c2r_core.segment.cut import Cell, joined
+from r2c2r_core.segment.edges import as_lab, panel_edges
+from r2c2r_core.segment.finders import Workbench
+from r2c2r_core.segment.fronts import Front, front_panel, wall_behind
+from r2c2r_core.segment.handles import find_handles
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs import Run
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.thing_boxes import box_of
+from r2c2r_core.segment.things import support_height
+
+_GRID_STEP_M = 0.01  # of the votes on a plane
+_ON_PLANE_M = 0.03
+_LEAST_ON_PLANE = 0.25  # of a front's surface that must lie on one plane
+_SAME_PANEL = 0.8  # overlap from which the voted rectangle is the panel the lines cut, whose edges are finer
+_POINT_FRAMES = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """What later stages need beside the masks."""
+
+    kind: Kind
+    front: FrontPanel | None = None
+    box: ThingBox | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def measure(bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
+    """The object's front or box: `masks` say which part of the scan it is, `body` is that part of the fused surface."""
+    hint = hint_for(prompt.category)
+    if hint.kind == "thing":
+        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint))
+    front = _front(bench, masks, body, hint)
+    if front is None:
+        said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
+        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint), warnings=said)
+    wall = wall_behind(front.run, front.cell, bench.scene.capture.room, hint.depth_m)
+    if hint.kind == "front":
+        return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or hint.depth_m)))
+    depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
+    warnings = () if seen else (f"its depth was not seen: {depth:.2f} m is usual for a {prompt.category}",)
+    front = replace(front, depth_m=depth)
+    return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
+
+
+def _front(bench: Workbench, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint) -> Front | None:
+    region = _plane_under(bench.planes, body)
+    run = bench.run_of(region) if region is not None else None
+    if run is None:
+        return None
+    voted = _voted_rectangle(run, bench.scene, masks)
+    if voted is None:
+        return None
+    cell = _as_cut(run, voted)
+    lab, seen = as_lab(run.mosaic)
+    cell = panel_edges(cell, lab, seen, run.seen, run.grid.cell_m)
+    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    return Front(run, cell, handle, hint.depth_m)
+
+
+def _plane_under(planes: tuple[PlaneRegion, ...], body: Body) -> PlaneRegion | None:
+    """The plane that holds most of the body's surface."""
+    if not body.exists:
+        return None
+    shares = []
+    for plane in planes:
+        off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
+        shares.append(float(((off < _ON_PLANE_M) & plane.supports(body.vertices, 0.02)).mean()))
+    best = int(np.argmax(shares)) if shares else 0
+    return planes[best] if shares and shares[best] > _LEAST_ON_PLANE else None
+
+
+def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask]) -> Cell | None:
+    """The rectangle of a run's plane (grid cells) that most masks cover."""
+    step = max(1, round(_GRID_STEP_M / run.grid.cell_m))
+    columns, rows = np.arange(step / 2, run.grid.columns, step), np.arange(step / 2, run.grid.rows, step)
+    at = np.stack([grid.ravel() for grid in np.meshgrid(columns, rows)], axis=1)
+    inside, seen = vote(scene, masks, run.grid.points_at(at))
+    covered = ((seen > 0) & (inside > 0.5 * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
+    if count <= 1:
+        return None
+    largest = labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    across, down = largest.sum(axis=0), largest.sum(axis=1)
+    wide, tall = np.flatnonzero(across > 0.5 * across.max()), np.flatnonzero(down > 0.5 * down.max())
+    if len(wide) < 3 or len(tall) < 3:
+        return None
+    return Cell(*(float(step * edge) for edge in (wide[0], tall[0], wide[-1] + 1, tall[-1] + 1)))
+
+
+def _as_cut(run: Run, voted: Cell) -> Cell:
+    """The panel, or the neighbouring panels, that the run's lines cut there; the voted rectangle where none fits."""
+    within = [cell for cell in run.cells if _overlap(cell, voted) > 0.6 * cell.width * cell.height]
+    if not within:
+        return voted
+    cut = joined(within)
+    shared = _overlap(cut, voted)
+    union = cut.width * cut.height + voted.width * voted.height - shared
+    return cut if shared > _SAME_PANEL * union else voted
+
+
+def _overlap(a: Cell, b: Cell) -> float:
+    wide = min(a.right, b.right) - max(a.left, b.left)
+    tall = min(a.bottom, b.bottom) - max(a.top, b.top)
+    return max(wide, 0.0) * max(tall, 0.0)
+
+
+def _thing_box(
+    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint
+) -> ThingBox | None:
+    """The box of its points on its support; None where depth never saw it."""
+    points = _points(scene, masks, body)
+    if len(points) < 20:
+        return None
+    clicked = [scene.pick(click.frame, click.x, click.y) for click in prompt.points if click.label == 1]
+    hits = np.array([point for point in clicked if point is not None]).reshape(-1, 3)
+    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], hint.thing)
+    if support is not None and (points[:, 2] > support).sum() >= 20:
+        points = points[points[:, 2] > support]
+    centres = np.stack([frame.world_from_camera.translation for frame in scene.frames])
+    yaw = scene.capture.room.manhattan_yaw_rad
+    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=hint.thing.round)
+
+
+def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:
+    """World points of depth pixels well inside the masks, near the body where there is one."""
+    found = [np.zeros((0, 3))]
+    for index in voting_frames(masks, _POINT_FRAMES):
+        frame, depth = scene.frame(index), scene.depth(index)
+        mask = unpack_mask(masks[index]).astype(np.uint8)
+        small = cv2.resize(mask, (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_AREA)
+        inner = cv2.erode(small, np.ones((3, 3), np.uint8)) if small.sum() > 200 else small
+        row, column = np.nonzero((inner > 0) & (depth > 0))
+        uv = np.stack([column + 0.5, row + 0.5], axis=1)
+        found.append(frame.world_from_camera.apply(unproject(uv, depth[row, column].astype(np.float64), frame.depth_camera)))
+    points = np.concatenate(found)
+    if not body.exists or not len(points):
+        return points
+    from scipy.spatial import cKDTree
+
+    away, _ = cKDTree(body.vertices).query(points, distance_upper_bound=2.5 * scene.capture.surface.voxel_m)
+    return points[np.isfinite(away)]

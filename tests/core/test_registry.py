@@ -1,0 +1,108 @@
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.errors import BackendUnavailable, InputError
+from r2c2r_core.registry import Backend, Registry, Weights, find_weights
+from r2c2r_core.segment.stage import SEGMENTERS
+
+TABLE = Registry(
+    "painter",
+    (
+        Backend(name="plain", target="pathlib:Path"),
+        Backend(
+            name="dreamer",
+            target="types:SimpleNamespace",
+            extra="dreams",
+            needs=("json",),
+            weights=Weights(usual="someone/dreams", variable="TEST_DREAMS_WEIGHTS"),
+        ),
+        Backend(name="absent", target="no_such_module:Class", extra="absent", needs=("no_such_module",)),
+        Backend(
+            name="gated",
+            target="types:SimpleNamespace",
+            weights=Weights(usual="someone/gated", variable="TEST_GATED_WEIGHTS", gated=True),
+        ),
+    ),
+)
+
+
+@pytest.fixture(autouse=True)
+def empty_hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A hub cache of this test's own."""
+    for name in ("TEST_DREAMS_WEIGHTS", "TEST_GATED_WEIGHTS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
+    return tmp_path / "hub"
+
+
+def model_in(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "config.json").write_text("{}")
+    (folder / "model.safetensors").write_bytes(b"")
+    return folder
+
+
+def test_a_missing_library_names_the_extra() -> None:
+    assert TABLE.available("absent") == (False, "missing no_such_module: pip install 'r2c2r[absent]'")
+    with pytest.raises(BackendUnavailable, match=r"painter 'absent' is not available: missing no_such_module; pip install"):
+        TABLE.load("absent")
+
+
+def test_missing_weights_name_the_command_that_brings_them() -> None:
+    ready, reason = TABLE.available("dreamer")
+    assert not ready
+    assert reason == (
+        "no weights at someone/dreams: hf download someone/dreams; or name a folder or hub id in TEST_DREAMS_WEIGHTS "
+        "or segment.weights"
+    )
+    assert "accept the licence at https://huggingface.co/someone/gated" in TABLE.available("gated")[1]
+
+
+def test_weights_come_from_the_setting_then_the_variable_then_the_hub_cache(
+    tmp_path: Path, empty_hub: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cached = model_in(empty_hub / "models--someone--dreams" / "snapshots" / "abc")
+    assert TABLE.load("dreamer").weights == cached
+    named = model_in(tmp_path / "named")
+    monkeypatch.setenv("TEST_DREAMS_WEIGHTS", str(named))
+    assert TABLE.load("dreamer").weights == named
+    set_here = model_in(tmp_path / "set")
+    assert TABLE.load("dreamer", weights=str(set_here)).weights == set_here
+    assert TABLE.weights_named("dreamer", str(set_here)) == str(set_here)
+    assert TABLE.weights_named("plain", "anything") == ""
+
+
+def test_of_several_snapshots_the_one_the_hub_calls_main_is_taken(empty_hub: Path) -> None:
+    repository = empty_hub / "models--someone--dreams"
+    for commit in ("aaa", "bbb", "ccc"):
+        model_in(repository / "snapshots" / commit)
+    (repository / "refs").mkdir()
+    (repository / "refs" / "main").write_text("bbb\n")
+    found = find_weights("someone/dreams")
+    assert found is not None
+    assert found.name == "bbb"
+
+
+def test_half_a_download_is_no_model(tmp_path: Path, empty_hub: Path) -> None:
+    folder = empty_hub / "models--someone--dreams" / "snapshots" / "abc"
+    folder.mkdir(parents=True)
+    (folder / "config.json").write_text("{}")
+    assert find_weights("someone/dreams") is None
+    assert find_weights(str(folder)) is None
+    ready, reason = TABLE.available("dreamer", str(folder))
+    assert not ready
+    assert "a folder with config.json and *.safetensors is expected" in reason
+
+
+def test_unknown_names_list_the_choices() -> None:
+    with pytest.raises(InputError, match="choose one of: plain, dreamer, absent, gated"):
+        TABLE.get("other")
+
+
+def test_every_learned_segmenter_says_its_licence_and_is_not_the_default() -> None:
+    assert SEGMENTERS.default == "geometric"
+    licences = {backend.name: (backend.licence, backend.licence_class) for backend in SEGMENTERS.backends}
+    assert licences["sam2"][0].startswith("Apache-2.0")
+    assert licences["edgetam"][0].startswith("Apache-2.0")
+    assert licences["sam3"] == ("SAM License (gated weights; commercial use allowed, military use not)", "restricted")
