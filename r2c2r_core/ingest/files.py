@@ -1,17 +1,19 @@
 """The files of a recording, whether it came as a folder or as a zip; nothing is ever unpacked onto the disk."""
 
 import hashlib
+import os
 import stat
 import zipfile
 import zlib
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
-from typing import Protocol
+from typing import BinaryIO, Protocol, cast
 
 from r2c2r_core.errors import CaptureError
 
 _MAX_MEMBERS = 400_000  # three files a frame, 60 frames/s: 37 minutes
 _MAX_MEMBER_BYTES = 256 * 2**20  # the largest honest member is a 12-megapixel PNG
+_VIDEOS = (".mp4", ".mov", ".m4v")  # are streamed, so they may be larger
 _MAX_RATIO, _RATIO_MATTERS_BYTES = 300, 256 * 2**20  # deflate reaches 1000 on zeros only
 
 
@@ -27,6 +29,9 @@ class Files(Protocol):
 
     def read(self, name: str) -> bytes:
         """The content; raises CaptureError when it cannot be read."""
+
+    def open(self, name: str) -> BinaryIO:
+        """The content as a stream that can seek; raises CaptureError when it cannot be read."""
 
     def sha256(self, names: Iterable[str]) -> str:
         """Identity of the recording: of the zip itself, or of the named files with their sizes and content."""
@@ -57,11 +62,21 @@ class FolderFiles:
 
     def read(self, name: str) -> bytes:
         """The content; raises CaptureError when it cannot be read."""
+        with self.open(name) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size > _MAX_MEMBER_BYTES:
+                raise CaptureError(
+                    f"{self.source / name}: {size >> 20} MiB, 256 MiB at most are expected", hint="is it an image?"
+                )
+            return stream.read()
+
+    def open(self, name: str) -> BinaryIO:
+        """The content as a stream; raises CaptureError when it cannot be read."""
         path = self.source / name
         if not path.resolve().is_relative_to(self._root):
             raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
         try:
-            return path.read_bytes()
+            return path.open("rb")
         except OSError as problem:
             raise CaptureError(f"{path}: {problem.strerror or problem}", hint="check that the file can be read") from problem
 
@@ -69,9 +84,10 @@ class FolderFiles:
         """Digest of the sorted names with sizes and content."""
         digest = hashlib.sha256()
         for name in sorted(names):
-            content = self.read(name)
-            digest.update(f"{name}\0{len(content)}\0".encode())
-            digest.update(content)
+            with self.open(name) as stream:
+                digest.update(f"{name}\0{os.fstat(stream.fileno()).st_size}\0".encode())
+                while chunk := stream.read(1 << 20):
+                    digest.update(chunk)
         return digest.hexdigest()
 
 
@@ -103,10 +119,14 @@ class ZipFiles:
         try:
             return self._zip.read(name)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as problem:
-            raise CaptureError(
-                f"{self.source}: member '{name}' is damaged ({problem or type(problem).__name__})",
-                hint="copy the recording again",
-            ) from problem
+            raise self._damaged(name, problem) from problem
+
+    def open(self, name: str) -> BinaryIO:
+        """The member as a stream; raises CaptureError when it is damaged."""
+        try:
+            return cast(BinaryIO, self._zip.open(name))
+        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as problem:
+            raise self._damaged(name, problem) from problem
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the zip file itself."""
@@ -125,13 +145,18 @@ class ZipFiles:
                 raise self._hostile(f"member '{info.filename}' is a symbolic link")
             if info.flag_bits & 0x1:
                 raise self._hostile(f"member '{info.filename}' is encrypted")
-            if info.file_size > _MAX_MEMBER_BYTES:
+            if info.file_size > _MAX_MEMBER_BYTES and path.suffix.lower() not in _VIDEOS:
                 raise self._hostile(
                     f"member '{info.filename}' unpacks to {info.file_size >> 20} MiB, 256 MiB at most are expected"
                 )
         unpacked, packed = sum(i.file_size for i in members), sum(i.compress_size for i in members)
         if unpacked > _RATIO_MATTERS_BYTES and unpacked > _MAX_RATIO * max(packed, 1):
             raise self._hostile(f"unpacks to {unpacked >> 20} MiB from {packed >> 10} KiB, a recording never packs that well")
+
+    def _damaged(self, name: str, problem: Exception) -> CaptureError:
+        return CaptureError(
+            f"{self.source}: member '{name}' is damaged ({problem or type(problem).__name__})", hint="copy the recording again"
+        )
 
     def _hostile(self, found: str) -> CaptureError:
         return CaptureError(f"{self.source}: {found}", hint="export the recording again from the app that made it")
@@ -152,6 +177,10 @@ class SubFiles:
     def read(self, name: str) -> bytes:
         """The content."""
         return self._files.read(self._prefix + name)
+
+    def open(self, name: str) -> BinaryIO:
+        """The content as a stream."""
+        return self._files.open(self._prefix + name)
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the underlying files."""

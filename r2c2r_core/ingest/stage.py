@@ -111,7 +111,7 @@ def _store_frames(
 
 def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confidence: int, config: IngestConfig) -> Frame:
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
-    jpeg, sharpness = stored_jpeg(recording.files.read(frame.rgb_name), frame.rgb_name, size)
+    jpeg, sharpness = stored_jpeg(recording.colour_of(frame), frame.rgb_name, size)
     raw = recording.depth_of(frame)
     depth = usable_depth(
         raw.metres,

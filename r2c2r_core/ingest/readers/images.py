@@ -8,10 +8,12 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
+from r2c2r_core.arrays import Image
 from r2c2r_core.errors import CaptureError
-from r2c2r_core.ingest.readers.protocol import UnreadableFrame
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.protocol import Colour, RawDepth, RawFrame, UnreadableFrame
 
-_MAX_PIXELS = 64_000_000
+MAX_PIXELS = 64_000_000
 
 
 def image_size(content: bytes, name: str) -> tuple[int, int]:
@@ -25,21 +27,58 @@ def image_size(content: bytes, name: str) -> tuple[int, int]:
                 width, height = image.size
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as problem:
         raise UnreadableFrame(f"{name}: not an image ({len(content)} bytes)") from problem
-    if width * height > _MAX_PIXELS:
-        raise UnreadableFrame(f"{name}: {width}x{height} pixels, at most {_MAX_PIXELS // 10**6} megapixels are expected")
+    if width * height > MAX_PIXELS:
+        raise UnreadableFrame(f"{name}: {width}x{height} pixels, at most {MAX_PIXELS // 10**6} megapixels are expected")
     return width, height
 
 
-def decode_depth_png(content: bytes, name: str, units_per_metre: float, size: tuple[int, int]) -> np.ndarray:
-    """Depth in metres of a 16-bit PNG; 0 and 65535 mean unknown. Raises UnreadableFrame."""
-    stored = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
-    if stored is None or stored.ndim != 2 or stored.dtype != np.uint16:
-        raise UnreadableFrame(f"{name}: not a readable 16-bit depth PNG")
-    if (stored.shape[1], stored.shape[0]) != size:
-        raise UnreadableFrame(f"{name}: {stored.shape[1]}x{stored.shape[0]} pixels, {size[0]}x{size[1]} expected")
+def colour_file(files: Files, frame: RawFrame) -> bytes:
+    """The frame's own image file."""
+    return files.read(frame.rgb_name)
+
+
+def depth_file(
+    files: Files,
+    units_per_metre: float,
+    frame: RawFrame,
+    *,
+    confidence_levels: tuple[int, int] = (1, 2),
+) -> RawDepth:
+    """Depth of a 16-bit PNG, and confidence 0..2 of an 8-bit one where the frame has it. Raises UnreadableFrame.
+
+    `confidence_levels` are the file's least values that mean medium and high.
+    """
+    size = (frame.depth_camera.width, frame.depth_camera.height)
+    stored = decode_png(files.read(frame.depth_name), frame.depth_name, np.dtype(np.uint16), size)
     metres = stored.astype(np.float32) / np.float32(units_per_metre)
     metres[stored == 65535] = 0
-    return metres
+    if frame.confidence_name is None:
+        return RawDepth(metres, None)
+    marks = decode_png(files.read(frame.confidence_name), frame.confidence_name, np.dtype(np.uint8), size)
+    medium, high = confidence_levels
+    return RawDepth(metres, (marks >= medium).astype(np.uint8) + (marks >= high))
+
+
+def decode_png(content: bytes, name: str, dtype: np.dtype, size: tuple[int, int]) -> np.ndarray:
+    """The (h, w) values of a PNG with one channel of that type; `size` is (width, height). Raises UnreadableFrame."""
+    found = image_size(content, name)
+    if found != size:
+        raise UnreadableFrame(f"{name}: {found[0]}x{found[1]} pixels, {size[0]}x{size[1]} expected")
+    stored = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if stored is None or stored.ndim != 2 or stored.dtype != dtype:
+        raise UnreadableFrame(f"{name}: not a readable image of one channel of {dtype.name}")
+    return np.asarray(stored)
+
+
+def colour_pixels(colour: Colour, name: str) -> Image:
+    """RGB pixels (h, w, 3), as stored: an EXIF rotation is not obeyed. Raises UnreadableFrame."""
+    if not isinstance(colour, bytes):
+        return colour
+    image_size(colour, name)
+    bgr = cv2.imdecode(np.frombuffer(colour, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if bgr is None:
+        raise UnreadableFrame(f"{name}: damaged image ({len(colour)} bytes)")
+    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
 def numbered(names: Iterable[str], pattern: str) -> dict[int, str]:
@@ -52,14 +91,14 @@ def numbered(names: Iterable[str], pattern: str) -> dict[int, str]:
     return found
 
 
-def first_size(contents: Iterable[tuple[str, bytes]], what: str, source: object) -> tuple[int, int]:
-    """Size of the first readable image; raises CaptureError when none of them is."""
+def first_size(files: Files, names: Iterable[str], what: str) -> tuple[int, int]:
+    """(width, height) of the first readable image; raises CaptureError when none of them is."""
     problem: UnreadableFrame | None = None
-    for name, content in contents:
+    for name in names:
         try:
-            return image_size(content, name)
+            return image_size(files.read(name), name)
         except UnreadableFrame as failure:
             problem = problem or failure
     raise CaptureError(
-        f"{source}: no readable {what}: {problem or 'there is none'}", hint="export the recording again"
+        f"{files.source}: no readable {what}: {problem or 'there is none'}", hint="export the recording again"
     ) from problem

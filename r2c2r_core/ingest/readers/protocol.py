@@ -1,15 +1,19 @@
 """What every reader returns: an opened recording in our conventions, its pixels still in its own files."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.arrays import DepthMetres, Vector3
+from r2c2r_core.arrays import DepthMetres, Image, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
+
+Colour = bytes | Image
+"""A colour image: the recording's own image file where it has one, else RGB pixels."""
 
 
 class RawDepth(NamedTuple):
@@ -28,7 +32,7 @@ class RawFrame:
     rgb_camera: Intrinsics
     depth_camera: Intrinsics
     capture_from_camera: Rigid3 | None  # None: the recording has no pose for it; ingest estimates those of a whole recording
-    rgb_name: str
+    rgb_name: str  # the file the colour is in: its own, or a video that all frames share
     depth_name: str
     confidence_name: str | None = None
 
@@ -40,6 +44,7 @@ class Recording:
     format: str
     files: Files
     frames: tuple[RawFrame, ...]  # sorted by index
+    colour_of: Callable[[RawFrame], Colour]  # cheapest in the order of the frames; raises UnreadableFrame
     depth_of: Callable[[RawFrame], RawDepth]  # raises UnreadableFrame
     up_capture: Vector3 | None  # unit, in the recording's own world, when the file knows gravity
     notices: tuple[str, ...] = ()
@@ -56,11 +61,30 @@ class UnreadableFrame(Exception):
     """One frame cannot be used; the others may. Handled inside ingest: callers see CaptureError."""
 
 
+class Part(NamedTuple):
+    """A file, or a kind of file, that makes a format what it is."""
+
+    what: str  # as a person would write it: "rgbd/N.jpg"
+    pattern: str  # of the whole name
+
+    def is_in(self, names: frozenset[str]) -> bool:
+        """Whether a file of that name exists."""
+        return any(re.fullmatch(self.pattern, name) for name in names)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
     """One recording format."""
 
     name: str
-    expects: str  # what a folder of this format holds, for the message when nothing matches
-    recognise: Callable[[frozenset[str]], bool]  # from the file names alone
+    parts: tuple[Part, ...]  # a folder that holds all of them is of this format
     open: Callable[[Files], Recording]
+
+    @property
+    def expects(self) -> str:
+        """What a folder of this format holds."""
+        return ", ".join(part.what for part in self.parts)
+
+    def missing(self, names: frozenset[str]) -> tuple[str, ...]:
+        """The parts that no file stands for."""
+        return tuple(part.what for part in self.parts if not part.is_in(names))

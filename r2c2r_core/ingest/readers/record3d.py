@@ -12,9 +12,9 @@ import numpy as np
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.images import first_size, numbered
+from r2c2r_core.ingest.readers.images import colour_file, first_size, numbered
 from r2c2r_core.ingest.readers.lzfse_blocks import unpacked, unpacked_size
-from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
 
 _METADATA = "metadata"
@@ -48,6 +48,7 @@ def open_record3d(files: Files) -> Recording:
         format="Record3D .r3d",
         files=files,
         frames=frames,
+        colour_of=partial(colour_file, files),
         depth_of=partial(_depth_of, files),
         up_capture=metadata.up_capture,
         notices=tuple(notices),
@@ -66,7 +67,7 @@ def record3d_frames(
 ) -> tuple[RawFrame, ...]:
     """The frames with those numbers; cameras scaled to the sizes the images really have."""
     chosen = list(numbers)
-    width, height = first_size(((colour[n], files.read(colour[n])) for n in chosen), "colour image", files.source)
+    width, height = first_size(files, (colour[n] for n in chosen), "colour image")
     _same_shape((width, height), (metadata.width, metadata.height), f"{files.source}: colour images are", "the metadata says")
     _same_shape(depth_size, (width, height), f"{files.source}: depth images are", "colour images are")
     frames = []
@@ -136,10 +137,8 @@ def _same_shape(found: tuple[int, int], expected: tuple[int, int], found_is: str
         )
 
 
-def _recognise(names: frozenset[str]) -> bool:
-    return _METADATA in names
-
-
 READER = Reader(
-    name="Record3D .r3d", expects="a zip of metadata and rgbd/N.jpg, N.depth, N.conf", recognise=_recognise, open=open_record3d
+    name="Record3D .r3d",
+    parts=(Part(_METADATA, _METADATA),),  # without its frames it still is one, and says so
+    open=open_record3d,
 )

@@ -10,19 +10,20 @@ import numpy as np
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.images import numbered
-from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.images import colour_file, numbered
+from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.record3d import record3d_frames
 from r2c2r_core.ingest.readers.record3d_metadata import parse_metadata
 
 _METADATA = "metadata.json"
+_COLOUR, _DEPTH = r"rgb/(\d+)\.(?:jpe?g|png)", r"depth/(\d+)\.exr"
 
 
 def open_record3d_exr(files: Files) -> Recording:
     """The recording in an EXR+JPG export; raises CaptureError."""
     metadata = parse_metadata(files.read(_METADATA), f"{files.source}, file '{_METADATA}'")
-    colour = numbered(files.names(), r"rgb/(\d+)\.(?:jpe?g|png)")
-    depth = numbered(files.names(), r"depth/(\d+)\.exr")
+    colour = numbered(files.names(), _COLOUR)
+    depth = numbered(files.names(), _DEPTH)
     shared = colour.keys() & depth.keys()
     if not shared:
         raise CaptureError(
@@ -37,6 +38,7 @@ def open_record3d_exr(files: Files) -> Recording:
         format="Record3D EXR+JPG",
         files=files,
         frames=record3d_frames(files, metadata, posed, colour, depth, {}, size),
+        colour_of=partial(colour_file, files),
         depth_of=partial(_depth_of, files),
         up_capture=metadata.up_capture,
         notices=tuple(notices),
@@ -76,10 +78,8 @@ def _channel(content: bytes, name: str) -> np.ndarray:
     return np.asarray(channels["R"].pixels)
 
 
-def _recognise(names: frozenset[str]) -> bool:
-    return _METADATA in names and any(n.startswith("depth/") and n.endswith(".exr") for n in names)
-
-
 READER = Reader(
-    name="Record3D EXR+JPG", expects="metadata.json, rgb/N.jpg and depth/N.exr", recognise=_recognise, open=open_record3d_exr
+    name="Record3D EXR+JPG",
+    parts=(Part(_METADATA, r"metadata\.json"), Part("rgb/N.jpg", _COLOUR), Part("depth/N.exr", _DEPTH)),
+    open=open_record3d_exr,
 )

@@ -5,7 +5,6 @@ poses are [qx, qy, qz, qw, x, y, z], camera-to-world, OpenGL camera axes; the ne
 the older app's starts at the first camera (poses[0] is the identity) and knows no gravity; pixel centres lie at integers.
 """
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3, nearest_rotation
+from r2c2r_core.ingest.readers.texts import parse_json
 
 _TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
 
@@ -70,14 +70,7 @@ class Record3DMetadata:
 
 def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
     """Read the JSON; `source` names it in messages. Raises CaptureError."""
-    try:
-        metadata = json.loads(content)
-    except ValueError as problem:
-        raise CaptureError(f"{source}: not JSON ({problem})", hint="export the recording again") from problem
-    if not isinstance(metadata, dict):
-        raise CaptureError(
-            f"{source}: a JSON {type(metadata).__name__}, an object was expected", hint="export the recording again"
-        )
+    metadata = parse_json(content, source)
     width, height = _positive(metadata, "w", source), _positive(metadata, "h", source)
     raw_poses = _table(metadata, "poses", 7, source)
     if raw_poses is None or not len(raw_poses):

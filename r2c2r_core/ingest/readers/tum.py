@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.errors import CaptureError
-from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.images import decode_depth_png, first_size
-from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Reader, Recording
+from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.protocol import Part, RawFrame, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of
+from r2c2r_core.ingest.readers.trajectory import Trajectory
 
 _POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
 _APART_S = 0.02
@@ -53,11 +54,9 @@ def open_tum(files: Files) -> Recording:
             f"none agree within {_APART_S * 1000:.0f} ms",
             hint=f"check the clocks of rgb.txt, depth.txt and {pose_name}",
         )
-    size = first_size(((rgb[i][1], files.read(rgb[i][1])) for i, _, _ in wanted), "colour image", files.source)
-    depth_size = first_size(((depth[j][1], files.read(depth[j][1])) for _, j, _ in wanted), "depth image", files.source)
-    camera = Intrinsics(
-        fx=calibration.fx, fy=calibration.fy, cx=calibration.cx + 0.5, cy=calibration.cy + 0.5, width=size[0], height=size[1]
-    )
+    size = first_size(files, (rgb[i][1] for i, _, _ in wanted), "colour image")
+    depth_size = first_size(files, (depth[j][1] for _, j, _ in wanted), "depth image")
+    camera = integer_centred(calibration.fx, calibration.fy, calibration.cx, calibration.cy, size)
     notices = [n for n in (calibration.notice,) if n]
     if by_line:
         notices.append(f"the clocks of rgb.txt and {pose_name} differ, their counts agree: poses are matched by line")
@@ -80,7 +79,8 @@ def open_tum(files: Files) -> Recording:
             for i, j, pose in wanted
             if pose is not None
         ),
-        depth_of=partial(_depth_of, files, calibration.units_per_metre),
+        colour_of=partial(colour_file, files),
+        depth_of=partial(depth_file, files, calibration.units_per_metre),
         up_capture=np.array([0.0, 0.0, 1.0]),
         notices=tuple(notices),
         other_names=tuple(others),
@@ -91,7 +91,8 @@ def _pose_of_images(
     rgb: list[tuple[float, str]], poses: np.ndarray, files: Files, pose_name: str
 ) -> tuple[list[Rigid3 | None], bool]:
     """A pose for each image, by clock; by line where the clocks have nothing in common and the counts agree."""
-    placed = _interpolated([t for t, _ in rgb], poses)
+    trajectory = Trajectory(poses[:, 0], [_rigid(row[1:]) for row in poses])
+    placed = [trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for t, _ in rgb]
     if any(p is not None for p in placed):
         return placed, False
     if len(rgb) != len(poses):
@@ -99,30 +100,7 @@ def _pose_of_images(
             f"{files.source}: {len(rgb)} images and {len(poses)} poses, and their clocks share no time ({pose_name})",
             hint="the pose file belongs to another recording",
         )
-    return [_rigid(row[1:]) for row in poses], True
-
-
-def _interpolated(times_s: list[float], poses: np.ndarray) -> list[Rigid3 | None]:
-    """Poses at those times: slerp and linear between neighbours, within 20 ms of one of them."""
-    from scipy.spatial.transform import Rotation, Slerp
-
-    stamps = poses[:, 0]
-    result: list[Rigid3 | None] = []
-    for time_s in times_s:
-        nearest = int(np.argmin(np.abs(stamps - time_s)))
-        if abs(stamps[nearest] - time_s) > _APART_S:
-            result.append(None)
-            continue
-        after = int(np.searchsorted(stamps, time_s))
-        between = 0 < after < len(stamps) and stamps[after] - stamps[after - 1] < _GAP_S
-        if not between:
-            result.append(_rigid(poses[nearest, 1:]))
-            continue
-        a, b = poses[after - 1], poses[after]
-        share = (time_s - a[0]) / (b[0] - a[0])
-        turn = Slerp([0.0, 1.0], Rotation.from_quat(np.stack([a[4:], b[4:]])))(share)
-        result.append(Rigid3(turn.as_matrix(), a[1:4] + share * (b[1:4] - a[1:4])))
-    return result
+    return list(trajectory.poses), True
 
 
 def _rigid(row: np.ndarray) -> Rigid3:
@@ -134,7 +112,7 @@ def _rigid(row: np.ndarray) -> Rigid3:
 def _pose_rows(files: Files, name: str) -> np.ndarray:
     """Rows `t x y z qx qy qz qw`, by time; unusable ones left out."""
     rows = []
-    for line in _lines(files, name):
+    for line in (text.split() for text in lines_of(files, name)):
         try:
             row = [float(word) for word in line]
         except ValueError:
@@ -149,7 +127,7 @@ def _pose_rows(files: Files, name: str) -> np.ndarray:
 
 def _image_list(files: Files, name: str) -> list[tuple[float, str]]:
     images = []
-    for line in _lines(files, name):
+    for line in (text.split() for text in lines_of(files, name)):
         try:
             images.append((float(line[0]), line[1]))
         except (ValueError, IndexError) as problem:
@@ -159,11 +137,6 @@ def _image_list(files: Files, name: str) -> list[tuple[float, str]]:
         found = f"none of the {len(images)} files it names exist" if images else "it names no file"
         raise CaptureError(f"{files.source}/{name}: {found}", hint="copy the images beside it")
     return images if len(present) == len(images) else present
-
-
-def _lines(files: Files, name: str) -> list[list[str]]:
-    text = files.read(name).decode("utf-8", errors="replace")
-    return [line.split() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
 
 
 def _nearest(time_s: float, others_s: list[float]) -> int | None:
@@ -187,13 +160,12 @@ def _calibration(files: Files) -> _Calibration:
     return _Calibration(*_GENERIC_CAMERA, 5000.0, "no calibration was found: the generic Kinect's 525 px is assumed", None)
 
 
-def _depth_of(files: Files, units_per_metre: float, frame: RawFrame) -> RawDepth:
-    size = (frame.depth_camera.width, frame.depth_camera.height)
-    return RawDepth(decode_depth_png(files.read(frame.depth_name), frame.depth_name, units_per_metre, size), None)
-
-
-def _recognise(names: frozenset[str]) -> bool:
-    return {"rgb.txt", "depth.txt"} <= names and any(n in names for n in _POSE_FILES)
-
-
-READER = Reader(name="TUM RGB-D", expects="rgb.txt, depth.txt and groundtruth.txt", recognise=_recognise, open=open_tum)
+READER = Reader(
+    name="TUM RGB-D",
+    parts=(
+        Part("rgb.txt", r"rgb\.txt"),
+        Part("depth.txt", r"depth\.txt"),
+        Part(_POSE_FILES[0], "|".join(re.escape(name) for name in _POSE_FILES)),
+    ),
+    open=open_tum,
+)

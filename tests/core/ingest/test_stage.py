@@ -338,8 +338,8 @@ BAD = {
     "lost tracking": (metadata(poses=[[0.0] * 7] * ROOM.count), "no frame has a usable pose"),
     "rotated images": (rotated, "another shape"),
     "odd depth size": (odd_depth, "have no size of the shape"),
-    "kitchen without poses": (without("pose/*"), "no known recording format"),
-    "kitchen without depth": (without("depth/*"), "0 depth images"),
+    "kitchen without poses": (without("pose/*"), "looks like 7-Scenes folder, but pose/N.txt is missing"),
+    "kitchen without depth": (without("depth/*"), "but depth/N.png is missing"),
     "link out of the folder": (leaving_link, "link that leaves"),
 }
 

@@ -1,0 +1,72 @@
+"""Frames put together from what a folder holds under each number: colour, depth, confidence, pose; nothing goes by position."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.protocol import RawFrame
+from r2c2r_core.ingest.readers.texts import read_pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a recording holds, by frame number."""
+
+    colour: Mapping[int, str]
+    depth: Mapping[int, str]
+    poses: Mapping[int, Rigid3 | None]  # None: unusable
+    confidence: Mapping[int, str] = field(default_factory=dict)
+    times_s: Mapping[int, float] = field(default_factory=dict)
+
+
+def joined_frames(
+    files: Files, found: Found, rgb_camera: Callable[[int], Intrinsics], depth_camera: Callable[[int], Intrinsics]
+) -> tuple[tuple[RawFrame, ...], list[str]]:
+    """The frames that have colour, depth and a pose, and what to tell about the others; raises CaptureError."""
+    shared = found.colour.keys() & found.depth.keys() & found.poses.keys()
+    if not shared:
+        counts = f"{len(found.colour)} colour images, {len(found.depth)} depth images, {len(found.poses)} poses"
+        raise CaptureError(f"{files.source}: {counts}, none with the same number", hint="export or copy the recording again")
+    start_s = min(found.times_s.values(), default=0.0)
+    frames = tuple(
+        RawFrame(
+            index=number,
+            timestamp_s=found.times_s[number] - start_s if number in found.times_s else None,
+            rgb_camera=rgb_camera(number),
+            depth_camera=depth_camera(number),
+            capture_from_camera=pose,
+            rgb_name=found.colour[number],
+            depth_name=found.depth[number],
+            confidence_name=found.confidence.get(number),
+        )
+        for number in sorted(shared)
+        if (pose := found.poses[number]) is not None
+    )
+    if not frames:
+        raise CaptureError(
+            f"{files.source}: none of {len(shared)} poses is finite and a rotation", hint="record again with tracking"
+        )
+    return frames, _left_out(found, shared, len(frames))
+
+
+def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | None]:
+    """The pose in each of those text files (4x4, camera-to-world, OpenCV axes)."""
+    return {number: read_pose(files.read(name)) for number, name in names.items()}
+
+
+def _left_out(found: Found, shared: set[int], posed: int) -> list[str]:
+    every = found.colour.keys() | found.depth.keys() | found.poses.keys()
+    lacking = [
+        f"{len(every - held.keys())} {what}"
+        for what, held in (("a colour image", found.colour), ("a depth image", found.depth), ("a pose", found.poses))
+        if every - held.keys()
+    ]
+    notices = []
+    if lacking:
+        notices.append(f"{len(every) - len(shared)} of {len(every)} frames were left out: {', '.join(lacking)} missing")
+    if posed < len(shared):
+        notices.append(f"{len(shared) - posed} frames have no usable pose and were left out")
+    return notices

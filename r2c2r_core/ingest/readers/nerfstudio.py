@@ -1,0 +1,179 @@
+"""nerfstudio: transforms.json with depth_file_path; OpenGL camera-to-world, world z up.
+
+fl_x, fl_y, cx, cy, w, h stand once or in every frame; depth is a 16-bit PNG or .npy in steps of depth_unit_scale_factor (1 mm
+unless said), 0 unknown, of the colour image's view; black in mask_path means ignore. cx and cy count from the corner of the
+first pixel, as ours do. k1, k2, p1, p2, k3 are taken out here. (nerfstudio, docs/quickstart/data_conventions.md.)
+"""
+
+import io
+import posixpath
+import re
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
+from r2c2r_core.ingest.readers.images import MAX_PIXELS, colour_file, colour_pixels, depth_file, first_size
+from r2c2r_core.ingest.readers.lens import Lens, undistorted
+from r2c2r_core.ingest.readers.protocol import Colour, Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_json
+
+_TRANSFORMS = "transforms.json"
+_PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
+_CAMERA, _LENS = ("fl_x", "fl_y", "cx", "cy"), ("k1", "k2", "p1", "p2", "k3")
+
+
+def open_nerfstudio(files: Files) -> Recording:
+    """The recording that a transforms.json describes; raises CaptureError."""
+    document = read_json(files, _TRANSFORMS)
+    entries = _entries(files, document)
+    colour, depth, masks = (_named(files, entries, key) for key in ("file_path", "depth_file_path", "mask_path"))
+    if not depth:
+        said = sum("depth_file_path" in entry for entry in entries.values())
+        raise CaptureError(
+            f"{files.source}/{_TRANSFORMS}: {said} of {len(entries)} frames name a depth image, none of them exists",
+            hint="export with depth: each frame needs a depth_file_path",
+        )
+    size, depth_size = first_size(files, colour.values(), "colour image"), _depth_size(files, depth)
+    settings = {number: {**document, **entry} for number, entry in entries.items()}
+    cameras = {number: _camera(files, setting, size) for number, setting in settings.items()}
+    lenses = {number: lens for number, setting in settings.items() if any(lens := _lens(setting))}
+    found = Found(colour=colour, depth=depth, poses={number: _pose(entry) for number, entry in entries.items()})
+    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
+    # COLMAP's world has any direction; what its images were called tells that it came from there
+    upright = not any("colmap_im_id" in entry for entry in entries.values())
+    return Recording(
+        format="nerfstudio transforms.json",
+        files=files,
+        frames=frames,
+        colour_of=partial(_colour_of, files, lenses),
+        depth_of=partial(_depth_of, files, 1.0 / _metres_per_unit(files, document), lenses, masks),
+        up_capture=np.array([0.0, 0.0, 1.0]) if upright else None,
+        notices=tuple(notices),
+        other_names=(_TRANSFORMS, *masks.values()),
+    )
+
+
+def _entries(files: Files, document: dict[str, Any]) -> dict[int, dict[str, Any]]:
+    """The frames by number: the last number in their file's name where that tells them apart, else their rank."""
+    listed = document.get("frames")
+    if not isinstance(listed, list) or not all(isinstance(e, dict) and isinstance(e.get("file_path"), str) for e in listed):
+        raise CaptureError(
+            f"{files.source}/{_TRANSFORMS}: 'frames' should list objects with a file_path", hint="export it again"
+        )
+    if document.get("camera_model", "OPENCV") not in _PINHOLES:
+        raise CaptureError(
+            f"{files.source}/{_TRANSFORMS}: camera model {str(document['camera_model'])[:40]}, a pinhole was expected",
+            hint="undistort the images to a pinhole camera first",
+        )
+    numbers = [int((re.findall(r"\d{1,9}", posixpath.basename(e["file_path"])) or [-1])[-1]) for e in listed]
+    if -1 in numbers or len(set(numbers)) < len(numbers):
+        numbers = list(range(len(listed)))
+    return dict(zip(numbers, listed, strict=True))
+
+
+def _named(files: Files, entries: Mapping[int, dict[str, Any]], key: str) -> dict[int, str]:
+    """The existing files that the frames name under `key`; older files leave the ending out."""
+    names, found = files.names(), {}
+    for number, entry in entries.items():
+        if isinstance(path := entry.get(key), str):
+            plain = posixpath.normpath(path.replace("\\", "/"))
+            if existing := [name for name in (plain, f"{plain}.png", f"{plain}.jpg") if name in names]:
+                found[number] = existing[0]
+    return found
+
+
+def _camera(files: Files, setting: dict[str, Any], size: tuple[int, int]) -> Intrinsics:
+    fallback = {"fl_y": setting.get("fl_x"), "cx": size[0] / 2, "cy": size[1] / 2, "w": size[0], "h": size[1]}
+    try:
+        fx, fy, cx, cy, width, height = (float({**fallback, **setting}[key]) for key in (*_CAMERA, "w", "h"))
+    except (KeyError, TypeError, ValueError) as problem:
+        raise CaptureError(
+            f"{files.source}/{_TRANSFORMS}: fl_x, fl_y, cx, cy, w, h should be numbers ({problem})", hint="export it again"
+        ) from problem
+    if not (np.isfinite([fx, fy, cx, cy, width, height]).all() and min(fx, fy, width, height) > 0):
+        raise CaptureError(f"{files.source}/{_TRANSFORMS}: a focal length or a size is not positive", hint="export it again")
+    return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=int(width), height=int(height)).resized(*size)
+
+
+def _lens(setting: dict[str, Any]) -> Lens:
+    k1, k2, p1, p2, k3 = (float(v) if isinstance(v := setting.get(key, 0.0), int | float) else 0.0 for key in _LENS)
+    return (k1, k2, p1, p2, k3)
+
+
+def _pose(entry: dict[str, Any]) -> Rigid3 | None:
+    try:
+        matrix = np.array(entry.get("transform_matrix"), np.float64)
+    except (TypeError, ValueError):
+        return None
+    return pose_of_matrix(matrix, CAMERA_CV_FROM_GL) if matrix.shape in ((3, 4), (4, 4)) else None
+
+
+def _metres_per_unit(files: Files, document: dict[str, Any]) -> float:
+    scale = document.get("depth_unit_scale_factor", document.get("integer_depth_scale", 1e-3))
+    if not isinstance(scale, int | float) or not 0 < scale < 1e3:
+        raise CaptureError(
+            f"{files.source}/{_TRANSFORMS}: depth_unit_scale_factor {str(scale)[:40]}", hint="1e-3 is millimetres"
+        )
+    return float(scale)
+
+
+def _colour_of(files: Files, lenses: Mapping[int, Lens], frame: RawFrame) -> Colour:
+    content, lens = colour_file(files, frame), lenses.get(frame.index)
+    if lens is None:
+        return content
+    return undistorted(colour_pixels(content, frame.rgb_name), frame.rgb_camera, lens, nearest=False)
+
+
+def _depth_of(
+    files: Files, units_per_metre: float, lenses: Mapping[int, Lens], masks: Mapping[int, str], frame: RawFrame
+) -> RawDepth:
+    if frame.depth_name.endswith(".npy"):
+        metres = (_array(files, frame.depth_name) / units_per_metre).astype(np.float32)
+    else:
+        metres = depth_file(files, units_per_metre, frame).metres
+    if frame.index in masks:
+        metres = np.where(_mask(files, masks[frame.index], metres.shape), metres, np.float32(0))
+    if frame.index in lenses:
+        metres = undistorted(metres, frame.depth_camera, lenses[frame.index], nearest=True)
+    return RawDepth(metres, None)
+
+
+def _mask(files: Files, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    import cv2
+
+    white = colour_pixels(files.read(name), name).max(axis=2)
+    return np.asarray(cv2.resize(white, shape[::-1], interpolation=cv2.INTER_NEAREST) > 0)
+
+
+def _depth_size(files: Files, depth: Mapping[int, str]) -> tuple[int, int]:
+    if not any(name.endswith(".npy") for name in depth.values()):
+        return first_size(files, depth.values(), "depth image")
+    height, width = _array(files, min(depth.values())).shape
+    return width, height
+
+
+def _array(files: Files, name: str) -> np.ndarray:
+    """A (h, w) array of numbers from a .npy file, its header believed only when the bytes are there."""
+    content = files.read(name)
+    stream = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read_header(stream)
+        if len(shape) == 3 and shape[2] == 1:
+            shape = shape[:2]
+        if len(shape) != 2 or not 0 < shape[0] * shape[1] <= MAX_PIXELS or dtype.kind not in "fiu":
+            raise ValueError(f"{dtype} of shape {shape}")
+        return np.load(io.BytesIO(content), allow_pickle=False).reshape(shape)
+    except (ValueError, EOFError, OSError) as problem:
+        raise UnreadableFrame(f"{name}: not a readable depth array ({problem})") from problem
+
+
+READER = Reader(name="nerfstudio transforms.json", parts=(Part(_TRANSFORMS, re.escape(_TRANSFORMS)),), open=open_nerfstudio)

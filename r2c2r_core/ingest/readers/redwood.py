@@ -1,0 +1,87 @@
+"""Redwood and Open3D: color/N.jpg (or image/, rgb/), depth/N.png, trajectory.log, and a camera's JSON where there is one.
+
+trajectory.log holds, for each frame, a line "i j k" and a 4x4 camera-to-world matrix with OpenCV axes; depth is uint16
+millimetres registered to colour; without a calibration the camera is a PrimeSense (525, 525, 319.5, 239.5); pixel centres lie
+at integers; nothing tells which way is up.
+"""
+
+from collections.abc import Collection
+from functools import partial
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
+from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json, read_numbers
+
+_COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.png"
+_LOG = r"(?:scene/)?trajectory\.log"
+_ROW = 3 + 16  # numbers of one frame
+
+
+def open_redwood(files: Files) -> Recording:
+    """The recording in a Redwood or Open3D folder; raises CaptureError."""
+    colour, depth = numbered(files.names(), _COLOUR), numbered(files.names(), _DEPTH)
+    log = next(name for name in sorted(files.names(), key=len) if Part("", _LOG).is_in(frozenset({name})))
+    poses = _poses(files, log)
+    notices = []
+    if _starts_one_earlier(poses, colour.keys()):
+        poses = {number + 1: pose for number, pose in poses.items()}
+        notices.append(f"images are numbered from 1, {log} from 0: pose i belongs to image i + 1")
+    camera, camera_name = _camera(files, first_size(files, colour.values(), "colour image"))
+    depth_camera = camera.resized(*first_size(files, depth.values(), "depth image"))
+    if camera_name is None:
+        notices.append("no calibration was found: a PrimeSense's 525 px is assumed")
+    found = Found(colour=colour, depth=depth, poses=poses)
+    frames, left_out = joined_frames(files, found, lambda _: camera, lambda _: depth_camera)
+    return Recording(
+        format="Redwood / Open3D",
+        files=files,
+        frames=frames,
+        colour_of=partial(colour_file, files),
+        depth_of=partial(depth_file, files, 1000.0),
+        up_capture=None,
+        notices=(*notices, *left_out),
+        other_names=(log, *([camera_name] if camera_name else [])),
+    )
+
+
+def _poses(files: Files, log: str) -> dict[int, Rigid3 | None]:
+    numbers = read_numbers(files.read(log))
+    if numbers is None or not numbers.size or numbers.size % _ROW:
+        found = "words that are no numbers" if numbers is None else f"{numbers.size} numbers"
+        raise CaptureError(f"{files.source}/{log}: {found}, {_ROW} a frame were expected", hint="copy the recording again")
+    rows = numbers.reshape(-1, _ROW)
+    return {int(row[0]): pose_of_matrix(row[3:].reshape(4, 4)) for row in rows if np.isfinite(row[0])}
+
+
+def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool:
+    """Whether images count from 1 and poses from 0: every pose then has an image one number later, pose 0 none of its own."""
+    return bool(images) and min(poses) == 0 and min(images) == 1 and max(poses) + 1 <= max(images)
+
+
+def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None]:
+    """From a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
+    for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
+        document = read_json(files, name)
+        matrix, width, height = (document.get(key) for key in ("intrinsic_matrix", "width", "height"))
+        try:
+            k = np.array(matrix, np.float64).reshape(3, 3).T
+            full = integer_centred(k[0, 0], k[1, 1], k[0, 2], k[1, 2], (int(width or 0), int(height or 0)))
+        except (TypeError, ValueError):
+            continue
+        if np.isfinite(k).all() and min(full.fx, full.fy, full.width, full.height) > 0:
+            return full.resized(*size), name
+    return integer_centred(525.0, 525.0, 319.5, 239.5, (640, 480)).resized(*size), None
+
+
+READER = Reader(
+    name="Redwood / Open3D",
+    parts=(Part("color/N.jpg", _COLOUR), Part("depth/N.png", _DEPTH), Part("trajectory.log", _LOG)),
+    open=open_redwood,
+)

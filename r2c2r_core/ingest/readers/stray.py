@@ -1,0 +1,100 @@
+"""Stray Scanner: rgb.mp4 (HEVC, landscape, never rotated), depth/N.png, confidence/N.png, camera_matrix.csv, odometry.csv.
+
+Depth is uint16 millimetres, confidence 0..2, both for the whole colour image at a lower resolution. Poses are camera-to-world
+with OpenCV camera axes in ARKit's y-up world; newer files carry fx, fy, cx, cy per frame, which are preferred to
+camera_matrix.csv (the last frame's). Columns go by name, frames by number; pixel centres lie at integers.
+(StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
+"""
+
+import csv
+from functools import partial
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
+from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.protocol import Colour, Part, RawFrame, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_calibration
+from r2c2r_core.ingest.readers.video import Video
+
+_VIDEO, _MATRIX, _ODOMETRY = "rgb.mp4", "camera_matrix.csv", "odometry.csv"
+_COLOUR, _DEPTH, _CONFIDENCE = r"rgb/(\d+)\.(?:jpe?g|png)", r"depth/(\d+)\.png", r"confidence/(\d+)\.png"
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+_CAMERA = ("fx", "fy", "cx", "cy")
+
+
+def open_stray(files: Files) -> Recording:
+    """The recording in a Stray Scanner folder; raises CaptureError."""
+    odometry = _odometry(files)
+    depth = numbered(files.names(), _DEPTH)
+    video = Video(files, _VIDEO) if _VIDEO in files.names() else None
+    colour = dict.fromkeys(odometry, _VIDEO) if video else numbered(files.names(), _COLOUR)
+    size = video.size if video else first_size(files, colour.values(), "colour image")
+    common = read_calibration(files, _MATRIX, size)
+    cameras = {number: _camera(row, common) for number, row in odometry.items()}
+    depth_size = first_size(files, depth.values(), "depth image")
+    found = Found(
+        colour=colour,
+        depth=depth,
+        poses={n: pose_of_quaternion(np.array([row[c] for c in _POSE])) for n, row in odometry.items()},
+        confidence=numbered(files.names(), _CONFIDENCE),
+        times_s={n: row["timestamp"] for n, row in odometry.items()},
+    )
+    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
+    return Recording(
+        format="Stray Scanner",
+        files=files,
+        frames=frames,
+        colour_of=partial(_video_frame, video) if video else partial(colour_file, files),
+        depth_of=partial(depth_file, files, 1000.0),
+        up_capture=np.array([0.0, 1.0, 0.0]),
+        notices=tuple(notices),
+        other_names=(_MATRIX, _ODOMETRY),
+    )
+
+
+def _video_frame(video: Video, frame: RawFrame) -> Colour:
+    return video.frame(frame.index)
+
+
+def _odometry(files: Files) -> dict[int, dict[str, float]]:
+    """The rows of odometry.csv by frame number; a value that is no number is NaN."""
+    table = csv.DictReader(lines_of(files, _ODOMETRY), skipinitialspace=True)
+    columns = [name.strip() for name in table.fieldnames or ()]
+    lacking = [c for c in ("timestamp", "frame", *_POSE) if c not in columns]
+    if lacking:
+        raise CaptureError(
+            f"{files.source}/{_ODOMETRY}: no column {', '.join(lacking)} among {', '.join(columns)[:80] or 'none'}",
+            hint="the first line names the columns; copy the recording from the phone again",
+        )
+    rows = ({c: _number(value) for c, value in zip(columns, row.values(), strict=False)} for row in table)
+    return {int(row["frame"]): row for row in rows if 0 <= row["frame"] < 1e7}
+
+
+def _camera(row: dict[str, float], common: Intrinsics) -> Intrinsics:
+    fx, fy, cx, cy = (row.get(c, np.nan) for c in _CAMERA)
+    if not (np.isfinite([fx, fy, cx, cy]).all() and min(fx, fy) > 0):
+        return common
+    return integer_centred(fx, fy, cx, cy, (common.width, common.height))
+
+
+def _number(text: object) -> float:
+    try:
+        return float(text) if isinstance(text, str) else np.nan
+    except ValueError:
+        return np.nan
+
+
+READER = Reader(
+    name="Stray Scanner",
+    parts=(
+        Part(_VIDEO, rf"{_VIDEO}|{_COLOUR}"),
+        Part("depth/N.png", _DEPTH),
+        Part(_MATRIX, _MATRIX),
+        Part(_ODOMETRY, _ODOMETRY),
+    ),
+    open=open_stray,
+)

@@ -1,0 +1,87 @@
+"""Numbers in text files: matrices, poses and cameras as the folder formats write them."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Matrix3
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
+from r2c2r_core.ingest.files import Files
+
+_MOST_JSON_BYTES = 64 * 2**20  # an hour of poses is half of it
+
+
+def read_numbers(content: bytes) -> np.ndarray | None:
+    """All numbers of a text, in order; None when a word is not one."""
+    try:
+        return np.array([float(word) for word in content.decode().replace(",", " ").split()])
+    except ValueError:  # UnicodeDecodeError is one too
+        return None
+
+
+def read_pose(content: bytes) -> Rigid3 | None:
+    """A 4x4 camera-to-world matrix; None where tracking was lost (written as -inf or NaN) or the matrix is no pose."""
+    numbers = read_numbers(content)
+    return None if numbers is None or numbers.size != 16 else pose_of_matrix(numbers.reshape(4, 4))
+
+
+def pose_of_matrix(matrix: np.ndarray, camera_axes: Matrix3 | None = None) -> Rigid3 | None:
+    """The pose in a (3 or 4, 4) matrix, for cameras whose axes `camera_axes` turns into ours; None when it is no pose."""
+    rotation = matrix[:3, :3]
+    if not np.isfinite(matrix[:3]).all() or abs(np.linalg.det(rotation) - 1.0) > 0.05:
+        return None
+    return Rigid3(nearest_rotation(rotation if camera_axes is None else rotation @ camera_axes), matrix[:3, 3].copy())
+
+
+def pose_of_quaternion(numbers: np.ndarray, camera_axes: Matrix3 | None = None) -> Rigid3 | None:
+    """The pose in [x, y, z, qx, qy, qz, qw]; None when the numbers are not finite or the quaternion has no length."""
+    from scipy.spatial.transform import Rotation
+
+    if not np.isfinite(numbers).all() or not 0.5 < np.linalg.norm(numbers[3:7]) < 2.0:
+        return None
+    rotation = Rotation.from_quat(numbers[3:7]).as_matrix()
+    return Rigid3(nearest_rotation(rotation if camera_axes is None else rotation @ camera_axes), numbers[:3].copy())
+
+
+def read_calibration(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
+    """The camera of a 3x3 or 4x4 calibration matrix with pixel centres at integers; raises CaptureError."""
+    matrix = read_numbers(files.read(name))
+    side = {9: 3, 16: 4}.get(0 if matrix is None else matrix.size)
+    if matrix is None or side is None or not (np.isfinite(matrix).all() and min(matrix[0], matrix[side + 1]) > 0):
+        raise CaptureError(f"{files.source}/{name}: expected a 3x3 calibration matrix", hint="write fx 0 cx / 0 fy cy / 0 0 1")
+    return integer_centred(matrix[0], matrix[side + 1], matrix[2], matrix[side + 2], size)
+
+
+def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int, int]) -> Intrinsics:
+    """A camera whose format puts pixel centres at integers, in our convention; `size` is (width, height)."""
+    return Intrinsics(
+        fx=float(fx), fy=float(fy), cx=float(cx) + 0.5, cy=float(cy) + 0.5, width=int(size[0]), height=int(size[1])
+    )
+
+
+def read_json(files: Files, name: str) -> dict[str, Any]:
+    """A JSON object; raises CaptureError."""
+    return parse_json(files.read(name), f"{files.source}/{name}")
+
+
+def parse_json(content: bytes, source: str) -> dict[str, Any]:
+    """A JSON object; `source` names it in messages. Raises CaptureError."""
+    hint = "export the recording again"
+    if len(content) > _MOST_JSON_BYTES:
+        raise CaptureError(f"{source}: {len(content) >> 20} MiB of JSON, 64 at most are expected", hint=hint)
+    try:
+        document = json.loads(content)
+    except (ValueError, RecursionError) as problem:
+        raise CaptureError(f"{source}: not JSON ({problem})", hint=hint) from problem
+    if not isinstance(document, dict):
+        raise CaptureError(f"{source}: a JSON {type(document).__name__}, an object was expected", hint=hint)
+    return document
+
+
+def lines_of(files: Files, name: str) -> list[str]:
+    """The lines of a text that are neither empty nor comments."""
+    text = files.read(name).decode("utf-8", errors="replace")
+    return [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
