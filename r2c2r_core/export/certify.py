@@ -62,6 +62,7 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
                 "joint": j.joint,
                 "deepest_penetration_m": _number(j.deepest_penetration_m),
                 "travel_reached": _number(j.travel_reached),
+                "cavity_open": None if j.cavity_open is None else _number(j.cavity_open),
             }
             for j in certificate.joints
         ],

@@ -4,8 +4,9 @@ import html
 from typing import Any
 
 from r2c2r_core.export.certify import certificate_to_json
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
 from r2c2r_core.export.rules.table import RULES, SIMULATION_RULES
-from r2c2r_core.export.simulate import ALLOWED_DRIFT_M, ALLOWED_PENETRATION_M, NEEDED_TRAVEL
+from r2c2r_core.export.simulate import ALLOWED_DRIFT_M, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import FORMATS
 from r2c2r_core.model.report import Certificate
 
@@ -164,11 +165,12 @@ def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str
                     reach,
                     _judged(_percent(travel), travel is not None and travel >= NEEDED_TRAVEL),
                     _judged(_millimetres(deepest), deepest is not None and deepest <= ALLOWED_PENETRATION_M),
+                    _percent(result.get("cavity_open")),
                     f'<span class="quiet">{source}</span>',
                 ]
             )
-    head = ["joint", "kind", "opens", "travel reached", "deepest in sweep", "where its numbers come from"]
-    return "<h2>Joints</h2>" + _table(head, rows, numeric=(2, 3, 4)) if rows else ""
+    head = ["joint", "kind", "opens", "travel reached", "deepest in sweep", "inside free", "where its numbers come from"]
+    return "<h2>Joints</h2>" + _table(head, rows, numeric=(2, 3, 4, 5)) if rows else ""
 
 
 def _loaders(loaders: list[dict[str, Any]]) -> str:

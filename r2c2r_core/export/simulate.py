@@ -13,15 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from r2c2r_core.export.cavities import cavity_open
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, Touch, body_name, joint_names, subtree, touches
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.export.together import meetings
 from r2c2r_core.model.report import Finding, JointResult
 from r2c2r_core.progress import SILENT, Progress
 
 POSITIONS = 21
-ALLOWED_PENETRATION_M = 5e-4
 DRIVE_FORCE_N, DRIVE_TORQUE_NM = 30.0, 10.0  # about what one hand gives a drawer or a door
 DRIVE_SECONDS = 6.0
 NEEDED_TRAVEL = 0.98
+NEEDED_CAVITY = 0.5  # a microwave with its electronics beside the oven keeps about two thirds
 REST_SECONDS = 5.0
 ALLOWED_DRIFT_M = 0.02  # LRA's gate (sim-ready.md)
 ALLOWED_OVERLAP_M = 0.005  # of fixed parts, which no engine moves apart; LRA's gate
@@ -36,15 +39,6 @@ class Simulation:
     rest_penetration_m: float
     drift_m: float
     realtime_factor: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Touch:
-    """Two bodies that overlap."""
-
-    bodies: tuple[int, int]
-    depth_m: float
-    names: str
 
 
 def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
@@ -64,10 +58,12 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
             findings.append(finding("penetration-rest", touch.names.partition(" ")[0], message))
     findings += _fixed_overlaps(loose, rest)
     joints = []
-    for name in progress.part(0.0, 0.8).each(_joint_names(strict), "joint"):
+    for name in progress.part(0.0, 0.7).each(joint_names(strict), "joint"):
         result, notes = _examine_joint(strict, solid, name)
         joints.append(result)
         findings += notes
+    progress.at(0.7, "opening joints together")
+    findings += meetings(strict)
     progress.at(0.8, "leaving everything alone")
     drift_m, realtime, notes = leave_alone(shipped)
     return Simulation(
@@ -77,25 +73,6 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
         drift_m=drift_m,
         realtime_factor=realtime,
     )
-
-
-def touches(model: Any, positions: dict[str, float]) -> list[Touch]:
-    """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero."""
-    import mujoco
-
-    data = mujoco.MjData(model)
-    for name, position in positions.items():
-        data.qpos[model.joint(name).qposadr[0]] = position
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_collision(model, data)
-    deepest: dict[tuple[int, int], float] = {}
-    for contact in data.contact[: data.ncon]:
-        pair = sorted(int(model.geom_bodyid[g]) for g in contact.geom)
-        key = (pair[0], pair[1])
-        deepest[key] = max(deepest.get(key, 0.0), -float(contact.dist))
-    found = [Touch(bodies=k, depth_m=d, names=" and ".join(_body_name(model, b) for b in k[::-1])) for k, d in deepest.items()]
-    return sorted((touch for touch in found if touch.depth_m > 0), key=lambda touch: (-touch.depth_m, touch.bodies))
 
 
 def push_open(model: Any, joint: str) -> float:
@@ -140,7 +117,7 @@ def leave_alone(model: Any) -> tuple[float, float, list[Finding]]:
 def _examine_joint(strict: Any, solid: Any, name: str) -> tuple[JointResult, list[Finding]]:
     """Sweep and push one joint, all others closed."""
     upper, lower = float(strict.joint(name).range[1]), float(strict.joint(name).range[0])
-    movers = _subtree(strict, int(strict.joint(name).bodyid[0]))
+    movers = subtree(strict, int(strict.joint(name).bodyid[0]))
     deepest, at, worst = 0.0, 0.0, ""
     blockers: set[str] = set()
     for position in np.linspace(lower, upper, POSITIONS):
@@ -155,17 +132,20 @@ def _examine_joint(strict: Any, solid: Any, name: str) -> tuple[JointResult, lis
     if travel < NEEDED_TRAVEL:
         unit = f"{DRIVE_FORCE_N:.0f} N" if strict.joint(name).type[0] == 2 else f"{DRIVE_TORQUE_NM:.0f} N m"
         notes.append(finding("travel", name, f"opens {100 * travel:.0f} % of its range under {unit}"))
-    return JointResult(joint=name, deepest_penetration_m=deepest, travel_reached=travel), notes
+    inside = cavity_open(strict, name)
+    if inside is not None and inside < NEEDED_CAVITY:
+        notes.append(finding("cavity", name, f"only {100 * inside:.0f} % of the space it opens is free"))
+    return JointResult(joint=name, deepest_penetration_m=deepest, travel_reached=travel, cavity_open=inside), notes
 
 
 def _blocked_by(solid: Any, name: str, position: float) -> set[str]:
     """Free-standing things that the joint's part runs into."""
-    movers = _subtree(solid, int(solid.joint(name).bodyid[0]))
+    movers = subtree(solid, int(solid.joint(name).bodyid[0]))
     free = _free_bodies(solid)
     if not free:
         return set()
     return {
-        _body_name(solid, next(iter(set(touch.bodies) & free)))
+        body_name(solid, next(iter(set(touch.bodies) & free)))
         for touch in touches(solid, {name: position})
         if touch.depth_m > ALLOWED_PENETRATION_M and movers & set(touch.bodies) and free & set(touch.bodies)
     }
@@ -209,39 +189,21 @@ def _compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loos
     return model
 
 
-def _joint_names(model: Any) -> list[str]:
-    """Hinges and slides with a range to travel."""
-    names = [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in (2, 3)]
-    return [name for name in names if float(model.joint(name).range[1]) > float(model.joint(name).range[0])]
-
-
 def _free_bodies(model: Any) -> set[int]:
     roots = {int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0}
     return {body for body in range(model.nbody) if int(model.body_rootid[body]) in roots}
 
 
-def _subtree(model: Any, root: int) -> set[int]:
-    found = {root}
-    for body in range(root + 1, model.nbody):  # parents come before children
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return found
-
-
 def _drift_findings(model: Any, moved: np.ndarray) -> list[Finding]:
     worst: dict[str, float] = {}
     for geom, distance in enumerate(moved):
-        name = _body_name(model, int(model.geom_bodyid[geom]))
+        name = body_name(model, int(model.geom_bodyid[geom]))
         worst[name] = max(worst.get(name, 0.0), float(distance))
     return [
         finding("drift", name, f"moves {1000 * distance:.0f} mm in {REST_SECONDS:.0f} s with nobody touching it")
         for name, distance in worst.items()
         if not distance <= ALLOWED_DRIFT_M
     ]
-
-
-def _body_name(model: Any, body: int) -> str:
-    return "floor" if body == 0 else str(model.body(body).name)
 
 
 def _divergences() -> tuple[Any, ...]:

@@ -30,6 +30,7 @@ class JointResult:
     joint: str
     deepest_penetration_m: float  # over the kinematic sweep, 21 positions
     travel_reached: float  # 0..1 of the range under the stated force
+    cavity_open: float | None = None  # 0..1 of the space it opens that no collider fills; None: no such space
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

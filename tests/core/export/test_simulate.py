@@ -7,7 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from r2c2r_core.export.simulate import simulate, touches
+from r2c2r_core.export.contacts import touches
+from r2c2r_core.export.simulate import simulate
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import ArticulatedScene, Box, SceneObject
 from tests.core.export.conftest import write_folder
@@ -28,7 +29,7 @@ def moved(item: SceneObject, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> 
 
 def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> None:
     result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
-    assert result.findings == ()
+    assert [(f.rule, f.where) for f in result.findings] == [("together", "drawer_1_slide")]  # beside a door at 92 degrees
     assert {joint.joint for joint in result.joints} == {
         "cabinet_1_hinge",
         "drawer_1_slide",
@@ -138,3 +139,28 @@ def _without_body(text: str, name: str) -> str:
     world = root.find("worldbody")
     world.remove(next(body for body in world if body.get("name") == name))
     return ET.tostring(root, encoding="unicode")
+
+
+def test_doors_that_meet_when_both_are_open_are_a_warning(tmp_path: Path) -> None:
+    """Two cabinets facing each other 0.8 m apart: each opens fully, their doors cross."""
+    turned = Rigid3(np.diag([-1.0, -1.0, 1.0]), np.array([0.1, -0.56 - 0.8, 0.0]))
+    facing = cabinet("b")
+    facing = replace(facing, world_from_object=turned @ facing.world_from_object)
+    result = simulated(tmp_path, cabinet("a"), facing)
+    assert {(f.rule, f.severity, f.where) for f in result.findings} == {("together", "warning", "a_hinge")}
+    assert min(joint.travel_reached for joint in result.joints) >= 0.98
+
+
+def test_what_opens_is_hollow(tmp_path: Path) -> None:
+    result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
+    assert all(joint.cavity_open is not None and joint.cavity_open > 0.9 for joint in result.joints)
+
+
+def test_a_door_before_a_solid_block_is_an_error(tmp_path: Path) -> None:
+    item = cabinet("c")
+    size = item.dimensions_m - np.array([0.05, 0.05, 0.05])
+    filling = Box(name="filling", size_m=size, link_from_box=Rigid3(np.eye(3), np.array([0.0, 0.03, 0.0])))
+    base = replace(item.links[0], boxes=(*item.links[0].boxes, filling))
+    result = simulated(tmp_path, replace(item, links=(base, *item.links[1:])))
+    assert "cavity" in {f.rule for f in result.findings}
+    assert result.joints[0].cavity_open < 0.1

@@ -1,0 +1,52 @@
+"""Bodies that overlap in a MuJoCo model, with its joints at given positions."""
+
+from dataclasses import dataclass
+from typing import Any
+
+ALLOWED_PENETRATION_M = 5e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Touch:
+    """Two bodies that overlap."""
+
+    bodies: tuple[int, int]
+    depth_m: float
+    names: str
+
+
+def touches(model: Any, positions: dict[str, float]) -> list[Touch]:
+    """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    for name, position in positions.items():
+        data.qpos[model.joint(name).qposadr[0]] = position
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    deepest: dict[tuple[int, int], float] = {}
+    for contact in data.contact[: data.ncon]:
+        pair = sorted(int(model.geom_bodyid[g]) for g in contact.geom)
+        key = (pair[0], pair[1])
+        deepest[key] = max(deepest.get(key, 0.0), -float(contact.dist))
+    found = [Touch(bodies=k, depth_m=d, names=" and ".join(body_name(model, b) for b in k[::-1])) for k, d in deepest.items()]
+    return sorted((touch for touch in found if touch.depth_m > 0), key=lambda touch: (-touch.depth_m, touch.bodies))
+
+
+def joint_names(model: Any) -> list[str]:
+    """Hinges and slides with a range to travel."""
+    names = [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in (2, 3)]
+    return [name for name in names if float(model.joint(name).range[1]) > float(model.joint(name).range[0])]
+
+
+def subtree(model: Any, root: int) -> set[int]:
+    found = {root}
+    for body in range(root + 1, model.nbody):  # parents come before children
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return found
+
+
+def body_name(model: Any, body: int) -> str:
+    return "floor" if body == 0 else str(model.body(body).name)
