@@ -17,10 +17,13 @@ from r2c2r_core.model import capture, inputs, mesh, placement, reconstruction, r
 _MODULES = (camera, masks, transforms, capture, inputs, mesh, placement, reconstruction, report, scene, track)
 
 
-def encode_noun(noun: object, header: Mapping[str, Any]) -> bytes:
-    """A model dataclass, with a small JSON header, as the bytes of a zip."""
+Classes = Mapping[str, type]
+
+
+def encode_noun(noun: object, header: Mapping[str, Any], more: tuple[type, ...] = ()) -> bytes:
+    """A dataclass of the model, or of `more`, with a small JSON header, as the bytes of a zip."""
     blobs: list[tuple[str, bytes]] = []
-    structure = {"header": dict(header), "noun": _encode(noun, blobs)}
+    structure = {"header": dict(header), "noun": _encode(noun, blobs, _named(more))}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("noun.json", json.dumps(structure))
@@ -30,11 +33,11 @@ def encode_noun(noun: object, header: Mapping[str, Any]) -> bytes:
     return buffer.getvalue()
 
 
-def decode_noun(content: bytes) -> tuple[Any, dict[str, Any]]:
+def decode_noun(content: bytes, more: tuple[type, ...] = ()) -> tuple[Any, dict[str, Any]]:
     """The noun and its header; raises ValueError, KeyError or zipfile.BadZipFile on anything else."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         structure = json.loads(archive.read("noun.json"))
-        return _decode(structure["noun"], archive), structure["header"]
+        return _decode(structure["noun"], archive, _named(more)), structure["header"]
 
 
 def decode_header(path_or_file: Any) -> dict[str, Any]:
@@ -44,7 +47,7 @@ def decode_header(path_or_file: Any) -> dict[str, Any]:
         return header
 
 
-def _encode(value: Any, blobs: list[tuple[str, bytes]]) -> Any:
+def _encode(value: Any, blobs: list[tuple[str, bytes]], classes: Classes) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic):
@@ -54,16 +57,16 @@ def _encode(value: Any, blobs: list[tuple[str, bytes]]) -> Any:
     if isinstance(value, bytes):
         return {"bytes": _store(value, "bin", blobs)}
     if isinstance(value, tuple | list):
-        return {"tuple": [_encode(item, blobs) for item in value]}
+        return {"tuple": [_encode(item, blobs, classes) for item in value]}
     if isinstance(value, dict):
-        return {"dict": [[_encode(key, blobs), _encode(item, blobs)] for key, item in value.items()]}
-    if dataclasses.is_dataclass(value) and type(value).__name__ in _classes():
-        fields = {f.name: _encode(getattr(value, f.name), blobs) for f in dataclasses.fields(value)}
+        return {"dict": [[_encode(key, blobs, classes), _encode(item, blobs, classes)] for key, item in value.items()]}
+    if dataclasses.is_dataclass(value) and classes.get(type(value).__name__) is type(value):
+        fields = {f.name: _encode(getattr(value, f.name), blobs, classes) for f in dataclasses.fields(value) if f.init}
         return {"class": type(value).__name__, "fields": fields}
     raise TypeError(f"{type(value).__name__} is not a noun of the model")
 
 
-def _decode(value: Any, archive: zipfile.ZipFile) -> Any:
+def _decode(value: Any, archive: zipfile.ZipFile, classes: Classes) -> Any:
     if not isinstance(value, dict):
         return value
     if "array" in value:
@@ -71,11 +74,11 @@ def _decode(value: Any, archive: zipfile.ZipFile) -> Any:
     if "bytes" in value:
         return archive.read(value["bytes"])
     if "tuple" in value:
-        return tuple(_decode(item, archive) for item in value["tuple"])
+        return tuple(_decode(item, archive, classes) for item in value["tuple"])
     if "dict" in value:
-        return {_decode(key, archive): _decode(item, archive) for key, item in value["dict"]}
-    fields = {name: _decode(item, archive) for name, item in value["fields"].items()}
-    return _classes()[value["class"]](**fields)
+        return {_decode(key, archive, classes): _decode(item, archive, classes) for key, item in value["dict"]}
+    fields = {name: _decode(item, archive, classes) for name, item in value["fields"].items()}
+    return classes[value["class"]](**fields)
 
 
 def _store(content: bytes, suffix: str, blobs: list[tuple[str, bytes]]) -> str:
@@ -105,10 +108,11 @@ def _load_array(name: str, archive: zipfile.ZipFile) -> np.ndarray:
 
 
 @cache
-def _classes() -> dict[str, type]:
-    return {
+def _named(more: tuple[type, ...]) -> Classes:
+    model = {
         name: member
         for module in _MODULES
         for name, member in vars(module).items()
         if isinstance(member, type) and dataclasses.is_dataclass(member)
     }
+    return model | {member.__name__: member for member in more}

@@ -1,15 +1,13 @@
 """What a run has computed and may use again: keys, stored nouns, failures of single objects, and where to stop."""
 
-import hashlib
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args
 
 from r2c2r_core.errors import PromptError, StageError
 from r2c2r_core.progress import Progress
+from r2c2r_core.sources import source_key
 from r2c2r_core.workspace import Workspace, content_key
 
 T = TypeVar("T")
@@ -99,15 +97,9 @@ class Ledger:
         return progress
 
 
-@cache
 def _code_key(stage: str) -> str:
     """The stage's version: a digest of its source and of the geometry and nouns it stands on."""
-    package = Path(__file__).parent
-    digest = hashlib.sha256()
-    for folder in (stage, "geometry", "model"):
-        for path in sorted((package / folder).rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    return source_key(stage, "geometry", "model")
 
 
 def keys_of(results: Mapping[str, Kept[Any]]) -> list[list[str]]:

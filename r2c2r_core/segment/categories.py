@@ -28,6 +28,7 @@ _APPLIANCES = {
     "microwave": ApplianceSize(width=(0.36, 0.50, 0.72), height=(0.21, 0.29, 0.46), depth=0.38),
     "hood": ApplianceSize(width=(0.4, 0.6, 1.2), height=(0.05, 0.3, 1.0), depth=0.4, spread=0.5),
 }
+APPLIANCE_SIZES = tuple(dict.fromkeys(_APPLIANCES.values()))
 _RADII_M = {  # half the largest side
     **dict.fromkeys(("mug", "cup", "glass", "can", "jar", "bowl"), 0.065),
     **dict.fromkeys(("bottle", "carafe", "vase"), 0.16),

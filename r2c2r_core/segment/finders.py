@@ -11,7 +11,7 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances import ApplianceSize, appliance_box, appliance_mask, find_rectangle, measure_depth
-from r2c2r_core.segment.categories import CategoryHint, Kind
+from r2c2r_core.segment.categories import APPLIANCE_SIZES, CategoryHint, Kind
 from r2c2r_core.segment.edges import as_lab, panel_edges
 from r2c2r_core.segment.fronts import Front, find_front, front_mask, front_panel, seen_sides, wall_behind
 from r2c2r_core.segment.handles import find_handles
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from r2c2r_core.segment.geometric import Found
 
 _SMALL_M = 0.25  # things below this radius are carved by silhouettes
+_PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
 
 
 class Workbench(Protocol):
@@ -198,6 +199,13 @@ def _margin(region: PlaneRegion, size: ApplianceSize) -> float:
     """How far the front may reach beyond what depth saw of it."""
     missing = max(size.width[1] - region.width_m, size.height[1] - region.height_m, 0.0)
     return round(missing + 0.05, 2) if missing > 0.08 else 0.0
+
+
+def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
+    """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
+    sizes = [size for size in APPLIANCE_SIZES if region.width_m < size.width[2] and region.height_m < size.height[2]]
+    margins = {_margin(region, size) for size in sizes}
+    return tuple(sorted(margin for margin in margins if 0 < margin <= _PREPARED_MARGIN_M))
 
 
 def _thing(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> FoundThing | None:

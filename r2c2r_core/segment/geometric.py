@@ -1,6 +1,8 @@
 """The weight-free segmenter: fronts cut on ortho mosaics, things cut from the fused surface."""
 
 import hashlib
+import importlib
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,15 +19,16 @@ from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.categories import Kind, hint_for
-from r2c2r_core.segment.finders import find_object
+from r2c2r_core.segment.finders import appliance_margins, find_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
+from r2c2r_core.segment.prepared import kept
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.proposals import propose_steps
-from r2c2r_core.segment.runs import Run, load_run
+from r2c2r_core.segment.runs import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.segment.stage import SegmentConfig
-
-_VERSION = 1  # of what lies in the cache
+from r2c2r_core.segment.surface import in_threads
+from r2c2r_core.sources import source_key
 
 
 class Found(Protocol):
@@ -55,11 +58,16 @@ class GeometricSegmenter:
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
         """Prepare a capture: see the surface from every frame, find its vertical planes, cut the furniture runs."""
         folder = cache / f"geometric-{_cache_key(capture, config)}"
-        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.9))
+        _forget_others(folder)
+        _import_heavy()
+        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.3))
+        progress.at(0.3, "looking for flat upright parts")
         centres = np.stack([frame.world_from_camera.translation for frame in capture.frames])
-        planes = find_planes(capture.surface, centres)
+        planes = kept(folder / "planes.noun", lambda: find_planes(capture.surface, centres))
+        session = GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
+        session.cut_runs(progress=progress.part(0.35, 1.0))
         progress.at(1.0, f"{len(planes)} flat upright parts found")
-        return GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
+        return session
 
 
 @dataclass(slots=True, eq=False)
@@ -137,9 +145,17 @@ class GeometricSession:
         """The furniture run on a plane, and this far around it; computed once."""
         key = f"run{self.planes.index(region)}-{round(margin_m * 1000)}"
         if key not in self._runs:
-            path = self.folder / f"{key}.bin"
-            self._runs[key] = load_run(region, self.scene, self.config.cell_m, self.config.mosaic_frames, path, margin_m)
+            cell_m, frames = self.config.cell_m, self.config.mosaic_frames
+            path = self.folder / f"{key}.noun"
+            self._runs[key] = kept(path, lambda: make_run(region, self.scene, cell_m, frames, margin_m))
         return self._runs[key]
+
+    def cut_runs(self, *, progress: Progress = SILENT) -> None:
+        """Cut the runs of all planes, and those around planes that may be a part of an appliance, before any click."""
+        tasks = [(region, 0.0) for region in self.planes]
+        tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
+        for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
+            progress.at(done / len(tasks), f"cutting furniture runs {done}/{len(tasks)}")
 
     def _points(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Points:
         """World points under the clicks of one label; raises PromptError where one must hit a surface and does not."""
@@ -168,9 +184,22 @@ def _outwards(frames: tuple[Frame, ...], start: int) -> list[Frame]:
     return sorted(frames, key=lambda frame: (abs(frame.index - start), frame.index))
 
 
+def _forget_others(folder: Path) -> None:
+    """Drop what older code, or another setting, prepared here: it is never read again."""
+    for path in folder.parent.glob("geometric-*"):
+        if path != folder:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _import_heavy() -> None:
+    """What the first click would otherwise wait for."""
+    for name in ("scipy.ndimage", "scipy.sparse.csgraph", "skimage.measure", "skimage.segmentation"):
+        importlib.import_module(name)
+
+
 def _cache_key(capture: Capture, config: SegmentConfig) -> str:
     parts = (
-        _VERSION,
+        source_key("segment", "geometry", "model"),
         capture.sha256,
         config,
         capture.world_from_capture.matrix.round(9).tolist(),

@@ -32,36 +32,32 @@ def gather(tiles: list[Tile], axis: int, cell_m: float, allowed: np.ndarray | No
     """
     reach = round(_MAX_SHIFT_M / cell_m)
     scored = [tile_scores(tile, axis, cell_m, allowed) for tile in tiles]
-    placed: list[tuple[np.ndarray, np.ndarray]] = []
+    placed: list[np.ndarray] = []  # of each tile: its weighted score and its weight, slid
     slides: list[int] = []
+    total = np.zeros((2, *scored[0][0].shape))
     for score, weight in scored:
-        if not placed:
-            slides.append(0)
-        else:
-            slide, weight = _placed_on(score, weight, _sum(placed), reach)
-            slides.append(slide)
-        placed.append((np.roll(score * weight, slides[-1], axis=1), np.roll(weight, slides[-1], axis=1)))
+        slide = 0
+        if placed:
+            slide, weight = _placed_on(score, weight, total, reach)
+        slides.append(slide)
+        placed.append(np.roll(np.stack([score * weight, weight]), slide, axis=2))
+        total += placed[-1]
     for i, (score, weight) in enumerate(scored):  # the first tiles met few others: place all once more
-        others = placed[:i] + placed[i + 1 :]
-        if others:
-            slides[i], weight = _placed_on(score, weight, _sum(others), reach)
-        placed[i] = np.roll(score * weight, slides[i], axis=1), np.roll(weight, slides[i], axis=1)
+        total -= placed[i]
+        if len(placed) > 1:
+            slides[i], weight = _placed_on(score, weight, total, reach)
+        placed[i] = np.roll(np.stack([score * weight, weight]), slides[i], axis=2)
+        total += placed[i]
     middle = round(float(np.median(slides)))
     for tile, slide in zip(tiles, slides, strict=True):
         tile.shift = (float(slide - middle), tile.shift[1]) if axis == 0 else (tile.shift[0], float(slide - middle))
-    total, weights = (np.roll(part, -middle, axis=1) for part in _sum(placed))
-    return Evidence(total / np.maximum(weights, 1e-6), weights > 0, _block(cell_m))
+    scores, weights = np.roll(np.sum(placed, axis=0), -middle, axis=2)
+    return Evidence(scores / np.maximum(weights, 1e-6), weights > 0, _block(cell_m))
 
 
-def _sum(placed: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    return np.sum([total for total, _ in placed], axis=0), np.sum([weight for _, weight in placed], axis=0)
-
-
-def _placed_on(
-    score: np.ndarray, weight: np.ndarray, reference: tuple[np.ndarray, np.ndarray], reach: int
-) -> tuple[int, np.ndarray]:
+def _placed_on(score: np.ndarray, weight: np.ndarray, reference: np.ndarray, reach: int) -> tuple[int, np.ndarray]:
     """A tile's slide and its weight: next to nothing where its lines agree with no slide."""
-    slide, agreement = _best_slide(score, weight, *reference, reach)
+    slide, agreement = _best_slide(score, weight, reference[0], reference[1], reach)
     return (0, weight * 0.15) if agreement < 0.25 else (slide, weight)
 
 
@@ -69,28 +65,38 @@ def tile_scores(tile: Tile, axis: int, cell_m: float, allowed: np.ndarray | None
     """One tile's z-scores (blocks, positions) and their weights, 0 where unseen."""
     lab = cv2.GaussianBlur(tile.lab, (0, 0), 0.8).astype(np.float32)
     weight = tile.weight if allowed is None else tile.weight * allowed
-    if axis == 1:
-        lab, weight = lab.transpose(1, 0, 2), weight.T
     block = _block(cell_m)
-    count, length = max(1, lab.shape[0] // block), lab.shape[1]
-    rows = min(count * block, lab.shape[0])
-    lab, weight = lab[:rows], weight[:rows]
-    parts = (count, rows // count, length)
-    total = weight.reshape(parts).sum(axis=1)
-    means = (lab * weight[..., None]).reshape(*parts, 3).sum(axis=1) / np.maximum(total, 1e-6)[..., None]
-    seen = (weight > 0).reshape(parts).mean(axis=1) > 0.6
+    weights = _pooled(weight, block, axis)
+    means = _pooled(lab * weight[..., None], block, axis) / np.maximum(weights, 1e-6 / block)[..., None]
+    seen = _pooled((weight > 0).astype(np.float32), block, axis) > 0.6
+    total = weights * block
     strength, known = _strength(means, seen, cell_m)
-    score = np.zeros_like(strength)
-    for i in range(count):
-        inside = known[i]
-        if inside.sum() < 20:
-            known[i] = False
-            continue
-        middle = np.median(strength[i][inside])
-        spread = 1.4826 * np.median(np.abs(strength[i][inside] - middle)) + _NOISE_FLOOR
-        score[i] = np.where(inside, np.clip((strength[i] - middle) / spread, -2, 6), 0)
+    known[known.sum(axis=1) < 20] = False
+    middle = _row_medians(strength, known)
+    spread = 1.4826 * _row_medians(np.abs(strength - middle), known) + _NOISE_FLOOR
+    score = np.where(known, np.clip((strength - middle) / spread, -2, 6), np.float32(0))
     quality = float(np.median(total[known])) if known.any() else 0.0
     return score, np.where(known, np.float32(quality), np.float32(0))
+
+
+def _pooled(values: np.ndarray, block: int, axis: int) -> np.ndarray:
+    """Means over blocks of a line's length, (blocks, positions, …): rows are pooled for axis 0, columns for axis 1."""
+    length = values.shape[axis]
+    count = max(1, length // block)
+    kept = values[: count * block] if axis == 0 else values[:, : count * block]
+    size = (values.shape[1], count) if axis == 0 else (count, values.shape[0])
+    pooled = cv2.resize(kept, size, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(pooled if axis == 0 else np.swapaxes(pooled, 0, 1))
+
+
+def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """The median over the known part of each row, (rows, 1); nought where nothing is known."""
+    ordered = np.sort(np.where(known, values, np.inf), axis=1)
+    count = known.sum(axis=1, keepdims=True)
+    pair = np.take_along_axis(
+        ordered, np.concatenate([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[1] - 1)], axis=1), axis=1
+    )
+    return np.where(count > 0, pair.mean(axis=1, keepdims=True), 0).astype(values.dtype)
 
 
 def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
@@ -116,17 +122,24 @@ def _best_slide(score: np.ndarray, weight: np.ndarray, total: np.ndarray, weight
     profile = _smooth((score * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-6))
     reference = _smooth(total.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-6))
     seen, known = weight.sum(axis=0) > 0, weights.sum(axis=0) > 0
-    best, best_slide = -1.0, 0
-    for slide in range(-reach, reach + 1):
-        both = known & np.roll(seen, slide)
-        if both.sum() < 40:
-            continue
-        a, b = np.roll(profile, slide)[both], reference[both]
-        a, b = a - a.mean(), b - b.mean()
-        agreement = float(a @ b / (np.sqrt((a @ a) * (b @ b)) + 1e-9)) - 0.1 * abs(slide) / reach
-        if agreement > best:
-            best, best_slide = agreement, slide
-    return best_slide, best
+    slides = np.arange(-reach, reach + 1)
+    both = known & _rolled(seen, slides)
+    count = np.maximum(both.sum(axis=1, keepdims=True), 1)
+    a, b = np.where(both, _rolled(profile, slides), 0.0), np.where(both, reference, 0.0)
+    a, b = (
+        np.where(both, a - a.sum(axis=1, keepdims=True) / count, 0),
+        np.where(both, b - b.sum(axis=1, keepdims=True) / count, 0),
+    )
+    agreement = (a * b).sum(axis=1) / (np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1)) + 1e-9) - 0.1 * np.abs(slides) / reach
+    agreement[both.sum(axis=1) < 40] = -1
+    best = int(np.argmax(agreement))
+    return (int(slides[best]), float(agreement[best])) if agreement[best] > -1 else (0, -1.0)
+
+
+def _rolled(values: np.ndarray, slides: np.ndarray) -> np.ndarray:
+    """np.roll of a row by each of the slides, (slides, positions); rows of their own when `values` has as many."""
+    at = (np.arange(values.shape[-1]) - slides[:, None]) % values.shape[-1]
+    return values[at] if values.ndim == 1 else np.take_along_axis(values, at, axis=1)
 
 
 def frame_slide(tile: Tile, axis: int, cell_m: float, evidence: Evidence) -> float:
@@ -155,13 +168,9 @@ def find_roll(vertical: Evidence, horizontal: Evidence, most_rad: float = np.rad
 
 def _sheared_energy(evidence: Evidence, angle_rad: float) -> float:
     score, known = evidence.score, evidence.known
-    offsets = (np.arange(len(score)) - len(score) / 2) * evidence.block * np.tan(angle_rad)
-    total = np.zeros(score.shape[1])
-    count = np.zeros(score.shape[1])
-    for i, offset in enumerate(offsets):
-        slide = round(float(offset))
-        total += np.roll(np.where(known[i], np.clip(score[i], -1, 4), 0), slide)
-        count += np.roll(known[i], slide)
+    slides = np.round((np.arange(len(score)) - len(score) / 2) * evidence.block * np.tan(angle_rad)).astype(int)
+    total = _rolled(np.where(known, np.clip(score, -1, 4), 0), slides).sum(axis=0)
+    count = _rolled(known, slides).sum(axis=0)
     profile = np.where(count > 0.4 * len(score), total / np.maximum(count, 1), 0)
     return float((np.clip(profile - np.median(profile), 0, 9) ** 2).sum())
 

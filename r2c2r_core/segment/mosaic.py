@@ -155,7 +155,10 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.
     """Cells (rows, columns) inside the image with no occluder in front, and the plane's z-depth there."""
     column, row = np.arange(grid.columns) + 0.5, np.arange(grid.rows) + 0.5
     homography = grid.pixel_from_cell(frame, frame.rgb_camera, out_m)
-    z, u, v = (homography[k, 0] * column[None] + homography[k, 1] * row[:, None] + homography[k, 2] for k in (2, 0, 1))
+    z, u, v = (
+        (homography[k, 0] * column).astype(np.float32) + (homography[k, 1] * row + homography[k, 2]).astype(np.float32)[:, None]
+        for k in (2, 0, 1)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = u / z, v / z
     camera = frame.rgb_camera

@@ -1,6 +1,6 @@
 """Vertical planes of the fused surface: the fronts of furniture runs, found once, whatever is clicked later."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -29,6 +29,9 @@ class PlaneRegion:
     support: np.ndarray  # bool, row 0 at the top, cells of `cell_m`
     cell_m: float
     area_m2: float
+    _grown: dict[float, np.ndarray] = field(
+        default_factory=dict, init=False, repr=False
+    )  # by reach: clicks ask for the same few
 
     @property
     def outward(self) -> Vector3:
@@ -39,9 +42,12 @@ class PlaneRegion:
         """Which points (n, 3) lie within `reach_m` of the seen part, measured in the plane."""
         local = self.world_from_plane.inverse.apply(points_world)
         margin = int(np.ceil(reach_m / self.cell_m)) + 1
-        grown = np.pad(self.support.astype(np.uint8), margin)
-        if reach_m > 0:
-            grown = cv2.dilate(grown, _disk(reach_m / self.cell_m))
+        grown = self._grown.get(reach_m)
+        if grown is None:
+            grown = np.pad(self.support.astype(np.uint8), margin)
+            if reach_m > 0:
+                grown = cv2.dilate(grown, _disk(reach_m / self.cell_m))
+            self._grown[reach_m] = grown
         column = np.floor((local[:, 0] + self.width_m / 2) / self.cell_m).astype(int) + margin
         row = np.floor((self.height_m / 2 - local[:, 2]) / self.cell_m).astype(int) + margin
         height, width = grown.shape

@@ -1,8 +1,6 @@
 """A furniture run made ready for clicks: one plane's mosaic, its panels and their handles. Keyed by plane, never by click."""
 
-import pickle
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -57,26 +55,6 @@ class Run:
             frame_slide(tile, 0, self.grid.cell_m, self.vertical),
             frame_slide(tile, 1, self.grid.cell_m, self.horizontal),
         )
-
-
-def load_run(
-    region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, path: Path, margin_m: float = 0.0
-) -> Run | None:
-    """The run of a plane, from `path` when it was made before; None when too few frames see it."""
-    if path.is_file():
-        try:
-            stored = pickle.loads(path.read_bytes())
-        except (pickle.UnpicklingError, EOFError, AttributeError, ImportError):
-            stored = None  # half-written, or by another version: make it anew
-        if isinstance(stored, Run):
-            return stored
-    run = make_run(region, scene, cell_m, frame_count, margin_m)
-    if run is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(".tmp")
-        temporary.write_bytes(pickle.dumps(run))
-        temporary.replace(path)
-    return run
 
 
 def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, margin_m: float = 0.0) -> Run | None:

@@ -1,19 +1,23 @@
 """A capture prepared for segmenting: images at hand, the fused surface seen from every frame, rays into it."""
 
+import os
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
+from typing import Generic, TypeVar
 
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Vector3
-from r2c2r_core.geometry.camera import Intrinsics
-from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.surface import draw, drawn_size, in_threads, parts_of
 
-_SURFACE_WIDTH_PX = 256  # of the rendered surface: the occluders that sensors miss are broad
+T = TypeVar("T", Image, DepthMetres)
+
 _IMAGE_CACHE_BYTES = 500_000_000
 
 
@@ -24,8 +28,9 @@ class Scene:
     capture: Capture
     rendered_mm: dict[int, np.ndarray]  # uint16 millimetres, 0 = nothing
     _frames: dict[int, Frame] = field(default_factory=dict)
-    _rgb: "OrderedDict[int, Image]" = field(default_factory=OrderedDict)
-    _depth: "OrderedDict[int, DepthMetres]" = field(default_factory=OrderedDict)
+    _rgb: "_Recent[Image]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES))
+    _depth: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
+    _filled: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -40,26 +45,11 @@ class Scene:
 
     def rgb(self, frame_index: int) -> Image:
         """The colour image; the latest few hundred megabytes stay in memory."""
-        if frame_index in self._rgb:
-            self._rgb.move_to_end(frame_index)
-            return self._rgb[frame_index]
-        image = self.capture.images.rgb(frame_index)
-        self._rgb[frame_index] = image
-        while len(self._rgb) > 1 and len(self._rgb) * image.nbytes > _IMAGE_CACHE_BYTES:
-            self._rgb.popitem(last=False)
-        return image
+        return self._rgb.get(frame_index, self.capture.images.rgb)
 
     def depth(self, frame_index: int) -> DepthMetres:
         """Sensor depth in metres, float32, 0 where the sensor has none."""
-        if frame_index in self._depth:
-            self._depth.move_to_end(frame_index)
-            return self._depth[frame_index]
-        depth = self.capture.images.depth(frame_index)
-        metres = np.where(depth.valid, depth.metres, 0).astype(np.float32)
-        self._depth[frame_index] = metres
-        while len(self._depth) > 1 and len(self._depth) * metres.nbytes > _IMAGE_CACHE_BYTES // 2:
-            self._depth.popitem(last=False)
-        return metres
+        return self._depth.get(frame_index, self._sensor_depth)
 
     def surface_depth(self, frame_index: int, size: tuple[int, int]) -> DepthMetres:
         """Depth of the fused surface seen from a frame, at (width, height); 0 where the scan has nothing."""
@@ -70,9 +60,7 @@ class Scene:
 
     def filled_depth(self, frame_index: int) -> DepthMetres:
         """Sensor depth, and the fused surface where the sensor has none; 0 where neither knows."""
-        sensor = self.depth(frame_index)
-        surface = self.surface_depth(frame_index, (sensor.shape[1], sensor.shape[0]))
-        return np.where(sensor > 0, sensor, surface)
+        return self._filled.get(frame_index, self._fill_depth)
 
     def pick(self, frame_index: int, x_px: float, y_px: float) -> Vector3 | None:
         """World point under a pixel of the colour image: sensor depth, else the fused surface, else None."""
@@ -99,9 +87,18 @@ class Scene:
         row, column = int(y_px * depth.shape[0] / camera.height), int(x_px * depth.shape[1] / camera.width)
         return bool((depth[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] > 0).any())
 
+    def _sensor_depth(self, frame_index: int) -> DepthMetres:
+        depth = self.capture.images.depth(frame_index)
+        return np.where(depth.valid, depth.metres, 0).astype(np.float32)
+
+    def _fill_depth(self, frame_index: int) -> DepthMetres:
+        sensor = self.depth(frame_index)
+        surface = self.surface_depth(frame_index, (sensor.shape[1], sensor.shape[0]))
+        return np.where(sensor > 0, sensor, surface)
+
     def _depth_near(self, frame_index: int, x_px: float, y_px: float) -> float | None:
         camera = self.frame(frame_index).rgb_camera
-        for image, reach in ((self.depth(frame_index), 1), (self.surface_depth(frame_index, _surface_size(camera)), 1)):
+        for image, reach in ((self.depth(frame_index), 1), (self.surface_depth(frame_index, drawn_size(camera)), 1)):
             height, width = image.shape
             column = min(int(x_px * width / camera.width), width - 1)
             row = min(int(y_px * height / camera.height), height - 1)
@@ -114,7 +111,7 @@ class Scene:
 
 
 def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT) -> Scene:
-    """Render the fused surface into every frame, or take it from `cache`."""
+    """Draw the fused surface into every frame, or take it from `cache`."""
     path = cache / "surface_depth.npz"
     indices = np.array([frame.index for frame in capture.frames])
     if path.is_file():
@@ -122,28 +119,37 @@ def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT)
             if np.array_equal(stored["frames"], indices):
                 images = stored["millimetres"]
                 return Scene(capture=capture, rendered_mm=dict(zip(indices.tolist(), images, strict=True)))
-    rendered = {}
-    for position, frame in enumerate(capture.frames):
-        progress.at(position / len(capture.frames), f"looking at the surface from frame {position + 1}/{len(capture.frames)}")
-        rendered[frame.index] = _render(capture, frame)
+    parts = parts_of(capture.surface)
+    rendered: dict[int, np.ndarray] = {}
+    for frame, drawn in zip(capture.frames, in_threads(lambda frame: draw(parts, frame), capture.frames), strict=True):
+        rendered[frame.index] = drawn
+        progress.at(len(rendered) / len(indices), f"looking at the surface from frame {len(rendered)}/{len(indices)}")
     if len({image.shape for image in rendered.values()}) == 1:
         cache.mkdir(parents=True, exist_ok=True)
-        np.savez(path, frames=indices, millimetres=np.stack(list(rendered.values())))
+        unfinished = cache / f".surface_depth.{os.getpid()}.npz"
+        np.savez(unfinished, frames=indices, millimetres=np.stack(list(rendered.values())))
+        unfinished.replace(path)
     return Scene(capture=capture, rendered_mm=rendered)
 
 
-def _surface_size(camera: Intrinsics) -> tuple[int, int]:
-    return _SURFACE_WIDTH_PX, max(1, round(_SURFACE_WIDTH_PX * camera.height / camera.width))
+class _Recent(Generic[T]):
+    """The latest arrays by frame number, up to a number of bytes. Safe to share between threads."""
 
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes, self._bytes = most_bytes, 0
+        self._kept: OrderedDict[int, T] = OrderedDict()
+        self._lock = Lock()
 
-def _render(capture: Capture, frame: Frame) -> np.ndarray:
-    camera = frame.rgb_camera.resized(*_surface_size(frame.rgb_camera))
-    surface = capture.surface
-    raster = rasterize(
-        surface.vertices_world,
-        surface.faces,
-        np.zeros((len(surface.vertices_world), 3), np.float32),
-        camera,
-        frame.world_from_camera.inverse,
-    )
-    return (raster.depth_m * 1000 + 0.5).clip(0, 65535).astype(np.uint16)
+    def get(self, frame_index: int, load: Callable[[int], T]) -> T:
+        with self._lock:
+            if frame_index in self._kept:
+                self._kept.move_to_end(frame_index)
+                return self._kept[frame_index]
+        loaded = load(frame_index)
+        with self._lock:
+            if frame_index not in self._kept:
+                self._kept[frame_index] = loaded
+                self._bytes += loaded.nbytes
+            while len(self._kept) > 1 and self._bytes > self._most_bytes:
+                self._bytes -= self._kept.popitem(last=False)[1].nbytes
+        return loaded

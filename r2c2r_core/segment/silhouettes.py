@@ -138,17 +138,15 @@ def _best_shift(hull: Mask, gradient: np.ndarray, reach_px: int) -> tuple[int, i
     outline = outline[:: max(1, len(outline) // 160)]
     limited = np.minimum(cv2.GaussianBlur(gradient, (0, 0), 1.0), np.quantile(gradient, 0.97) + 1e-6)
     height, width = hull.shape
-    best, best_shift = -1.0, (0, 0)
-    for dy in range(-reach_px, reach_px + 1, max(1, reach_px // 10)):
-        for dx in range(-reach_px, reach_px + 1, max(1, reach_px // 10)):
-            x, y = outline[:, 0] + dx, outline[:, 1] + dy
-            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-            if inside.sum() < 0.5 * len(outline):
-                continue
-            value = float(limited[y[inside], x[inside]].mean()) * (1 - 0.35 * np.hypot(dx, dy) / max(reach_px, 1))
-            if value > best:
-                best, best_shift = value, (dx, dy)
-    return best_shift
+    steps = np.arange(-reach_px, reach_px + 1, max(1, reach_px // 10))
+    dy, dx = (grid.ravel() for grid in np.meshgrid(steps, steps, indexing="ij"))
+    x, y = outline[:, 0] + dx[:, None], outline[:, 1] + dy[:, None]
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    strength = np.where(inside, limited[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], 0).sum(axis=1)
+    value = strength / np.maximum(inside.sum(axis=1), 1) * (1 - 0.35 * np.hypot(dx, dy) / max(reach_px, 1))
+    value[inside.sum(axis=1) < 0.5 * len(outline)] = -1
+    best = int(np.argmax(value))
+    return (int(dx[best]), int(dy[best])) if value[best] > -1 else (0, 0)
 
 
 def _moved(hull: Mask, shift: tuple[int, int]) -> Mask:
