@@ -54,10 +54,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run(options: argparse.Namespace) -> int:
     """Headless reconstruction: recording and prompts in, certified bundle out."""
     from r2c2r_core.config import ReconstructConfig, read_config
+    from r2c2r_core.disk import explained_io
     from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
     from r2c2r_core.pipeline import Request, Tools, reconstruct
     from r2c2r_core.segment.prompts import read_prompts
-    from r2c2r_core.workspace import Workspace, explained_io
+    from r2c2r_core.workspace import Workspace
 
     destination: Path = options.output
     if destination.suffix != ".zip":
@@ -91,8 +92,8 @@ def run(options: argparse.Namespace) -> int:
 
 def sample(options: argparse.Namespace) -> int:
     """Write a synthetic kitchen recording with exact truth."""
+    from r2c2r_core.disk import explained_io
     from r2c2r_core.synthetic.stage import write_sample
-    from r2c2r_core.workspace import explained_io
 
     with show_progress() as progress, explained_io(options.out):
         paths = write_sample(

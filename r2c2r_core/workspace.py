@@ -12,7 +12,6 @@ re-runs exactly what depends on it, and a crash resumes where it stopped.
 """
 
 import contextlib
-import errno
 import fcntl
 import hashlib
 import json
@@ -27,6 +26,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from r2c2r_core.codec import decode_header, decode_noun, encode_noun
+from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import EnvironmentProblem
 from r2c2r_core.model.capture import Capture
 
@@ -151,18 +151,6 @@ def write_atomically(path: Path, content: bytes) -> None:
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def explained_io(path: Path) -> Iterator[None]:
-    """Turn a full disk or a forbidden folder into one line with the next step."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno == errno.ENOSPC:
-            hint = "free some space and run the same command again: finished stages are kept"
-            raise EnvironmentProblem(f"{path}: the disk is full", hint=hint) from error
-        raise EnvironmentProblem(f"{path}: {error.strerror or error}", hint="choose a folder you may write to") from error
 
 
 def _plain(value: Any) -> Any:

@@ -1,7 +1,6 @@
 """Bundles as zips: the same bytes for the same content, written whole or not at all, and read with suspicion."""
 
 import contextlib
-import errno
 import os
 import shutil
 import stat
@@ -11,7 +10,8 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from r2c2r_core.errors import BundleError, EnvironmentProblem
+from r2c2r_core.disk import explained_io
+from r2c2r_core.errors import BundleError
 from r2c2r_core.export.rules.files import is_inside
 
 MOST_MEMBERS = 20_000
@@ -60,20 +60,6 @@ def unpack(path: Path, folder: Path) -> None:
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeError) as error:
         what = " ".join(str(error).split()) or type(error).__name__
         raise BundleError(f"{path.name}: not a readable zip ({what})", hint="download or export the bundle again") from error
-
-
-@contextlib.contextmanager
-def explained_io(path: Path) -> Iterator[None]:
-    """Turn a full disk or a forbidden folder into one line with the next step."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            hint = "free some space and run the same command again: finished stages are kept"
-            raise EnvironmentProblem(f"{path}: the disk is full", hint=hint) from error
-        raise EnvironmentProblem(
-            f"{error.filename or path}: {error.strerror or error}", hint="choose a folder you may write to"
-        ) from error
 
 
 @contextlib.contextmanager

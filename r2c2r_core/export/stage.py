@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
-from r2c2r_core.export.archive import building_folder, explained_io, opened_bundle, replace_folder, write_zip
+from r2c2r_core.disk import explained_io
+from r2c2r_core.export.archive import building_folder, opened_bundle, replace_folder, write_zip
 from r2c2r_core.export.certify import certificate_to_json, certify
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.pictures import write_pictures

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import EnvironmentProblem, ObjectNotSeen
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.ledger import Kept, Ledger, Reached
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.workspace import Workspace, content_key, explained_io, file_key, write_atomically
+from r2c2r_core.workspace import Workspace, content_key, file_key, write_atomically
 
 
 def noun(area: int) -> PackedMask:
