@@ -13,7 +13,6 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -106,14 +105,16 @@ def sample(options: argparse.Namespace) -> int:
 def info(options: argparse.Namespace) -> int:
     """The capture doctor."""
     from r2c2r_core.ingest.doctor import examine
+    from r2c2r_core.ingest.readers.table import open_recording
     from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
     source = _existing(options.capture)
     with tempfile.TemporaryDirectory(prefix="r2c2r-info-") as store, show_progress() as progress:
-        report = examine(read_capture(source, Path(store), IngestConfig(), progress=progress.for_stage("ingest")))
+        capture = read_capture(source, Path(store), IngestConfig(), progress=progress.for_stage("ingest"))
+        report = examine(capture, open_recording(source))
     if options.json:
-        _write_json(options.json, {"version": 1, **asdict(report)})
-    print(table(("figure", "value"), [(name, str(value)) for name, value in asdict(report.figures).items()]))
+        _write_json(options.json, report.to_json())
+    print(table(("figure", "value"), report.rows()))
     for line in (*report.reasons, *report.notices):
         print(f"- {line}")
     print(f"{source}: {report.verdict}")

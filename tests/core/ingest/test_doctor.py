@@ -48,7 +48,7 @@ def test_a_wrong_camera_convention_makes_it_unusable(capture):
 
     report = examine(with_frames(capture, flip))
     assert report.verdict == "unusable"
-    assert "wrong" in report.reasons[0]
+    assert report.remarks[0].cause == "camera_axes"
 
 
 def test_poses_the_other_way_round_make_it_unusable(capture):
@@ -64,7 +64,7 @@ def test_a_jump_of_the_tracking_is_told(capture):
     report = examine(with_frames(capture, jump))
     assert report.figures.pose_jumps == 1
     assert report.verdict != "good"
-    assert any("jumped" in r for r in report.reasons)
+    assert any(r.cause == "pose_jumps" for r in report.remarks)
 
 
 def test_few_frames_no_floor_and_a_guessed_up_are_told(capture):

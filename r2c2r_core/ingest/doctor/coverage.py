@@ -1,0 +1,52 @@
+"""From how many sides, and from how near, the surface was filmed."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.ingest.doctor.pairs import Views
+
+_SAMPLE = 3000
+_APART_DEG = 10.0
+_CLOSE_M = 2.0
+
+
+class Cover(NamedTuple):
+    """Shares of the seen surface."""
+
+    from_three: float  # seen from three directions, 10 deg apart
+    close: float  # seen from within 2 m
+
+
+def cover(points_world: Points, views: Views) -> Cover:
+    """How well the views cover points of the fused surface, each weighing the same."""
+    points = points_world[:: max(1, len(points_world) // _SAMPLE)]
+    if not len(points):
+        return Cover(0.0, 0.0)
+    seen, toward, distance = _sight(points, views)
+    picked, count = np.zeros((len(points), 3, 3)), np.zeros(len(points), dtype=np.int64)
+    cosine = np.cos(np.radians(_APART_DEG))
+    for view in range(len(views.position)):  # greedily: a direction counts when it is far from those counted
+        new = seen[view] & (count < 3) & (np.einsum("nkd,nd->nk", picked, toward[view]).max(axis=1) < cosine)
+        rows = np.flatnonzero(new)
+        picked[rows, count[rows]] = toward[view, rows]
+        count[rows] += 1
+    anywhere = seen.any(axis=0)
+    nearest = np.where(seen, distance, np.inf).min(axis=0)
+    total = max(int(anywhere.sum()), 1)
+    return Cover(float((count[anywhere] == 3).sum() / total), float((nearest[anywhere] < _CLOSE_M).sum() / total))
+
+
+def _sight(points: Points, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Whether each view sees each point (v, n), the unit directions to the camera (v, n, 3), and the distances."""
+    rows, columns = views.depth_m.shape[1:]
+    offset = points[None] - views.translation[:, None]
+    there = offset @ views.rotation
+    z = np.maximum(there[..., 2], 0.05)
+    uv = there[..., :2] / z[..., None] * views.focal[:, None] + views.centre[:, None]
+    inside = (there[..., 2] > 0.05) & (uv >= 0).all(axis=2) & (uv < (columns, rows)).all(axis=2)
+    column, row = (np.where(inside, uv[..., axis], 0).astype(np.int64) for axis in (0, 1))
+    measured = views.depth_m[np.arange(len(views.position))[:, None], row, column]
+    distance = np.linalg.norm(offset, axis=2)
+    return inside & (np.abs(measured - z) < 0.04 + 0.02 * z), -offset / np.maximum(distance, 1e-6)[..., None], distance

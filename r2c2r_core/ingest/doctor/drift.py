@@ -1,0 +1,95 @@
+"""How far poses are off: views are aligned to each other, and what it takes to do so is the poses' disagreement."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.ingest.doctor.pairs import Disagreement, Pairs, Views, compare, overlaps, spread, tolerance_m
+
+_ROUNDS = 5
+_APART = 0.25  # of the recording lies between two visits
+_DAMPING = 0.02  # directions that the surface does not tell stay where they are
+
+
+def revisits(views: Views, most: int) -> Pairs:
+    """Pairs that see the same surface from alike places at very different times, those most alike first."""
+    every, overlap = overlaps(views)
+    later = every[:, 1] - every[:, 0] >= max(_APART * len(views.position), 2)
+    return spread(every, np.where(later & (overlap > 0.3), overlap, 0.0), most)
+
+
+def misplaced_m(views: Views, pairs: Pairs) -> np.ndarray:
+    """By how much (pairs,) the first view's surface must be moved, at its middle, to lie on the second's.
+
+    Point-to-plane alignment by depth look-up (Chen and Medioni 1992; KinectFusion 2011); NaN where it finds too little.
+    """
+    moved = replace(views, rotation=views.rotation.copy(), translation=views.translation.copy())
+    return np.array([_misplaced(moved, pair) for pair in pairs])
+
+
+def _misplaced(views: Views, pair: np.ndarray) -> float:
+    first = int(pair[0])
+    given = views.rotation[first].copy(), views.translation[first].copy()
+    compared = compare(views, pair[None])
+    if compared.comparable.sum() < 80:
+        return float("nan")
+    middle = np.median(_points(views, first)[compared.comparable[0]], axis=0)
+    surface = _surface(views, int(pair[1]))
+    for _ in range(_ROUNDS):
+        step = _step(views, pair, compared, surface)
+        views.rotation[first] = step[0] @ views.rotation[first]
+        views.translation[first] = step[0] @ views.translation[first] + step[1]
+        compared = compare(views, pair[None])
+    before, after = middle @ given[0].T + given[1], middle @ views.rotation[first].T + views.translation[first]
+    agreed = compared.comparable.sum() >= 80
+    views.rotation[first], views.translation[first] = given  # the next pair starts from the given poses
+    return float(np.linalg.norm(after - before)) if agreed else float("nan")
+
+
+def _step(
+    views: Views, pair: np.ndarray, compared: Disagreement, surface: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """One Gauss-Newton step of the first view's pose, in the world: rotation and translation."""
+    from scipy.spatial.transform import Rotation
+
+    first, second = int(pair[0]), int(pair[1])
+    normals, measured = surface
+    row, column = compared.row[0], compared.column[0]
+    n, m = normals[row, column], measured[row, column]
+    used = compared.comparable[0] & np.isfinite(n).all(axis=1)
+    to_world = views.rotation[second]
+    n, m = n[used] @ to_world.T, m[used] @ to_world.T + views.translation[second]
+    p = _points(views, first)[used] @ views.rotation[first].T + views.translation[first]
+    apart = ((m - p) * n).sum(axis=1)
+    weight = 1.0 / (1.0 + (apart / tolerance_m(compared.expected_m[0][used])) ** 2)
+    centre = p.mean(axis=0) if len(p) else np.zeros(3)
+    jacobian = np.hstack([np.cross(p - centre, n), n])
+    normal_matrix = (jacobian * weight[:, None]).T @ jacobian
+    damped = normal_matrix + _DAMPING * (weight.sum() + 1e-9) * np.eye(6)
+    solved = np.linalg.solve(damped, (jacobian * weight[:, None]).T @ apart)
+    turn = Rotation.from_rotvec(solved[:3]).as_matrix()
+    return turn, centre + solved[3:] - turn @ centre
+
+
+def _points(views: Views, view: int) -> np.ndarray:
+    """Camera-frame points (n, 3) of a view."""
+    z = views.point_z[view][:, None]
+    return np.hstack([(views.point_uv[view] - views.centre[view]) / views.focal[view] * z, z])
+
+
+def _surface(views: Views, view: int) -> tuple[np.ndarray, np.ndarray]:
+    """Normals, NaN where unknown or across a step, and points (h, w, 3) of a view's depth image, in its camera frame."""
+    depth = views.depth_m[view].astype(np.float64)
+    rows, columns = depth.shape
+    u, v = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
+    (fx, fy), (cx, cy) = views.focal[view], views.centre[view]
+    points = np.stack([(u - cx) / fx * depth, (v - cy) / fy * depth, depth], axis=-1)
+    points[depth == 0] = np.nan
+    across, down = np.full_like(points, np.nan), np.full_like(points, np.nan)
+    across[:, 2:-2] = points[:, 4:] - points[:, :-4]
+    down[2:-2] = points[4:] - points[:-4]
+    normals = np.cross(across, down)
+    step = np.maximum(np.abs(across[..., 2]), np.abs(down[..., 2])) > 0.05 + 0.05 * depth
+    normals[step] = np.nan
+    with np.errstate(invalid="ignore"):
+        return normals / np.linalg.norm(normals, axis=-1, keepdims=True), points

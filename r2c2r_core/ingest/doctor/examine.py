@@ -1,0 +1,46 @@
+"""The capture doctor: is this recording good enough, and if not, why not."""
+
+import numpy as np
+
+from r2c2r_core.ingest.doctor.hypotheses import Poses, find_convention, find_scale
+from r2c2r_core.ingest.doctor.measures import measure
+from r2c2r_core.ingest.doctor.pairs import far_pairs, neighbours, stack_views
+from r2c2r_core.ingest.doctor.registration import measure_registration
+from r2c2r_core.ingest.doctor.report import CaptureReport
+from r2c2r_core.ingest.doctor.verdict import judge, worst
+from r2c2r_core.ingest.readers.protocol import Recording
+from r2c2r_core.model.capture import Capture
+
+_VIEWS = 60  # frames that are looked at
+_FAR_PAIRS = 30
+_REGISTERED = 30  # frames on which depth is laid over colour
+
+
+def examine(capture: Capture, recording: Recording | None = None) -> CaptureReport:
+    """Look a recording over, by sixty of its frames; `recording` adds confidence and frames that thinning left out."""
+    rng = np.random.default_rng(0)
+    count = len(capture.frames)
+    positions = np.unique(np.linspace(0, count - 1, min(_VIEWS, count)).round().astype(np.int64))
+    views = stack_views(capture.frames, capture.images, list(positions), rng)
+    near = neighbours(views)
+    convention, mended = find_convention(views, near, [(k, _later(capture, positions + k)) for k in (1, -1)])
+    scale = find_scale(mended, far_pairs(mended, _FAR_PAIRS))
+    spread = positions[:: max(1, len(positions) // _REGISTERED)]
+    registration = measure_registration([capture.frames[p] for p in spread], capture.images, rng)
+    figures = measure(capture, views, near, recording)
+    remarks = judge(figures, convention, scale, registration)
+    return CaptureReport(
+        verdict=worst(remarks),
+        remarks=remarks,
+        figures=figures,
+        convention=convention,
+        scale=scale,
+        registration=registration,
+        notices=capture.notices,
+    )
+
+
+def _later(capture: Capture, positions: np.ndarray) -> Poses:
+    """Poses of the frames at these positions; the first and the last stand in beyond the ends."""
+    poses = [capture.frames[p].world_from_camera for p in np.clip(positions, 0, len(capture.frames) - 1)]
+    return np.stack([p.rotation for p in poses]), np.stack([p.translation for p in poses])

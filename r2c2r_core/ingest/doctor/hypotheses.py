@@ -1,0 +1,218 @@
+"""What if the recording was read wrongly? The usual mistakes, each tried, and the one that fits better named."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, rotation_about_z
+from r2c2r_core.ingest.doctor.pairs import Centres, Pairs, Rotations, Views, compare
+
+Cause = Literal[
+    "poses_inverted",
+    "camera_axes",
+    "rotation_transposed",
+    "quaternion_order",
+    "image_rotated",
+    "frames_shifted",
+    "depth_scale",
+    "focal_length",
+    "ray_distance",
+]
+Poses = tuple[Rotations, Centres]
+
+_LEAST_GAIN = 0.1  # of the points must come to agree before a convention is called wrong
+_LEAST_OFF = 0.04  # a scale or a focal length nearer than this to the given one is not called wrong
+_SCALES = np.geomspace(0.8, 1.25, 23)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Another way to read the recording that fits better than the given one."""
+
+    cause: Cause
+    text: str  # what is wrong, for a person
+    factor: float | None  # by which depth or focal length should be multiplied
+    agreement_given: float  # share of points on which pairs of frames agree, as the recording was read
+    agreement_so: float  # and with this change
+    error_given_mm: float | None  # median disagreement, the same two ways
+    error_so_mm: float | None
+
+
+class _Change(NamedTuple):
+    cause: Cause
+    text: str
+    poses: Callable[[Poses], Poses]
+
+
+def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Poses]]) -> tuple[Finding | None, Views]:
+    """The wrong convention that explains the disagreement of neighbouring frames, and the views as they should be.
+
+    `shifted`: poses of the frames so many places later, to tell images that belong to another frame's pose.
+    """
+    given = compare(views, pairs)
+    best: tuple[float, Cause, str, Views] | None = None
+    for cause, text, change in _conventions(shifted):
+        changed = views.posed(*change((views.rotation, views.translation)))
+        agreement = float(compare(changed, pairs).agreement.mean())
+        if best is None or agreement > best[0]:
+            best = (agreement, cause, text, changed)
+    assert best is not None
+    agreement, cause, text, changed = best
+    before = float(given.agreement.mean())
+    # Frames that barely move agree under any convention: only a clear gain counts
+    if agreement < before + _LEAST_GAIN or agreement < 1.25 * before:
+        return None, views
+    finding = Finding(
+        cause=cause,
+        text=text,
+        factor=None,
+        agreement_given=before,
+        agreement_so=agreement,
+        error_given_mm=_millimetres(given.error_m),
+        error_so_mm=_millimetres(compare(changed, pairs).error_m),
+    )
+    return finding, changed
+
+
+def find_scale(views: Views, pairs: Pairs) -> Finding | None:
+    """Depth in another unit or off by some percent, a wrong focal length, or depth along the ray: the best of them.
+
+    Needs pairs with a wide baseline: without parallax, depth of any scale agrees with itself.
+    """
+    if len(pairs) < 4:
+        return None
+    given = compare(views, pairs)
+    tries = [*_unit_tries(views, pairs), *_fine_tries(views, pairs)]
+    best = min(tries, key=lambda t: t.cost.mean())
+    better = best.cost < given.cost
+    # Wrong calibration hurts nearly every pair, chance only some of them
+    if best.cost.mean() > 0.85 * given.cost.mean() or better.mean() < 0.7:
+        return None
+    if best.factor is not None and abs(np.log(best.factor)) < _LEAST_OFF:
+        return None
+    so = compare(views, pairs, **best.change)
+    return Finding(
+        cause=best.cause,
+        text=best.text,
+        factor=best.factor,
+        agreement_given=float(given.agreement.mean()),
+        agreement_so=float(so.agreement.mean()),
+        error_given_mm=_millimetres(given.error_m),
+        error_so_mm=_millimetres(so.error_m),
+    )
+
+
+class _Try(NamedTuple):
+    cause: Cause
+    text: str
+    factor: float | None
+    change: dict
+    cost: np.ndarray
+
+
+def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
+    flip = CAMERA_CV_FROM_GL
+    changes = [
+        _Change("camera_axes", "the camera axes are flipped (OpenGL taken for OpenCV, or the reverse)", _turned(flip)),
+        _Change("poses_inverted", _INVERTED, _inverted),
+        _Change("poses_inverted", _INVERTED, lambda poses: _turned(flip)(_inverted(poses))),
+        _Change("rotation_transposed", "the rotations of the poses are transposed", lambda p: (_transposed(p[0]), p[1])),
+    ]
+    for quarter, angle in ((1, 90), (2, 180), (3, 270)):
+        text = f"the images are turned by {angle} deg against their poses"
+        changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarter * np.pi / 2))))
+    for before in (np.eye(3), flip):
+        for order in ((1, 2, 3, 0), (3, 0, 1, 2)):
+            changes.append(
+                _Change("quaternion_order", "the quaternions are read in the wrong order", _reordered(order, before))
+            )
+    for places, poses in shifted:
+        text = f"the images belong to the poses of the frames {abs(places)} {'later' if places > 0 else 'earlier'}"
+        changes.append(_Change("frames_shifted", text, _replaced(poses)))
+    return changes
+
+
+_INVERTED = "the poses are inverted (world to camera where camera to world is expected)"
+
+
+def _turned(camera_from_camera: np.ndarray) -> Callable[[Poses], Poses]:
+    return lambda poses: (poses[0] @ camera_from_camera, poses[1])
+
+
+def _replaced(by: Poses) -> Callable[[Poses], Poses]:
+    return lambda _: by
+
+
+def _inverted(poses: Poses) -> Poses:
+    rotation = _transposed(poses[0])
+    return rotation, -np.einsum("vij,vj->vi", rotation, poses[1])
+
+
+def _transposed(rotation: Rotations) -> Rotations:
+    return np.ascontiguousarray(np.swapaxes(rotation, 1, 2))
+
+
+def _reordered(order: tuple[int, ...], camera_axes: np.ndarray) -> Callable[[Poses], Poses]:
+    """Quaternions with their numbers in another order; `camera_axes` undoes and redoes the reader's own flip."""
+
+    def change(poses: Poses) -> Poses:
+        from scipy.spatial.transform import Rotation
+
+        read = Rotation.from_matrix(poses[0] @ camera_axes).as_quat()
+        return Rotation.from_quat(read[:, order]).as_matrix() @ camera_axes, poses[1]
+
+    return change
+
+
+def _unit_tries(views: Views, pairs: Pairs) -> list[_Try]:
+    units = ((0.2, "1/5000 m read as 1/1000 m"), (5.0, "1/1000 m read as 1/5000 m"))
+    return [
+        _Try(
+            "depth_scale",
+            f"the depth has the wrong unit ({text})",
+            f,
+            {"depth_scale": f},
+            compare(views, pairs, depth_scale=f).cost,
+        )
+        for f, text in units
+    ]
+
+
+def _fine_tries(views: Views, pairs: Pairs) -> list[_Try]:
+    scale, focal = (_best_factor(views, pairs, name) for name in ("depth_scale", "focal_scale"))
+    along = compare(views, pairs, along_ray=True).cost
+    return [
+        _Try("depth_scale", f"the depth is {_percent_off(scale[0])}", scale[0], {"depth_scale": scale[0]}, scale[1]),
+        _Try("focal_length", f"the focal length is {_percent_off(focal[0])}", focal[0], {"focal_scale": focal[0]}, focal[1]),
+        _Try(
+            "ray_distance", "the depth is measured along the ray, not along the camera's axis", None, {"along_ray": True}, along
+        ),
+    ]
+
+
+def _best_factor(views: Views, pairs: Pairs, name: str) -> tuple[float, np.ndarray]:
+    """The factor with the least cost: a scan, then the vertex of the parabola through the three best neighbours."""
+
+    def cost(factor: float) -> np.ndarray:
+        return compare(views, pairs, **{name: factor}).cost  # type: ignore[arg-type]  # both are numbers
+
+    costs = [float(cost(f).mean()) for f in _SCALES]
+    k = int(np.clip(np.argmin(costs), 1, len(costs) - 2))
+    left, middle, right = costs[k - 1 : k + 2]
+    bend = left - 2 * middle + right
+    shift = float(np.clip(0.5 * (left - right) / bend, -1.0, 1.0)) if bend > 1e-12 else 0.0
+    factor = float(_SCALES[k] * (_SCALES[k + 1] / _SCALES[k]) ** shift)
+    return factor, cost(factor)
+
+
+def _percent_off(factor: float) -> str:
+    """How a value that must be multiplied by `factor` is off."""
+    percent = 100.0 * (1.0 / factor - 1.0)
+    return f"{abs(percent):.0f} % too {'large' if percent > 0 else 'small'}"
+
+
+def _millimetres(errors_m: np.ndarray) -> float | None:
+    known = errors_m[np.isfinite(errors_m)]
+    return float(1000 * np.median(known)) if len(known) else None

@@ -1,0 +1,181 @@
+"""The figures of a recording: what can be counted, before anything is judged."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.doctor.coverage import cover
+from r2c2r_core.ingest.doctor.drift import misplaced_m, revisits
+from r2c2r_core.ingest.doctor.pairs import Pairs, Views, angle_deg, compare
+from r2c2r_core.ingest.doctor.report import CaptureFigures
+from r2c2r_core.ingest.readers.protocol import Recording, UnreadableFrame
+from r2c2r_core.model.capture import Capture, Frame
+
+_STOPS = 0.5  # a change of brightness that shows in textures
+_LEVEL_M2 = 0.15  # a level surface smaller than this is a thing's top
+_CEILING_M = 1.9
+
+
+def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording | None) -> CaptureFigures:
+    """The figures of a recording; `pairs` are neighbours among `views`."""
+    frames = capture.frames
+    centres = np.array([f.world_from_camera.translation for f in frames])
+    steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
+    turns = [angle_deg(a.world_from_camera.rotation, b.world_from_camera.rotation) for a, b in pairwise(frames)]
+    timing = _timing(recording, frames)
+    depth_known = views.depth_m > 0
+    sharpness = np.array([f.sharpness for f in frames])
+    jumps = _jumps(frames, steps)
+    compared = compare(views, pairs)
+    errors = compared.error_m[np.isfinite(compared.error_m)]
+    again = misplaced_m(views, revisits(views, 24))
+    light = _light(capture, views, pairs)
+    heights = _heights(capture)
+    seen = cover(capture.surface.vertices_world, views)
+    return CaptureFigures(
+        frames=len(frames),
+        first_frame=frames[0].index,
+        last_frame=frames[-1].index,
+        missing_share=timing.missing_share,
+        longest_gap_s=timing.longest_gap_s,
+        rgb_size=(frames[0].rgb_camera.width, frames[0].rgb_camera.height),
+        depth_size=(frames[0].depth_camera.width, frames[0].depth_camera.height),
+        fps=timing.fps,
+        duration_s=timing.duration_s,
+        path_m=float(steps.sum()),
+        turned_deg=float(np.sum(turns)),
+        depth_coverage=float(np.median(depth_known.mean(axis=(1, 2)))),
+        confidence_shares=_confidence(recording) if recording else None,
+        median_depth_m=float(np.median(views.depth_m[depth_known])) if depth_known.any() else 0.0,
+        blurred_share=float((sharpness < np.median(sharpness) / 3).mean()),
+        overexposed_share=light.white,
+        underexposed_share=light.black,
+        flicker_share=light.flicker,
+        pose_jumps=int(jumps.sum()),
+        largest_jump_m=float(steps[jumps].max()) if jumps.any() else 0.0,
+        pair_error_mm=float(1000 * np.median(errors)) if len(errors) else None,
+        pair_overlap=float(compared.overlap.mean()) if len(pairs) else 0.0,
+        drift_mm=float(1000 * np.nanmedian(again)) if np.isfinite(again).any() else None,
+        up_source=capture.room.up_source,
+        floor_found=capture.room.floor_found,
+        walls=len(capture.room.walls),
+        camera_height_m=float(np.median(centres[:, 2])) if capture.room.floor_found else None,
+        level_heights_m=heights.level,
+        room_height_m=heights.ceiling,
+        seen_from_three=seen.from_three,
+        seen_close=seen.close,
+        voxel_mm=capture.surface.voxel_m * 1000,
+        surface_m=_extent(capture.surface.vertices_world),
+    )
+
+
+class _Timing(NamedTuple):
+    missing_share: float
+    longest_gap_s: float | None
+    fps: float | None
+    duration_s: float | None
+
+
+def _timing(recording: Recording | None, frames: Sequence[Frame]) -> _Timing:
+    """Frame rate and gaps, of the recording itself where it is at hand: a long one is thinned on reading."""
+    every = recording.frames if recording else frames
+    numbers = np.array([f.index for f in every], dtype=np.float64)
+    times = np.array([f.timestamp_s for f in every if f.timestamp_s is not None])
+    gaps = np.diff(numbers)
+    expected = (numbers[-1] - numbers[0]) / np.median(gaps) + 1 if len(gaps) else 1.0
+    between = np.diff(times)
+    duration = float(times[-1] - times[0]) if len(times) > 1 else None
+    return _Timing(
+        missing_share=float(max(0.0, 1.0 - len(numbers) / expected)),
+        longest_gap_s=float(between.max()) if len(between) else None,
+        fps=(len(times) - 1) / duration if duration else None,
+        duration_s=duration,
+    )
+
+
+def _confidence(recording: Recording, frames: int = 12) -> tuple[float, float, float] | None:
+    """Shares of pixels of low, medium and high confidence."""
+    counts = np.zeros(3)
+    for frame in recording.frames[:: max(1, len(recording.frames) // frames)]:
+        try:
+            confidence = recording.depth_of(frame).confidence
+        except (UnreadableFrame, CaptureError):
+            continue
+        if confidence is not None:
+            counts += np.bincount(np.clip(confidence.ravel(), 0, 2), minlength=3)
+    if not counts.any():
+        return None
+    low, medium, high = counts / counts.sum()
+    return float(low), float(medium), float(high)
+
+
+class _Light(NamedTuple):
+    white: float
+    black: float
+    flicker: float
+
+
+def _light(capture: Capture, views: Views, pairs: Pairs) -> _Light:
+    """Exposure of the sampled frames, and how often neighbours show one surface in another brightness."""
+    size = (views.depth_m.shape[2], views.depth_m.shape[1])
+    rgb = [cv2.resize(capture.images.rgb(capture.frames[p].index), size, interpolation=cv2.INTER_AREA) for p in views.position]
+    grey = np.stack([cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in rgb])
+    if not len(pairs):
+        return _Light(float(np.median((grey > 250).mean(axis=(1, 2)))), float(np.median((grey < 5).mean(axis=(1, 2)))), 0.0)
+    compared = compare(views, pairs)
+    here = views.point_uv[pairs[:, 0]].astype(np.int64)
+    first = grey[pairs[:, 0, None], here[..., 1], here[..., 0]]
+    second = grey[pairs[:, 1, None], compared.row, compared.column]
+    fair = compared.agrees & (first > 20) & (first < 235) & (second > 20) & (second < 235)
+    # sRGB: light grows about as the 2.2th power of the value
+    stops = 2.2 * np.log2(np.maximum(second, 1) / np.maximum(first, 1).astype(np.float64))
+    steps = np.array([np.median(stops[k, fair[k]]) for k in range(len(pairs)) if fair[k].sum() >= 30])
+    return _Light(
+        white=float(np.median((grey > 250).mean(axis=(1, 2)))),
+        black=float(np.median((grey < 5).mean(axis=(1, 2)))),
+        flicker=float((np.abs(steps) > _STOPS).mean()) if len(steps) else 0.0,
+    )
+
+
+class _Heights(NamedTuple):
+    level: tuple[float, ...]
+    ceiling: float | None
+
+
+def _heights(capture: Capture) -> _Heights:
+    """Heights of large level surfaces above the floor, and of a ceiling: things that have the size of people's rooms."""
+    if not capture.room.floor_found or not len(capture.surface.faces):
+        return _Heights((), None)
+    a, b, c = (capture.surface.vertices_world[capture.surface.faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    area = np.linalg.norm(cross, axis=1) / 2
+    level = np.abs(cross[:, 2]) > 2 * 0.95 * area
+    z, up = (a[:, 2] + b[:, 2] + c[:, 2]) / 3, cross[:, 2] > 0
+    furniture = level & up & (z > 0.25) & (z < _CEILING_M)
+    counts = np.histogram(z[furniture], bins=np.arange(0.25, _CEILING_M, 0.02), weights=area[furniture])[0]
+    smooth = np.convolve(counts, np.ones(3), mode="same")
+    peaks = np.flatnonzero((smooth[1:-1] > smooth[:-2]) & (smooth[1:-1] >= smooth[2:]) & (smooth[1:-1] > _LEVEL_M2)) + 1
+    around = [furniture & (np.abs(z - (0.26 + 0.02 * k)) < 0.04) for k in peaks]
+    heights = sorted({round(float(np.average(z[near], weights=area[near])), 2) for near in around})
+    above = level & ~up & (z > _CEILING_M)
+    ceiling = float(np.average(z[above], weights=area[above])) if area[above].sum() > 0.5 else None
+    return _Heights(tuple(heights), ceiling)
+
+
+def _jumps(frames: Sequence[Frame], steps: np.ndarray) -> np.ndarray:
+    """Steps much longer than the pace of the recording and of the steps beside them allows."""
+    if len(steps) < 3:
+        return np.zeros(len(steps), dtype=bool)
+    gaps = np.diff([f.index for f in frames]).astype(np.float64)
+    pace = steps / gaps
+    beside = np.maximum(np.r_[pace[1], pace[:-1]], np.r_[pace[1:], pace[-2]])
+    return np.asarray((steps > 0.2) & (pace > 6.0 * np.median(pace)) & (pace > 2.5 * beside))
+
+
+def _extent(vertices: np.ndarray) -> tuple[float, float, float]:
+    extent = np.ptp(np.quantile(vertices, (0.005, 0.995), axis=0), axis=0) if len(vertices) else np.zeros(3)
+    return float(extent[0]), float(extent[1]), float(extent[2])

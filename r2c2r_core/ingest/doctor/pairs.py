@@ -1,0 +1,224 @@
+"""Frames that see the same surface, and how well their depth agrees there: the measure behind every other finding.
+
+Everything is stacked, so that judging another convention, scale or calibration on all pairs at once costs milliseconds.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Integer
+
+from r2c2r_core.model.capture import Frame, FrameImages
+
+_LEAST_WIDTH = 160  # px; depth images are thinned to no less than this
+_POINTS = 700  # of each view
+_NEAR_M = 0.05
+
+Rotations = Float[np.ndarray, "views 3 3"]
+Centres = Float[np.ndarray, "views 3"]
+Pairs = Integer[np.ndarray, "pairs 2"]  # positions of the view whose points are taken and of the view that judges them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Views:
+    """Some frames of a recording, thinned and stacked; lengths in metres, pixels of the thinned depth images."""
+
+    position: Integer[np.ndarray, " views"]  # in the capture's list of frames
+    depth_m: Float[np.ndarray, "views rows columns"]
+    focal: Float[np.ndarray, "views 2"]
+    centre: Float[np.ndarray, "views 2"]
+    rotation: Rotations  # world_from_camera
+    translation: Centres
+    point_uv: Float[np.ndarray, "views points 2"]  # pixels of known depth, spread over the image
+    point_z: Float[np.ndarray, "views points"]  # 0 where a view has fewer points
+
+    def posed(self, rotation: Rotations, translation: Centres) -> "Views":
+        """The same images from other places."""
+        return replace(self, rotation=rotation, translation=translation)
+
+
+class Disagreement(NamedTuple):
+    """Depth of one view's points as the other should see them, less what it saw, and whether that says anything."""
+
+    apart_m: Float[np.ndarray, "pairs points"]
+    expected_m: Float[np.ndarray, "pairs points"]  # depth at which the other view should see the point
+    seen: Bool[np.ndarray, "pairs points"]  # in the other's image, and known there
+    known: Bool[np.ndarray, "pairs points"]  # the first view has a point at all
+    row: Integer[np.ndarray, "pairs points"]  # the pixel of the second view; 0 where outside
+    column: Integer[np.ndarray, "pairs points"]
+
+    @property
+    def agrees(self) -> np.ndarray:
+        """Points on which both views agree, within what a depth sensor's noise allows."""
+        return self.seen & (np.abs(self.apart_m) < tolerance_m(self.expected_m))
+
+    @property
+    def agreement(self) -> np.ndarray:
+        """Share (pairs,) of the first view's points that the second confirms."""
+        return np.asarray(self.agrees.sum(axis=1) / np.maximum(self.known.sum(axis=1), 1))
+
+    @property
+    def comparable(self) -> np.ndarray:
+        """Points both see: what lies far off is hidden from one of the two."""
+        return self.seen & (np.abs(self.apart_m) < 0.1 + 0.1 * self.expected_m)
+
+    @property
+    def overlap(self) -> np.ndarray:
+        """Share (pairs,) of the first view's points that the second sees at roughly their distance."""
+        return np.asarray(self.comparable.sum(axis=1) / np.maximum(self.known.sum(axis=1), 1))
+
+    @property
+    def error_m(self) -> np.ndarray:
+        """Median disagreement (pairs,) over comparable points; NaN where there are fewer than 30."""
+        comparable = self.comparable
+        errors = np.full(len(comparable), np.nan)
+        for k in np.flatnonzero(comparable.sum(axis=1) >= 30):
+            errors[k] = np.median(np.abs(self.apart_m[k, comparable[k]]))
+        return errors
+
+    @property
+    def cost(self) -> np.ndarray:
+        """Mean disagreement (pairs,) in tolerances, cut off at 3, over points both see; 3 where there are fewer than 30."""
+        comparable = self.comparable
+        counts = comparable.sum(axis=1)
+        cut = np.minimum(np.abs(self.apart_m) / tolerance_m(self.expected_m), 3.0)
+        return np.where(counts >= 30, np.where(comparable, cut, 0.0).sum(axis=1) / np.maximum(counts, 1), 3.0)
+
+
+def tolerance_m(depth_m: np.ndarray) -> np.ndarray:
+    """By how much two good depth images may differ: 2 cm at 1 m, 4 cm at 3 m."""
+    return np.asarray(0.01 + 0.01 * depth_m)
+
+
+def stack_views(frames: Sequence[Frame], images: FrameImages, positions: Sequence[int], rng: np.random.Generator) -> Views:
+    """The frames at those positions, thinned; all must have depth images of one size."""
+    parts = [_thinned(frames[p], images, rng) for p in positions]
+    return Views(
+        position=np.asarray(positions, dtype=np.int64),
+        depth_m=np.stack([part[0] for part in parts]),
+        focal=np.array([part[1] for part in parts]),
+        centre=np.array([part[2] for part in parts]),
+        rotation=np.stack([frames[p].world_from_camera.rotation for p in positions]),
+        translation=np.stack([frames[p].world_from_camera.translation for p in positions]),
+        point_uv=np.stack([part[3] for part in parts]),
+        point_z=np.stack([part[4] for part in parts]),
+    )
+
+
+def compare(
+    views: Views, pairs: Pairs, *, depth_scale: float = 1.0, focal_scale: float = 1.0, along_ray: bool = False
+) -> Disagreement:
+    """How the depth of each pair's first view fits the second's, if depth and calibration were so much larger.
+
+    `along_ray`: the depth images hold distances from the camera instead of along its axis.
+    """
+    first, second = pairs[:, 0], pairs[:, 1]
+    focal = views.focal * focal_scale
+    uv, z = views.point_uv[first], views.point_z[first] * depth_scale
+    rays = np.concatenate([(uv - views.centre[first, None]) / focal[first, None], np.ones((*z.shape, 1))], axis=2)
+    if along_ray:
+        z = z / np.linalg.norm(rays, axis=2)
+    rotation = np.swapaxes(views.rotation[second], 1, 2) @ views.rotation[first]
+    moved = np.einsum("pji,pj->pi", views.rotation[second], views.translation[first] - views.translation[second])
+    there = (rays * z[..., None]) @ np.swapaxes(rotation, 1, 2) + moved[:, None]
+    depth = np.maximum(there[..., 2], _NEAR_M)
+    seen_uv = there[..., :2] / depth[..., None] * focal[second, None] + views.centre[second, None]
+    rows, columns = views.depth_m.shape[1:]
+    inside = (there[..., 2] > _NEAR_M) & (seen_uv >= 0).all(axis=2) & (seen_uv < (columns, rows)).all(axis=2)
+    column = np.where(inside, seen_uv[..., 0], 0).astype(np.int64)
+    row = np.where(inside, seen_uv[..., 1], 0).astype(np.int64)
+    measured = views.depth_m[second[:, None], row, column] * depth_scale
+    if along_ray:
+        off = (np.stack([column, row], axis=2) + 0.5 - views.centre[second, None]) / focal[second, None]
+        measured = measured / np.sqrt(1.0 + (off**2).sum(axis=2))
+    known = z > 0
+    return Disagreement(
+        apart_m=there[..., 2] - measured,
+        expected_m=depth,
+        seen=known & inside & (measured > 0),
+        known=known,
+        row=row,
+        column=column,
+    )
+
+
+def neighbours(views: Views) -> Pairs:
+    """For each view a later one that has moved on a little: turned by 8 deg or moved by 15 cm, or else the sixth.
+
+    Chosen by the order of the frames and by angles between them, which survive inverted poses, flipped camera axes and
+    reordered quaternions: the pairs overlap even where the poses are nonsense.
+    """
+    pairs = []
+    for k in range(len(views.position) - 1):
+        for later in range(k + 1, min(k + 7, len(views.position))):
+            moved = float(np.linalg.norm(views.translation[later] - views.translation[k]))
+            if moved > 0.15 or angle_deg(views.rotation[k], views.rotation[later]) > 8.0:
+                break
+        pairs.append((k, later))
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def far_pairs(views: Views, most: int) -> Pairs:
+    """Pairs with a wide baseline that see the same surface: what tells scale and focal length. By the given poses."""
+    every, overlap = overlaps(views)
+    known = np.where(views.point_z > 0, views.point_z, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a view without depth: its overlap is 0
+        distance = np.nan_to_num(np.nanmedian(known, axis=1), nan=1.0)
+    apart = np.linalg.norm(views.translation[every[:, 0]] - views.translation[every[:, 1]], axis=1)
+    parallax = apart / np.maximum(distance[every[:, 0]], 0.3)
+    wanted = np.where((overlap > 0.2) & (parallax > 0.1), np.minimum(parallax, 0.8) * np.sqrt(overlap), 0.0)
+    return spread(every, wanted, most)
+
+
+def overlaps(views: Views) -> tuple[Pairs, np.ndarray]:
+    """Every ordered pair of views, and the share of the first's points that the second sees at roughly their distance."""
+    count = len(views.position)
+    first, second = np.nonzero(~np.eye(count, dtype=bool))
+    every = np.stack([first, second], axis=1)
+    few = replace(views, point_uv=views.point_uv[:, ::12], point_z=views.point_z[:, ::12])
+    shares = [np.zeros(0)]
+    for chunk in np.array_split(every, max(1, len(every) // 400)):
+        shares.append(compare(few, chunk).overlap)
+    return every, np.concatenate(shares)
+
+
+def spread(pairs: Pairs, wanted: np.ndarray, most: int) -> Pairs:
+    """The most wanted pairs, no view in more than a few of them."""
+    views = int(pairs.max()) + 1 if len(pairs) else 1
+    uses, limit = np.zeros(views, dtype=np.int64), max(2, -(-3 * most // views))
+    chosen: list[np.ndarray] = []
+    for k in np.argsort(-wanted, kind="stable"):
+        if wanted[k] <= 0 or len(chosen) == most:
+            break
+        if (uses[pairs[k]] < limit).all():
+            chosen.append(pairs[k])
+            uses[pairs[k]] += 1
+    return np.array(chosen, dtype=np.int64).reshape(-1, 2)
+
+
+def angle_deg(a: np.ndarray, b: np.ndarray) -> float:
+    """Angle between two rotations (3, 3), degrees."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1.0) / 2.0, -1.0, 1.0))))
+
+
+def _thinned(
+    frame: Frame, images: FrameImages, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(depth, focal lengths, principal point, pixels of some known points, their depth) at a fraction of the resolution."""
+    camera = frame.depth_camera
+    step = max(1, camera.width // _LEAST_WIDTH)
+    start = step // 2  # thinned pixel k stands for the full one at start + k * step, whose centre lies half a pixel further
+    depth = np.asarray(images.depth(frame.index).metres[start::step, start::step])
+    off_centre = (start + 0.5) / step - 0.5
+    focal = np.array([camera.fx, camera.fy]) / step
+    centre = np.array([camera.cx, camera.cy]) / step - off_centre
+    row, column = np.nonzero(depth > 0)
+    taken = rng.permutation(len(row))[:_POINTS]
+    uv, z = np.zeros((_POINTS, 2)), np.zeros(_POINTS)
+    uv[: len(taken)] = np.stack([column[taken], row[taken]], axis=1) + 0.5
+    z[: len(taken)] = depth[row[taken], column[taken]]
+    return depth, focal, centre, uv, z

@@ -1,0 +1,99 @@
+"""What the capture doctor says about a recording."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from r2c2r_core.ingest.doctor.hypotheses import Finding
+from r2c2r_core.ingest.doctor.registration import Registration
+
+Verdict = Literal["good", "usable with care", "unusable"]
+VERDICTS: tuple[Verdict, ...] = ("good", "usable with care", "unusable")
+VERSION = 2  # of the document that `to_json` returns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """One thing about a recording, how much it matters, and what to do about it."""
+
+    verdict: Verdict
+    cause: str  # a word for programs, such as "poses_inverted"
+    text: str
+    advice: str
+
+    @property
+    def line(self) -> str:
+        """For a person: what, and what to do."""
+        return f"{self.text}; {self.advice}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaptureFigures:
+    """What was measured."""
+
+    frames: int
+    first_frame: int
+    last_frame: int
+    missing_share: float  # of the frames between the first and the last, by number
+    longest_gap_s: float | None
+    rgb_size: tuple[int, int]  # width, height
+    depth_size: tuple[int, int]
+    fps: float | None
+    duration_s: float | None
+    path_m: float
+    turned_deg: float
+    depth_coverage: float  # share of pixels with usable depth in the median frame
+    confidence_shares: tuple[float, float, float] | None  # low, medium, high; None: the format has no confidence
+    median_depth_m: float
+    blurred_share: float  # frames with less than a third of the median sharpness
+    overexposed_share: float  # pixels at white in the median frame
+    underexposed_share: float  # pixels at black in the median frame
+    flicker_share: float  # neighbouring frames that show the same surface more than half a stop brighter or darker
+    pose_jumps: int
+    largest_jump_m: float
+    pair_error_mm: float | None  # median disagreement of the depth of neighbouring frames; None: no overlap
+    pair_overlap: float  # share of a frame's pixels its neighbour sees too
+    drift_mm: float | None  # by how much the poses place the same surface apart on another visit; None: none is revisited
+    up_source: str
+    floor_found: bool
+    walls: int
+    camera_height_m: float | None  # above the floor
+    level_heights_m: tuple[float, ...]  # of large level surfaces above the floor
+    room_height_m: float | None  # where a ceiling was seen
+    seen_from_three: float  # share of the seen surface that is seen from three directions, 10 deg apart
+    seen_close: float  # share of it that is seen from within 2 m
+    voxel_mm: float
+    surface_m: tuple[float, float, float]  # extent of the fused surface along x, y, z
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaptureReport:
+    """The doctor's report."""
+
+    verdict: Verdict
+    remarks: tuple[Remark, ...]  # worst first
+    figures: CaptureFigures
+    convention: Finding | None  # another way to read the poses that fits better
+    scale: Finding | None  # another scale of depth or focal length that fits better
+    registration: Registration | None  # how depth lies on colour; None: too few edges in depth to tell
+    notices: tuple[str, ...]  # what the reader had to say
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """One line for each remark, worst first."""
+        return tuple(r.line for r in self.remarks)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """The figures for a table: names in words, numbers as a person reads them."""
+        return [(name.replace("_", " "), _plain(value)) for name, value in asdict(self.figures).items()]
+
+    def to_json(self) -> dict[str, Any]:
+        """The versioned document of `r2c2r info --json`."""
+        return {"version": VERSION, **asdict(self), "reasons": list(self.reasons)}
+
+
+def _plain(value: object) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, tuple):
+        return ", ".join(_plain(part) for part in value) or "-"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

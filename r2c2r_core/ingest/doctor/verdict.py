@@ -1,0 +1,170 @@
+"""From figures to a verdict: what matters, worst first, and what to do about it."""
+
+from r2c2r_core.ingest.doctor.hypotheses import Finding
+from r2c2r_core.ingest.doctor.registration import Registration
+from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Verdict
+
+_MOST_OFF_PX = 2.0  # of 640: a front's gap is about as wide
+_LEAST_GAIN = 0.15  # of the edge distance; good recordings gain up to 0.12 by chance
+
+
+def judge(
+    figures: CaptureFigures, convention: Finding | None, scale: Finding | None, registration: Registration | None
+) -> tuple[Remark, ...]:
+    """Remarks, worst first; among equals, the cause before its symptoms."""
+    found = (
+        *_depth(figures),
+        *_conventions(figures, convention, scale, registration),
+        *_recording(figures),
+        *_tracking(figures, explained=convention is not None or scale is not None),
+        *_pictures(figures),
+        *_room(figures),
+    )
+    return tuple(sorted(found, key=lambda r: -VERDICTS.index(r.verdict)))
+
+
+def worst(remarks: tuple[Remark, ...]) -> Verdict:
+    """The verdict of the first remark, "good" without one."""
+    return remarks[0].verdict if remarks else "good"
+
+
+def unregistered(registration: Registration | None) -> bool:
+    """Whether depth clearly lies elsewhere than the calibration says."""
+    if registration is None or registration.off_px <= _MOST_OFF_PX:
+        return False
+    return registration.edge_px - registration.edge_best_px > _LEAST_GAIN * registration.edge_px
+
+
+def _depth(figures: CaptureFigures) -> list[Remark]:
+    shares = figures.confidence_shares
+    low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > 0.5 else None
+    if figures.depth_coverage < 0.1:
+        if low:
+            advice = "film by more light and from 0.5 to 3 m, or check the confidence files"
+            return [
+                _remark(
+                    "unusable", "confidence", f"{low}, {figures.depth_coverage:.0%} of the median frame can be used", advice
+                )
+            ]
+        text = f"usable depth covers {figures.depth_coverage:.0%} of the median frame"
+        return [_remark("unusable", "depth_coverage", text, "check the unit of the depth; stay 0.5 to 3 m away")]
+    if figures.depth_coverage < 0.35:
+        text = f"usable depth covers only {figures.depth_coverage:.0%} of the median frame" + (f": {low}" if low else "")
+        return [
+            _remark("usable with care", "confidence" if low else "depth_coverage", text, "stay 0.5 to 3 m away, in good light")
+        ]
+    return []
+
+
+def _conventions(
+    figures: CaptureFigures, convention: Finding | None, scale: Finding | None, registration: Registration | None
+) -> list[Remark]:
+    remarks = []
+    if convention is not None:
+        gain = f"{convention.agreement_so:.0%} of neighbouring depth agrees then, {convention.agreement_given:.0%} as it is"
+        remarks.append(
+            _remark("unusable", convention.cause, f"{convention.text}: {gain}", "export again, or correct the poses")
+        )
+    if unregistered(registration):
+        remarks.append(_unregistered(registration))
+    if scale is not None:
+        gain = f"views disagree by {scale.error_so_mm:.0f} mm then, {scale.error_given_mm:.0f} mm as it is"
+        remarks.append(
+            _remark("unusable", scale.cause, f"{scale.text}: {gain}", "correct the calibration or the unit of the depth")
+        )
+    return remarks
+
+
+def _unregistered(found: Registration | None) -> Remark:
+    assert found is not None, "asked only where it was measured"
+    if found.focal_only:
+        text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
+        gain = f": depth lies {found.off_px:.0f} px of 640 beside the picture"
+        return _remark("unusable", "colour_focal_length", text + gain, "correct the colour calibration")
+    text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
+    fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
+    return _remark("unusable", "unregistered", text + fit, "export registered depth, or give the two cameras' calibration")
+
+
+def _recording(figures: CaptureFigures) -> list[Remark]:
+    remarks = []
+    if figures.frames < 5:
+        remarks.append(_remark("unusable", "few_frames", f"only {figures.frames} frames", "film for at least ten seconds"))
+    elif figures.frames < 20:
+        remarks.append(
+            _remark("usable with care", "few_frames", f"only {figures.frames} frames", "more views give better masks")
+        )
+    if figures.missing_share > 0.05:
+        gap = f", the longest gap is {figures.longest_gap_s:.1f} s" if figures.longest_gap_s else ""
+        text = f"{figures.missing_share:.0%} of the frames were dropped{gap}"
+        remarks.append(
+            _remark("usable with care", "dropped_frames", text, "close other apps and film again, or copy the recording again")
+        )
+    return remarks
+
+
+def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
+    remarks = []
+    if figures.pose_jumps and not explained:
+        text = f"tracking jumped {figures.pose_jumps} times, by up to {figures.largest_jump_m:.2f} m"
+        remarks.append(_remark("usable with care", "pose_jumps", text, "things may appear twice; film again, more slowly"))
+    error, depth = figures.pair_error_mm, figures.median_depth_m
+    if error is None or figures.pair_overlap < 0.03:
+        advice = "film more slowly, so that frames overlap"
+        text = "neighbouring frames hardly overlap: poses and depth could not be checked"
+        return [*remarks, _remark("usable with care", "no_overlap", text, advice)]
+    limit = 8.0 + 3.0 * depth**2  # mm; sensor noise grows with the square of the distance
+    if error > limit and not explained:
+        text = f"neighbouring frames disagree by {error:.0f} mm, {limit:.0f} mm were expected"
+        verdict: Verdict = "unusable" if error > 3 * limit else "usable with care"
+        remarks.append(_remark(verdict, "disagreement", text, "poses, calibration or depth are wrong in a way not known here"))
+    if figures.drift_mm is not None and figures.drift_mm > 45 and not explained:
+        text = f"the poses drift: what is filmed again lies {figures.drift_mm:.0f} mm from where it was"
+        verdict = "unusable" if figures.drift_mm > 150 else "usable with care"
+        remarks.append(_remark(verdict, "drift", text, "film more slowly, turn less at once, and avoid blank walls"))
+    return remarks
+
+
+def _pictures(figures: CaptureFigures) -> list[Remark]:
+    remarks = []
+    if figures.blurred_share > 0.2:
+        text = f"{figures.blurred_share:.0%} of the frames are blurred"
+        remarks.append(_remark("usable with care", "blur", text, "move more slowly, in more light"))
+    if figures.overexposed_share > 0.2:
+        text = f"{figures.overexposed_share:.0%} of the median picture is white"
+        remarks.append(_remark("usable with care", "overexposed", text, "film away from windows and lamps"))
+    if figures.underexposed_share > 0.3:
+        text = f"{figures.underexposed_share:.0%} of the median picture is black"
+        remarks.append(_remark("usable with care", "underexposed", text, "switch the light on"))
+    if figures.flicker_share > 0.25:
+        text = f"the brightness changes in {figures.flicker_share:.0%} of the steps between frames"
+        remarks.append(_remark("usable with care", "flicker", text, "lock the exposure while filming"))
+    return remarks
+
+
+def _room(figures: CaptureFigures) -> list[Remark]:
+    remarks = []
+    if figures.path_m < 0.15:
+        text = f"the camera moved only {figures.path_m:.2f} m"
+        remarks.append(_remark("usable with care", "short_path", text, "walk around the objects"))
+    elif figures.seen_from_three < 0.15:
+        text = f"only {figures.seen_from_three:.0%} of the surface is seen from three sides"
+        remarks.append(_remark("usable with care", "one_sided", text, "walk around the objects"))
+    if figures.up_source == "assumed":
+        text = "neither the recording nor its planes tell which way is up"
+        remarks.append(_remark("usable with care", "up_unknown", text, "set it by hand"))
+    if not figures.floor_found:
+        remarks.append(
+            _remark("usable with care", "no_floor", "no floor was found", "film some of it, or set its height by hand")
+        )
+    height = figures.camera_height_m
+    if height is not None and not 0.7 < height < 2.2:
+        text = f"the camera was held {height:.2f} m above what was taken for the floor"
+        remarks.append(
+            _remark("usable with care", "camera_height", text, "check the floor's height and the scale of the poses")
+        )
+    return remarks
+
+
+def _remark(verdict: Verdict, cause: str, text: str, advice: str) -> Remark:
+    return Remark(verdict=verdict, cause=cause, text=text, advice=advice)
