@@ -134,13 +134,42 @@ def check(options: argparse.Namespace) -> int:
 
 
 def evaluate(options: argparse.Namespace) -> int:
-    """The metric set against truth."""
+    """The metric set against truth: of a bundle, or of a dataset that `r2c2r dataset` wrote (its masks and aligned meshes)."""
+    from r2c2r_core.evaluate.dataset import evaluate_dataset, is_dataset
     from r2c2r_core.evaluate.stage import evaluate_bundle
 
-    evaluation = evaluate_bundle(_existing(options.bundle), _existing(options.truth), masks=options.masks)
+    bundle, truth = _existing(options.bundle), _existing(options.truth)
+    dataset = is_dataset(bundle)
+    evaluation = evaluate_dataset(bundle, truth) if dataset else evaluate_bundle(bundle, truth, masks=options.masks)
     if options.json:
         _write_json(options.json, evaluation.to_json())
     print(evaluation.to_text())
+    return 0
+
+
+def dataset(options: argparse.Namespace) -> int:
+    """A finished work folder as a dataset: labelled frames, candidate meshes, matched points, aligned meshes (paper §3)."""
+    from r2c2r_core.dataset.stage import LabelledObject, StoredFrames, write_dataset
+    from r2c2r_core.ingest.store import depth_path, rgb_path
+    from r2c2r_core.workspace import Workspace, explained_io
+
+    workdir = _existing(options.workdir)
+    if not (workdir / "nouns").is_dir():
+        raise InputError(f"{workdir}: not a work folder", hint="give the --workdir of r2c2r run")
+    work = Workspace(workdir)
+    capture = work.load_latest("ingest", "scene")
+    if capture is None:
+        raise InputError(f"{workdir}: no recording was read here", hint="run r2c2r run with this --workdir first")
+    objects = [
+        LabelledObject(track, work.load_latest("generate", name), work.load_latest("align", name))
+        for name in work.names("segment")
+        if (track := work.load_latest("segment", name)) is not None
+    ]
+    stored = StoredFrames(lambda index: rgb_path(work.frames, index), lambda index: depth_path(work.frames, index))
+    with show_progress() as progress, explained_io(options.output):
+        manifest = write_dataset(capture, objects, stored, options.output, progress=progress.for_stage("dataset"))
+    placed = sum((options.output / "objects" / item.track.name / "aligned.glb").exists() for item in objects)
+    print(f"{manifest}: {len(objects)} objects, {placed} of them placed")
     return 0
 
 
@@ -229,10 +258,13 @@ def _parser() -> argparse.ArgumentParser:
     checked.add_argument("bundle", type=Path)
     checked.add_argument("--json", type=Path)
     evaluated = add("evaluate", evaluate)
-    evaluated.add_argument("bundle", type=Path)
+    evaluated.add_argument("bundle", type=Path, help="a bundle (zip or folder), or a dataset's folder")
     evaluated.add_argument("--truth", type=Path, required=True)
     evaluated.add_argument("--masks", type=Path, help="the folder that run --masks wrote")
     evaluated.add_argument("--json", type=Path)
+    collected = add("dataset", dataset)
+    collected.add_argument("workdir", type=Path, help="the --workdir of r2c2r run, or a project's work folder")
+    collected.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     machine = add("doctor", doctor)
     machine.add_argument("--data", type=Path, default=data)
     machine.add_argument("--json", type=Path)

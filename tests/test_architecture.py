@@ -17,7 +17,7 @@ def test_import_contracts_hold() -> None:
 
 
 def test_stages_never_import_each_other() -> None:
-    stages = ["ingest", "segment", "generate", "align", "synthesize", "warp", "export", "evaluate", "synthetic"]
+    stages = ["ingest", "segment", "generate", "align", "synthesize", "warp", "export", "evaluate", "dataset", "synthetic"]
     for stage in stages:
         for path in (ROOT / "r2c2r_core" / stage).rglob("*.py"):
             for other in stages:

@@ -22,7 +22,7 @@ from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
-from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 
@@ -202,15 +202,13 @@ def _placement(
     pose = best.hypothesis.pose
     rival = _rival(best, trials, shape)
     rms = _rms(pose, shape, observation)
+    matched = _matched(lifted, pose, shape)
     placement = Placement(
         object_name=asset.object_name,
         candidate_id=asset.candidate_id,
         world_from_mesh=pose,
-        matches=sum(len(m.points_mesh) for m in lifted),
-        inliers=sum(
-            int(np.count_nonzero(inliers_of(pose, m.points_mesh, m.points_world, 3.0 * m.noise_m, shape.diameter)))
-            for m in lifted
-        ),
+        matches=len(matched.inlier),
+        inliers=int(np.count_nonzero(matched.inlier)),
         votes=votes.by_frame,
         rms_m=rms,
         mask_iou=best.judgement.iou,
@@ -219,8 +217,24 @@ def _placement(
         runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
         method=f"{best.hypothesis.source} + {matcher}",
         warnings=(),
+        matched=matched,
     )
     return replace(placement, warnings=_warnings(placement, best, observation))
+
+
+def _matched(lifted: list[Lifted], pose: Similarity3, shape: Shape) -> MatchedPoints:
+    """All matches as one list of pairs, and which of them the pose explains."""
+    if not lifted:
+        return NO_MATCHES
+    mesh, world = np.concatenate([m.points_mesh for m in lifted]), np.concatenate([m.points_world for m in lifted])
+    noise_m = np.concatenate([m.noise_m for m in lifted])
+    return MatchedPoints(
+        frame_index=np.repeat([m.frame_index for m in lifted], [len(m.points_mesh) for m in lifted]).astype(np.int64),
+        points_mesh=mesh,
+        points_world=world,
+        noise_m=noise_m,
+        inlier=inliers_of(pose, mesh, world, 3.0 * noise_m, shape.diameter),
+    )
 
 
 def _rms(pose: Similarity3, shape: Shape, observation: Observation) -> float:

@@ -84,7 +84,7 @@ def evaluate_bundle(bundle: Path, truth: Path, *, masks: Path | None = None) -> 
     rows = tuple(_row(true, found, truth.parent / "truth_masks", masks) for true, found in zip(truths, matches, strict=True))
     taken = {found.name for found in matches if found is not None}
     surplus = tuple(thing.name for thing in record.objects if thing.name not in taken)
-    return Evaluation(rows=rows, scene=_scene_metrics(rows), surplus=surplus)
+    return Evaluation(rows=rows, scene=scene_metrics(rows), surplus=surplus)
 
 
 def match_objects(truths: tuple[ObjectRecord, ...], found: tuple[ObjectRecord, ...]) -> list[ObjectRecord | None]:
@@ -115,7 +115,7 @@ def _row(true: ObjectRecord, found: ObjectRecord | None, truth_masks: Path, mask
     return ObjectRow(name=true.name, category=true.category, matched=found.name, metrics=tuple(compared))
 
 
-def _scene_metrics(rows: tuple[ObjectRow, ...]) -> tuple[Metric, ...]:
+def scene_metrics(rows: tuple[ObjectRow, ...]) -> tuple[Metric, ...]:
     """The share of objects found, and the mean of every metric over the objects it applies to."""
     share = float(np.mean([row.matched is not None for row in rows])) if rows else None
     means = [

@@ -2,7 +2,30 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.transforms import Similarity3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MatchedPoints:
+    """Keypoints found both in a photo and in a rendered view of the candidate, lifted to points; n pairs over all frames."""
+
+    frame_index: np.ndarray  # (n,) int, Frame.index of the photo
+    points_mesh: Points
+    points_world: Points
+    noise_m: np.ndarray  # (n,) standard deviation to expect of the world point
+    inlier: np.ndarray  # (n,) bool, agrees with the pose
+
+
+NO_MATCHES = MatchedPoints(
+    frame_index=np.zeros(0, np.int64),
+    points_mesh=np.zeros((0, 3)),
+    points_world=np.zeros((0, 3)),
+    noise_m=np.zeros(0),
+    inlier=np.zeros(0, bool),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,3 +45,4 @@ class Placement:
     runner_up: float | None  # score of the best different hypothesis over the winner's, 0..1
     method: str
     warnings: tuple[str, ...]
+    matched: MatchedPoints = NO_MATCHES
