@@ -1,4 +1,4 @@
-"""A dataset (r2c2r_core.dataset's docs say what is in it) against truth: its masks, and its aligned meshes.
+"""A dataset (the dataset stage says what is in it) against truth: its masks, and its aligned meshes.
 
 Of the aligned meshes: extents and centre along the true object's axes, the overlap of the boxes, and the yaw modulo 90
 degrees, since a mesh alone does not say which side is its front. Extents leave out half a percent of the surface on each
