@@ -33,6 +33,17 @@ class Category(Shape):
     joint: str  # revolute | prismatic | none
 
 
+class Backend(Shape):
+    """One way to do a stage's work."""
+
+    name: str
+    summary: str
+    licence: str
+    licence_class: Literal["open", "restricted"]
+    available: bool
+    reason: str  # why not, and the next step
+
+
 class SystemInfo(Shape):
     """What the app can do here; limits are shown before a file is chosen."""
 
@@ -44,6 +55,7 @@ class SystemInfo(Shape):
     categories: list[Category]
     palette: list[str]  # colours by object.colour, "#rrggbb"
     viewer: bool
+    segmenters: list[Backend]  # the first needs nothing and is the default
 
 
 class FolderEntry(Shape):
@@ -175,12 +187,14 @@ class Project(Shape):
     bundle: Bundle | None  # the newest
     thumbnail: str | None
     size_bytes: int
+    segmenter: str  # draws the masks
 
 
-class ProjectRename(Shape):
-    """A new name."""
+class ProjectPatch(Shape):
+    """What changes: its name, or which segmenter draws its masks."""
 
-    name: str = Field(min_length=1, max_length=120)
+    name: str | None = Field(default=None, min_length=1, max_length=120)
+    segmenter: str | None = Field(default=None, max_length=60)
 
 
 class ImportPath(Shape):
@@ -265,6 +279,7 @@ class SceneObject(Shape):
     can_redo: bool
     segment: SegmentState
     mask_frames: int
+    mask_backend: str  # the segmenter that drew the masks; empty while there are none
     notices: list[str]
     saved: float  # when the last change was stored
 

@@ -5,7 +5,7 @@ from typing import Any
 from sqlmodel import Session
 
 from app.db import history
-from app.db.queries import live_objects, points_of
+from app.db.queries import live_objects, points_of, project_row
 from r2c2r_core.workspace import content_key
 
 
@@ -41,4 +41,5 @@ def overrides_entry(stored: dict[str, Any]) -> dict[str, Any]:
 
 def inputs_key(session: Session, project_id: str) -> str:
     """Key of everything a person gave: a result is current while its key is this one."""
-    return content_key(prompts_document(session, project_id), overrides_document(session, project_id))
+    segmenter = project_row(session, project_id).segmenter
+    return content_key(prompts_document(session, project_id), overrides_document(session, project_id), segmenter)

@@ -8,6 +8,8 @@ from typing import Any
 from sqlalchemy import JSON, Column, Index, UniqueConstraint
 from sqlmodel import Field, SQLModel
 
+from r2c2r_core.segment.stage import SEGMENTERS
+
 
 class Project(SQLModel, table=True):
     """One recording and what became of it."""
@@ -26,6 +28,7 @@ class Project(SQLModel, table=True):
     capture: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
     notices: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
     error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
 
 
 class SceneObject(SQLModel, table=True):

@@ -60,14 +60,15 @@ class LiveSegmenters:
         self._lock = threading.RLock()
         self.on_object = lambda project, number: None  # services tell tabs about the object
 
-    def open(self, project: str, files: ProjectFiles) -> None:
+    def open(self, project: str, files: ProjectFiles, segmenter: str) -> None:
         """Start the project's process unless it runs."""
         with self._lock:
             found = self._sessions.get(project)
             if found is not None and found.worker.alive:
                 found.used = time.monotonic()
                 return
-            command = (*self._commands.live, str(files.work), "--width", str(self._settings.preview_width))
+            options = ("--width", str(self._settings.preview_width), "--segmenter", segmenter)
+            command = (*self._commands.live, str(files.work), *options)
             session = _Session(project, Worker(command, files.root / "logs" / "live.log"))
             self._sessions[project] = session
             self._ended.pop(project, None)
@@ -80,9 +81,9 @@ class LiveSegmenters:
             session = self._sessions.get(project) or self._ended.get(project)
             return _status(session)
 
-    def segment(self, project: str, files: ProjectFiles, number: int, key: str, prompt: dict[str, Any]) -> None:
+    def segment(self, project: str, files: ProjectFiles, segmenter: str, number: int, key: str, prompt: dict[str, Any]) -> None:
         """Compute the object's masks for these clicks, before anything asked for earlier; a newer call supersedes."""
-        self.open(project, files)
+        self.open(project, files, segmenter)
         with self._lock:
             session = self._sessions[project]
             session.used = time.monotonic()

@@ -1,4 +1,5 @@
-"""The live segmenter of one project, in a process of its own: `python -m app.jobs.live_segment WORKDIR --width 960`.
+"""The live segmenter of one project, in a process of its own: `python -m app.jobs.live_segment WORKDIR --width 960
+--segmenter geometric`.
 
 Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · end of input stops it.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
@@ -33,11 +34,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="app.jobs.live_segment", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("--width", type=int, default=960)
+    parser.add_argument("--segmenter", default=SEGMENTERS.default)
     options = parser.parse_args(arguments)
     commands: Commands = queue.Queue()
     threading.Thread(target=_read_commands, args=(commands,), daemon=True).start()
     try:
-        desk = _open_desk(options.workdir, options.width)
+        desk = _open_desk(options.workdir, options.width, options.segmenter)
     except R2C2RError as error:
         _say(state="failed", error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
         return error.exit_code
@@ -115,7 +117,7 @@ class Desk:
             )
 
 
-def _open_desk(workdir: Path, width: int) -> Desk:
+def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
     work = Workspace(workdir)
     capture = work.load_latest("ingest", "scene")
     if capture is None:
@@ -123,7 +125,7 @@ def _open_desk(workdir: Path, width: int) -> Desk:
     progress = Progress(
         lambda _, fraction, text: _say(state="preparing", fraction=round(fraction, 3), text=text), stage="segment"
     )
-    session = open_session(capture, work.cache, SEGMENTERS.default, progress=progress)
+    session = open_session(capture, work.cache, segmenter, progress=progress)
     return Desk(session, capture, width)
 
 

@@ -17,9 +17,9 @@ class MaskFile:
     error: dict[str, Any] | None = None
 
 
-def prompt_key(category: str, points: Iterable[tuple[int, float, float, int]]) -> str:
-    """Key of what the masks depend on: the clicks and the category, not the name."""
-    content = json.dumps([category, [[frame, x, y, label] for frame, x, y, label in points]])
+def prompt_key(category: str, points: Iterable[tuple[int, float, float, int]], segmenter: str) -> str:
+    """Key of what the masks depend on: the clicks, the category and who draws, not the name."""
+    content = json.dumps([segmenter, category, [[frame, x, y, label] for frame, x, y, label in points]])
     return hashlib.sha256(content.encode()).hexdigest()[:20]
 
 

@@ -42,10 +42,10 @@ def get_project(context: Ctx, project: str) -> schemas.Project:
     return projects.get_project(context, project)
 
 
-@router.patch("/{project}", operation_id="renameProject")
-def rename_project(context: Ctx, project: str, body: schemas.ProjectRename) -> schemas.Project:
-    """A new name."""
-    return projects.rename(context, project, body.name)
+@router.patch("/{project}", operation_id="changeProject")
+def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> schemas.Project:
+    """A new name, or another segmenter (refused while its libraries or weights are missing)."""
+    return projects.change(context, project, body)
 
 
 @router.delete("/{project}", operation_id="deleteProject")

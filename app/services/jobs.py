@@ -14,6 +14,7 @@ from app.services import projects
 from app.services.context import Context
 from app.services.imports import queue_job
 from r2c2r_core.errors import PromptError
+from r2c2r_core.segment.stage import SEGMENTERS
 
 
 def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.Job:
@@ -34,7 +35,9 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     if not prompts_document(session, project.id)["objects"]:
         raise PromptError("no object has a click on it", hint="click at least one object on the annotate page")
-    payload = {**body.model_dump(), "inputs": inputs_key(session, project.id)}
+    SEGMENTERS.require(body.segmenter or project.segmenter)
+    wishes = {**body.model_dump(), "segmenter": body.segmenter or project.segmenter}
+    payload = {**wishes, "inputs": inputs_key(session, project.id)}
     active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
     for job in session.exec(active):
         if job.state == "queued" and job.started is None:
@@ -116,7 +119,6 @@ def _check_backends(body: schemas.RunRequest) -> None:
     """An unknown backend is refused before anything is queued."""
     from r2c2r_core.align.protocol import MATCHERS
     from r2c2r_core.generate.stage import GENERATORS
-    from r2c2r_core.segment.stage import SEGMENTERS
 
     for registry, name in ((SEGMENTERS, body.segmenter), (GENERATORS, body.generator), (MATCHERS, body.matcher)):
         if name is not None:

@@ -35,7 +35,7 @@ def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
         project = queries.project_row(session, project_id)
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
-    context.live.open(project_id, context.files(project))
+    context.live.open(project_id, context.files(project), project.segmenter)
     return context.live.status(project_id)
 
 
@@ -69,7 +69,7 @@ def follow(context: Context, project_id: str, object_id: int) -> None:
     if item.deleted or not any(point.label for point in points):
         context.live.cancel(project_id, object_id)
     elif state == "done" and _found(context, project, item, points) is not None:
-        files, key = context.files(project), _key(item, points)
+        files, key = context.files(project), _key(project, item, points)
         found = mask_store.read(mask_path(files.masks, object_id, key))
         if found is None or found.end != "done":  # the run's masks: nothing to show anew
             return
@@ -125,7 +125,8 @@ def on_frame(context: Context, project_id: str, frame: int) -> list[schemas.Fram
 
 def _start(context: Context, project: Project, item: SceneObject, points: list[Point]) -> None:
     prompt = {"name": item.name, "category": item.category, "points": [_click(point) for point in points]}
-    context.live.segment(project.id, context.files(project), item.id or 0, _key(item, points), prompt)
+    key = _key(project, item, points)
+    context.live.segment(project.id, context.files(project), project.segmenter, item.id or 0, key, prompt)
 
 
 def _told(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -142,7 +143,7 @@ def _found(
     context: Context, project: Project, item: SceneObject, points: list[Point]
 ) -> tuple[schemas.SegmentState, MaskFile, str] | None:
     """The masks that belong to these clicks, how far they are, and where they come from."""
-    number, key, files = item.id or 0, _key(item, points), context.files(project)
+    number, key, files = item.id or 0, _key(project, item, points), context.files(project)
     live = context.live.task(project.id, number, key)
     if live is not None:
         return (*live, "live")
@@ -150,7 +151,7 @@ def _found(
     stored = _stored(path)
     if stored is not None and stored.end == "done":
         return "done", stored, "live"
-    run = _run_masks(files, item, points, context.settings.preview_width)
+    run = _run_masks(files, item, points, project.segmenter, context.settings.preview_width)
     if run is not None:
         return "done", run, "run"
     if stored is None:
@@ -168,29 +169,30 @@ def _lane(item: SceneObject, found: tuple[schemas.SegmentState, MaskFile, str] |
     return schemas.Lane(object=item.id or 0, state=state, source=where, complete=state == "done", frames=frames)
 
 
-def _run_masks(files: ProjectFiles, item: SceneObject, points: list[Point], width: int) -> MaskFile | None:
-    """The last run's masks, when it ran with these clicks."""
+def _run_masks(files: ProjectFiles, item: SceneObject, points: list[Point], segmenter: str, width: int) -> MaskFile | None:
+    """The last run's masks, when it ran with these clicks and this segmenter."""
     path = files.work / "nouns" / "segment" / f"{item.name}.noun"
     prompts = files.finished_prompts
     if not (path.is_file() and prompts.is_file()):
         return None
     for entry in _prompts_at(prompts, prompts.stat().st_mtime_ns):
         if entry["name"] == item.name and entry["category"] == item.category and entry["points"] == [_click(p) for p in points]:
-            return _track_at(path, path.stat().st_mtime_ns, files.work, item.name, width)
+            backend, found = _track_at(path, path.stat().st_mtime_ns, files.work, item.name, width)
+            return found if backend == segmenter else None
     return None
 
 
 @lru_cache(maxsize=64)
-def _track_at(path: Path, _changed: int, work: Path, name: str, width: int) -> MaskFile | None:
+def _track_at(path: Path, _changed: int, work: Path, name: str, width: int) -> tuple[str, MaskFile | None]:
     track: MaskTrack | None = Workspace(work).load_latest("segment", name)
     if track is None:
-        return None
+        return "", None
     found = MaskFile(end="done")
     for frame, packed in track.masks.items():
         area = packed.area_px / max(packed.width * packed.height, 1)
         entry = {"frame": frame, "confidence": track.confidence[frame], "area": area, "mask": mask_bits(packed, width)}
         found.frames[frame] = entry
-    return found
+    return track.backend, found
 
 
 @lru_cache(maxsize=16)
@@ -211,8 +213,8 @@ def _stored_at(path: Path, _changed: int) -> MaskFile | None:
     return mask_store.read(path)
 
 
-def _key(item: SceneObject, points: list[Point]) -> str:
-    return prompt_key(item.category, [(p.frame, p.x, p.y, p.label) for p in points])
+def _key(project: Project, item: SceneObject, points: list[Point]) -> str:
+    return prompt_key(item.category, [(p.frame, p.x, p.y, p.label) for p in points], project.segmenter)
 
 
 def _click(point: Point) -> dict[str, Any]:

@@ -18,7 +18,9 @@ from app.db.engine import reading, writing
 from app.db.tables import Event, Job, Point, Project, SceneObject, Verdict
 from app.errors import Conflict, NotReady
 from app.files import ProjectFiles, delete_folder, folder_bytes
+from app.services import masks
 from app.services.context import Context
+from r2c2r_core.segment.stage import SEGMENTERS
 
 
 def list_projects(context: Context) -> list[schemas.Project]:
@@ -45,18 +47,33 @@ def new_project(session: Session, name: str, source_name: str, source_path: Path
     return project
 
 
-def rename(context: Context, project_id: str, name: str) -> schemas.Project:
-    """A new name."""
+def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> schemas.Project:
+    """A new name, or another segmenter: it starts on every object, and what the other one drew is kept for when it returns."""
+    if body.segmenter is not None:
+        SEGMENTERS.require(body.segmenter)
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
-        now = time.time()
-        text, before, after = f"renamed to {name.strip()}", {"name": row.name}, {"name": name.strip()}
-        event = Event(project_id=row.id, scope="project", action="rename", text=text, who=context.settings.user, at=now)
-        event.before, event.after = before, after
-        row.name, row.updated = name.strip(), now
-        session.add_all([row, event])
+        name = body.name.strip() if body.name is not None else row.name
+        if name != row.name:
+            _note(context, session, row, "rename", f"renamed to {name}", {"name": name})
+        if body.segmenter is not None and body.segmenter != row.segmenter:
+            text = f"masks by {body.segmenter} instead of {row.segmenter}"
+            _note(context, session, row, "segmenter", text, {"segmenter": body.segmenter})
+            context.live.close(project_id)
+        objects = [item.id or 0 for item in queries.live_objects(session, project_id)] if body.segmenter else []
+    for number in objects:
+        masks.follow(context, project_id, number)
     tell(context, project_id)
     return get_project(context, project_id)
+
+
+def _note(context: Context, session: Session, row: Project, action: str, text: str, after: dict[str, str]) -> None:
+    """Change fields of a project, with an event beside it."""
+    now = time.time()
+    event = Event(project_id=row.id, scope="project", action=action, text=text, who=context.settings.user, at=now)
+    event.before, event.after = {key: getattr(row, key) for key in after}, dict(after)
+    row.sqlmodel_update({**after, "updated": now})
+    session.add_all([row, event])
 
 
 def delete(context: Context, project_id: str) -> schemas.Deleted:
@@ -140,6 +157,7 @@ def shape(context: Context, session: Session, row: Project) -> schemas.Project:
         bundle=shown,
         thumbnail=f"/media/{row.id}/thumbnail.jpg?v={row.media_version}" if ready else None,
         size_bytes=_size(context.files(row).root, int(row.updated)),
+        segmenter=row.segmenter,
     )
 
 

@@ -215,6 +215,7 @@ def _shape(
         can_redo=bool(stacks.undone),
         segment=state,
         mask_frames=frames,
+        mask_backend=project.segmenter if frames else "",
         notices=[*notices, *_category_notice(item.category)],
         saved=saved or 0.0,
     )

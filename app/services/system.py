@@ -7,6 +7,8 @@ from app.errors import Forbidden, NotFound
 from app.files import free_bytes
 from app.services.context import Context
 from r2c2r_core import __version__
+from r2c2r_core.registry import Backend, Registry
+from r2c2r_core.segment.stage import SEGMENTERS
 
 PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
     "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00",
@@ -26,6 +28,7 @@ def describe(context: Context) -> schemas.SystemInfo:
         categories=_categories(),
         palette=PALETTE,
         viewer=context.viewer.enabled,
+        segmenters=[_backend(SEGMENTERS, backend) for backend in SEGMENTERS.backends],
     )
 
 
@@ -71,6 +74,18 @@ def _is_allowed(context: Context, path: Path) -> bool:
 def _entry(path: Path) -> schemas.FolderEntry:
     folder = path.is_dir()
     return schemas.FolderEntry(name=path.name, path=str(path), folder=folder, size=None if folder else path.stat().st_size)
+
+
+def _backend(registry: Registry, backend: Backend) -> schemas.Backend:
+    ready, reason = registry.available(backend.name)
+    return schemas.Backend(
+        name=backend.name,
+        summary=backend.summary,
+        licence=backend.licence,
+        licence_class=backend.licence_class,
+        available=ready,
+        reason="" if ready else reason,
+    )
 
 
 def _categories() -> list[schemas.Category]:

@@ -1,5 +1,15 @@
 // Generated from the app's OpenAPI document by `python -m app.openapi_types`. Do not edit.
 
+/** One way to do a stage's work. */
+export interface Backend {
+  name: string;
+  summary: string;
+  licence: string;
+  licence_class: "open" | "restricted";
+  available: boolean;
+  reason: string;
+}
+
 /** One finished bundle. */
 export interface Bundle {
   version: number;
@@ -340,6 +350,7 @@ export interface Project {
   bundle: Bundle | null;
   thumbnail: string | null;
   size_bytes: number;
+  segmenter: string;
 }
 
 /** What is in a project. */
@@ -350,9 +361,10 @@ export interface ProjectCounts {
   rejected: number;
 }
 
-/** A new name. */
-export interface ProjectRename {
-  name: string;
+/** What changes: its name, or which segmenter draws its masks. */
+export interface ProjectPatch {
+  name?: string | null;
+  segmenter?: string | null;
 }
 
 /** prompts.json. */
@@ -441,6 +453,7 @@ export interface SceneObject {
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
   mask_frames: number;
+  mask_backend: string;
   notices: string[];
   saved: number;
 }
@@ -478,6 +491,7 @@ export interface SystemInfo {
   categories: Category[];
   palette: string[];
   viewer: boolean;
+  segmenters: Backend[];
 }
 
 /** What to undo or redo: the last change of this object, or of any object when None. */
@@ -567,7 +581,7 @@ export interface Operations {
   /** GET /api/projects/{project} */
   getProject: { parameters: { project: string }; body: undefined; answer: Project };
   /** PATCH /api/projects/{project} */
-  renameProject: { parameters: { project: string }; body: ProjectRename; answer: Project };
+  changeProject: { parameters: { project: string }; body: ProjectPatch; answer: Project };
   /** GET /api/projects/{project}/bundles */
   listBundles: { parameters: { project: string }; body: undefined; answer: Bundle[] };
   /** GET /api/projects/{project}/candidates */

@@ -84,8 +84,8 @@ export const getProject = (id, signal) => get(of(id), signal);
 export const importPath = (path) => send("POST", "/api/projects/import", { path });
 /** @param {Partial<SampleRequest>} request @returns {Promise<Project>} */
 export const makeSample = (request) => send("POST", "/api/projects/sample", request);
-/** @param {string} id @param {string} name @returns {Promise<Project>} */
-export const renameProject = (id, name) => send("PATCH", of(id), { name });
+/** @param {string} id @param {{ name?: string, segmenter?: string }} patch @returns {Promise<Project>} */
+export const changeProject = (id, patch) => send("PATCH", of(id), patch);
 /** @param {string} id @returns {Promise<Deleted>} */
 export const deleteProject = (id) => send("DELETE", of(id));
 /** @param {string} id @returns {Promise<FrameInfo[]>} */

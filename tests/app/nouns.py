@@ -77,7 +77,7 @@ def track(name: str) -> MaskTrack:
         front=None,
         box=None,
         kind="front",
-        backend="fake",
+        backend="geometric",
         prompt_count=1,
         warnings=(),
     )

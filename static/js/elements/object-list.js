@@ -131,6 +131,9 @@ function state(object) {
   const clicks = counted(object.points.length, "click");
   if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
-  if (object.mask_frames) return `${clicks} · ${counted(object.mask_frames, "frame")}`;
+  if (object.mask_frames) {
+    const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
+    return h("span", {}, `${clicks} · ${counted(object.mask_frames, "frame")} `, drawn);
+  }
   return clicks;
 }

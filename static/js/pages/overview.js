@@ -1,8 +1,9 @@
 /** What the recording is, before any work starts; and where the project stands. */
 
-import { getProject, getHistory } from "../api.js";
-import { h, LiveElement } from "../dom.js";
+import { changeProject, getHistory, getProject, getSystem } from "../api.js";
+import { detailOf, h, LiveElement } from "../dom.js";
 import { JobPanel } from "../elements/job-panel.js";
+import { SegmenterChoice } from "../elements/segmenter-choice.js";
 import { sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
 import { ago, bytes, counted } from "../lib/format.js";
@@ -15,11 +16,16 @@ export class OverviewPage extends LiveElement {
   #body = h("div", { class: "page" });
   #job = new JobPanel();
   #viewer = new ViewerFrame();
+  #segmenter = new SegmenterChoice();
   #shown = false;
 
   connected() {
     this.replaceChildren(this.#body);
     const { signal } = this;
+    this.#segmenter.addEventListener("choose", (event) => this.#choose(/** @type {string} */ (detailOf(event))), {
+      signal,
+    });
+    getSystem().then((system) => (this.#segmenter.backends = system.segmenters), sayError);
     live.addEventListener("project", () => this.#load(), { signal });
     live.addEventListener("job", () => this.#load(), { signal });
     this.#load();
@@ -33,9 +39,20 @@ export class OverviewPage extends LiveElement {
     }
   }
 
+  /** @param {string} segmenter */
+  async #choose(segmenter) {
+    try {
+      this.#draw(await changeProject(this.project, { segmenter }));
+    } catch (error) {
+      sayError(error);
+      this.#load();
+    }
+  }
+
   /** @param {Project} project */
   #draw(project) {
     if (project.id !== this.project) return;
+    this.#segmenter.chosen = project.segmenter;
     this.#job.job = project.status === "ready" ? null : project.job;
     const capture = project.capture;
     this.#body.replaceChildren(
@@ -44,7 +61,12 @@ export class OverviewPage extends LiveElement {
         ? ""
         : h("section", { class: "card stack" }, h("h2", {}, "Importing"), failure(project), this.#job),
       capture && project.status === "ready"
-        ? h("div", { class: "split" }, this.#facts(project, capture), this.#cloud())
+        ? h(
+            "div",
+            { class: "split" },
+            h("div", { class: "stack" }, this.#facts(project, capture), this.#segmenter),
+            this.#cloud(),
+          )
         : "",
       h("section", { class: "stack" }, h("h2", {}, "History"), this.#history()),
     );

@@ -1,12 +1,12 @@
 /** All projects; import by upload, drop or path; the sample kitchen. */
 
 import {
+  changeProject,
   deleteProject,
   getSystem,
   importPath,
   listProjects,
   makeSample,
-  renameProject,
   uploadRecording,
 } from "../api.js";
 import { detailOf, h, icon, LiveElement } from "../dom.js";
@@ -188,7 +188,7 @@ export class ProjectsPage extends LiveElement {
   async #rename(project) {
     const name = prompt("Name of the project", project.name)?.trim();
     if (!name || name === project.name) return;
-    await renameProject(project.id, name).catch(sayError);
+    await changeProject(project.id, { name }).catch(sayError);
     this.#load();
   }
 

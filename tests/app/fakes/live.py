@@ -1,4 +1,4 @@
-"""A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N`.
+"""A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
 A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded.
 """
@@ -7,6 +7,7 @@ import json
 import sys
 import threading
 import time
+from pathlib import Path
 from queue import Empty, Queue
 
 import numpy as np
@@ -37,6 +38,7 @@ def main() -> None:
         commands.put(None)
 
     threading.Thread(target=read, daemon=True).start()
+    Path(sys.argv[1], "live_options.txt").write_text(" ".join(sys.argv[2:]))
     say(state="preparing", fraction=0.5, text="halfway")
     say(state="ready", total=3)
     while (command := commands.get()) is not None:
@@ -59,7 +61,8 @@ def main() -> None:
             except Empty:
                 continue
             commands.put(newer)
-            break
+            if newer is None or newer["object"] == number:
+                break
         else:
             say(object=number, key=key, end="done")
 
