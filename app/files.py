@@ -34,6 +34,11 @@ class ProjectFiles:
         return self.root / "masks"
 
     @property
+    def proposals(self) -> Path:
+        """What the segmenter proposed without a click; may be deleted at any time."""
+        return self.root / "proposals.json"
+
+    @property
     def uploads(self) -> Path:
         """Meshes people gave as candidates."""
         return self.root / "uploads"

@@ -96,7 +96,7 @@ class Event(SQLModel, table=True):
     id: int | None = Field(default=None, primary_key=True)
     project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
     object_id: int | None = None
-    scope: str  # prompts | review | project
+    scope: str  # prompts | review | proposals | project
     action: str  # add point, rename … | undo | redo
     text: str  # one line for a person
     frame: int | None = None

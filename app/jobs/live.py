@@ -1,6 +1,7 @@
 """One live segmenter process per project: started on demand, stopped when idle, fed with clicks, its masks kept and shown."""
 
 import contextlib
+import json
 import logging
 import queue
 import threading
@@ -18,6 +19,7 @@ from app.jobs.mask_store import MaskFile, mask_path
 from app.jobs.plans import Commands
 from app.process import Worker
 from app.settings import Settings
+from r2c2r_core.workspace import write_atomically
 
 _log = logging.getLogger(__name__)
 
@@ -48,6 +50,9 @@ class _Session:
     total: int = 0
     used: float = field(default_factory=time.monotonic)
     tasks: dict[int, _Task] = field(default_factory=dict)
+    proposals_path: Path | None = None  # where proposals go; None when they are there already
+    proposals: list[dict[str, Any]] = field(default_factory=list)
+    proposed: float = 0.0  # share of the work of proposing
 
 
 class LiveSegmenters:
@@ -70,6 +75,7 @@ class LiveSegmenters:
             options = ("--width", str(self._settings.preview_width), "--segmenter", segmenter)
             command = (*self._commands.live, str(files.work), *options)
             session = _Session(project, Worker(command, files.root / "logs" / "live.log"))
+            session.proposals_path = None if files.proposals.is_file() else files.proposals
             self._sessions[project] = session
             self._ended.pop(project, None)
         threading.Thread(target=self._follow, args=(session,), name=f"live-{project}", daemon=True).start()
@@ -93,6 +99,14 @@ class LiveSegmenters:
             if session.state == "ready":
                 self._send(session, number)
         self._tell_segment(session, number, restart=True)
+
+    def proposing(self, project: str) -> tuple[float, list[dict[str, Any]]] | None:
+        """The share of the work of proposing that is done, and what came of it; None when nobody is at it."""
+        with self._lock:
+            session = self._sessions.get(project)
+            if session is None or session.proposals_path is None:
+                return None
+            return session.proposed, list(session.proposals)
 
     def cancel(self, project: str, number: int) -> None:
         """Stop computing the object's masks; those there stay."""
@@ -153,6 +167,9 @@ class LiveSegmenters:
         if "state" in line:
             self._take_state(session, line)
             return
+        if "proposals" in line:
+            self._take_proposals(session, line)
+            return
         number = int(line["object"])
         with self._lock:
             task = session.tasks.get(number)
@@ -183,7 +200,21 @@ class LiveSegmenters:
                 for number in list(session.tasks):
                     if session.tasks[number].state == "waiting":
                         self._send(session, number)
+                if session.proposals_path is not None:
+                    session.worker.say({"cmd": "propose"})
         self._tell_status(session)
+
+    def _take_proposals(self, session: _Session, line: dict[str, Any]) -> None:
+        with self._lock:
+            session.used = time.monotonic()
+            grown = len(line["proposals"]) != len(session.proposals)
+            session.proposals, session.proposed = line["proposals"], float(line["fraction"])
+            done = session.proposed >= 1.0
+            if done and session.proposals_path is not None:
+                if "error" not in line:
+                    write_atomically(session.proposals_path, json.dumps(session.proposals).encode())
+                session.proposals_path = None
+        self._hub.publish("proposals", session.project, fraction=session.proposed, changed=grown or done)
 
     def _send(self, session: _Session, number: int) -> None:
         task = session.tasks[number]
@@ -200,6 +231,7 @@ class LiveSegmenters:
     def _idle(self, session: _Session) -> bool:
         with self._lock:
             working = any(task.state in ("waiting", "running") for task in session.tasks.values())
+            working = working or session.proposals_path is not None
             return session.state == "ready" and not working and time.monotonic() - session.used > self._settings.live_idle_s
 
     def _gone(self, session: _Session) -> None:

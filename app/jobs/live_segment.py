@@ -1,10 +1,11 @@
 """The live segmenter of one project, in a process of its own: `python -m app.jobs.live_segment WORKDIR --width 960
 --segmenter geometric`.
 
-Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · end of input stops it.
+Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · {"cmd": "propose"} · end of
+input stops it.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
 {"object", "key", "frame", "confidence", "mask"} (the clicked frame first) and {"object", "key", "end"}. The newest click
-goes first; the objects it interrupted go on afterwards.
+goes first; the objects it interrupted go on afterwards. Proposals, {"proposals": [...], "fraction"}, wait until no click does.
 """
 
 import argparse
@@ -18,9 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from app.jobs.mask_wire import mask_bits
+from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.progress import Progress
 from r2c2r_core.segment.prompts import check_prompt, parse_prompts
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
@@ -62,12 +65,13 @@ class Desk:
         self.session, self.capture, self.width = session, capture, width
         self.total = len(capture.frames)
         self._open: dict[int, tuple[str, Iterator[tuple[int, PackedMask, float]]]] = {}
+        self._proposing: Iterator[tuple[float, tuple[Proposal, ...]]] | None = None
 
     def answer(self, commands: Commands) -> None:
         """Take commands when there are any, else compute one more mask."""
         while True:
             try:
-                command = commands.get(block=not self._open)
+                command = commands.get(block=not self._open and self._proposing is None)
             except queue.Empty:
                 self._step()
                 continue
@@ -76,6 +80,9 @@ class Desk:
             self._take(command)
 
     def _take(self, command: dict[str, Any]) -> None:
+        if command["cmd"] == "propose":
+            self._proposing = self._proposing or self.session.propose()
+            return
         number = int(command["object"])
         stopped = self._open.pop(number, None)
         if command["cmd"] == "cancel":
@@ -91,6 +98,25 @@ class Desk:
             _fail(number, key, error)
 
     def _step(self) -> None:
+        if self._open:
+            self._segment_step()
+        else:
+            self._propose_step()
+
+    def _propose_step(self) -> None:
+        assert self._proposing is not None
+        try:
+            fraction, found = next(self._proposing)
+        except StopIteration:
+            self._proposing = None
+        except Exception as error:  # clicks go on working without proposals
+            traceback.print_exc()
+            self._proposing = None
+            _say(proposals=[], fraction=1.0, error=f"no proposals: {error}")
+        else:
+            _say(proposals=[proposal_line(proposal, self.width) for proposal in found], fraction=round(fraction, 3))
+
+    def _segment_step(self) -> None:
         number, (key, masks) = next(reversed(self._open.items()))
         try:
             frame, packed, confidence = next(masks)

@@ -6,6 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 
 
@@ -21,6 +22,12 @@ def mask_bits(packed: PackedMask, preview_width: int) -> dict[str, Any]:
         "box_height": small.box_height,
         "bits": base64.b64encode(small.bits).decode(),
     }
+
+
+def bits_mask(bits: dict[str, Any]) -> Mask:
+    """The boolean mask, at preview size, of schemas.MaskBits."""
+    shape = {key: bits[key] for key in ("width", "height", "left", "top", "box_width", "box_height")}
+    return unpack_mask(PackedMask(**shape, bits=base64.b64decode(bits["bits"]), area_px=0))
 
 
 def _shrunk(packed: PackedMask, width: int) -> PackedMask:

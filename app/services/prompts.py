@@ -32,8 +32,10 @@ def list_objects(context: Context, project_id: str, deleted: bool) -> list[schem
         return [_shape(context, session, project, item, stacks.get(item.id, empty)) for item in session.exec(query)]
 
 
-def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
-    """A new object, with its first clicks if there are any."""
+def create(
+    context: Context, project_id: str, body: schemas.ObjectIn, infer: bool, *, what: str = "added"
+) -> schemas.SceneObject:
+    """A new object, with its first clicks if there are any; `what` was done, as the history says it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         for point in body.points:
@@ -45,7 +47,7 @@ def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: boo
         session.add(item)
         session.flush()
         frame = body.points[0].frame if body.points else None
-        with history.change(session, item, "prompts", "create", f"added {name}", who=context.settings.user, frame=frame):
+        with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.settings.user, frame=frame):
             item.deleted = False
             session.add(item)
             session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)

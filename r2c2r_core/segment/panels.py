@@ -1,6 +1,6 @@
 """Panels of a run that look like fronts: closed by lines on four sides, flat, of a usual size, with a handle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,9 @@ _DARK_LIGHTNESS = 60.0  # of 255
 _SMALLEST_M = 0.09
 _CORNER_M = 0.06  # how exactly a side starts where a front ends
 _DEEPEST_M = 0.8  # of a carcass
+_ROW_M = 0.03  # how exactly the fronts of a row line up
+_MATE_WORTH = 0.5  # how much a sure front beside it says for a panel
+_SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
 _NO_POINTS = np.zeros((0, 3))
 _EQUAL_DOORS_M = 0.006  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
 
@@ -27,6 +30,7 @@ class Panel:
     front: Front
     category: str
     confidence: float
+    usual: float = 1.0  # 0..1: how usual its size is where it is; part of the confidence
 
     @property
     def run(self) -> Run:
@@ -65,7 +69,7 @@ def find_panels(run: Run, room: Room) -> list[Panel]:
             mates.append(mate)
         if panel is not None:
             found.append(panel)
-    return found
+    return [_beside(panel, [other for other in found if other is not panel]) for panel in found]
 
 
 def without_sides(panels: list[Panel]) -> list[Panel]:
@@ -98,7 +102,34 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
         pair=pair,
     )
     category, usual = name_front(look)
-    return Panel(front, category, usual * _evidence(front, area, room))
+    return Panel(front, category, usual * _evidence(front, area, room), usual)
+
+
+def _beside(panel: Panel, others: list[Panel]) -> Panel:
+    """The panel in the light of its run: fronts stand in rows and stacks, and small flat things stand alone."""
+    slack = _ROW_M / panel.run.grid.cell_m
+    mates = [other for other in others if _aligned(panel.front.cell, other.front.cell, slack) and other.usual > 0.5]
+    category = panel.category
+    if category == "dishwasher" and not _odd_one_out(mates):
+        category = "cabinet"
+    if mates:
+        best = max(other.confidence for other in mates)
+        unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - _MATE_WORTH * best)
+        return replace(panel, category=category, confidence=panel.usual * (1 - unsure))
+    alone = _ALONE_WORTH if _area(panel) < _SMALL_M2 else 1.0
+    return replace(panel, category=category, confidence=alone * panel.confidence)
+
+
+def _aligned(a: Cell, b: Cell, slack: float) -> bool:
+    """Whether two panels stand in one row, or above each other."""
+    in_row = abs(a.top - b.top) < slack and abs(a.bottom - b.bottom) < slack
+    return in_row or (abs(a.left - b.left) < slack and abs(a.right - b.right) < slack)
+
+
+def _odd_one_out(mates: list[Panel]) -> bool:
+    """Whether the doors beside a lying handle carry upright ones: a machine among cupboards."""
+    handles = [mate.front.handle for mate in mates if mate.category in ("cabinet", "dishwasher")]
+    return bool(handles) and all(handle is not None and handle.height > 1.8 * handle.width for handle in handles)
 
 
 def outlined(front: Front) -> float:

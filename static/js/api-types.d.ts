@@ -388,6 +388,33 @@ export interface PromptsFilePoint {
   label: 0 | 1;
 }
 
+/** An object that nobody clicked yet; confirming it adds this click under this category. */
+export interface Proposal {
+  id: string;
+  kind: "front" | "appliance" | "thing";
+  category: string;
+  confidence: number;
+  frame: number;
+  x: number;
+  y: number;
+  size_m: number[];
+  outline: [number, number][];
+  handle: [number, number][];
+}
+
+/** Which proposals are meant. */
+export interface ProposalIds {
+  ids: string[];
+}
+
+/** What is proposed now: dismissed ones and those that became objects are left out. */
+export interface Proposals {
+  state: "none" | "running" | "done";
+  fraction: number;
+  items: Proposal[];
+  dismissed: number;
+}
+
 /** The object after a verdict or a correction, and the job that follows from it. */
 export interface Reviewed {
   group: CandidateGroup | null;
@@ -632,6 +659,14 @@ export interface Operations {
   exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFile };
   /** POST /api/projects/{project}/prompts.json */
   importPrompts: { parameters: { project: string }; body: PromptsFile; answer: SceneObject[] };
+  /** GET /api/projects/{project}/proposals */
+  getProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
+  /** POST /api/projects/{project}/proposals/confirm */
+  confirmProposals: { parameters: { project: string }; body: ProposalIds; answer: SceneObject[] };
+  /** POST /api/projects/{project}/proposals/dismiss */
+  dismissProposals: { parameters: { project: string }; body: ProposalIds; answer: Proposals };
+  /** POST /api/projects/{project}/proposals/restore */
+  restoreProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
   /** POST /api/projects/{project}/redo */
   redo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
   /** POST /api/projects/{project}/run */

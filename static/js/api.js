@@ -1,7 +1,7 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane,
+ *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
  *   Bundle, ViewerSession, ViewerShown, ViewerShow, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest
  * } from "./api-types" */
@@ -162,6 +162,15 @@ export const openLive = (id) => send("POST", `${of(id)}/live/open`);
 export const getLanes = (id) => get(`${of(id)}/lanes`);
 /** @param {string} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<FrameMask[]>} */
 export const getMasks = (id, frame, signal) => get(`${of(id)}/masks/${frame}`, signal);
+
+/** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Proposals>} */
+export const getProposals = (id, signal) => get(`${of(id)}/proposals`, signal);
+/** @param {string} id @param {string[]} ids @returns {Promise<SceneObject[]>} */
+export const confirmProposals = (id, ids) => send("POST", `${of(id)}/proposals/confirm`, { ids });
+/** @param {string} id @param {string[]} ids @returns {Promise<Proposals>} */
+export const dismissProposals = (id, ids) => send("POST", `${of(id)}/proposals/dismiss`, { ids });
+/** @param {string} id @returns {Promise<Proposals>} */
+export const restoreProposals = (id) => send("POST", `${of(id)}/proposals/restore`);
 
 /** @param {string} id @param {Partial<RunRequest>} [request] @returns {Promise<Job>} */
 export const startRun = (id, request) => send("POST", `${of(id)}/run`, request ?? {});

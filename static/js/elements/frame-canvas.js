@@ -5,12 +5,14 @@
 
 import { h, LiveElement } from "../dom.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
+import { drawOutline } from "../lib/outlines.js";
 import { fit, toImage, toScreen, zoom } from "../lib/view.js";
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {import("../api-types").Point} Point */
 /** @typedef {{ object: number, colour: [number, number, number], mask: MaskBits, current: boolean }} Layer */
 /** @typedef {Point & { colour: string, number: number, object: number, current: boolean }} Marker */
+/** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
 const GRIP_PX = 11;
 
@@ -26,6 +28,8 @@ export class FrameCanvas extends LiveElement {
   #painted = [];
   /** @type {Marker[]} */
   #markers = [];
+  /** @type {Outline[]} */
+  #outlines = [];
   /** @type {{ x: number, y: number } | null} */
   #crosshair = null;
   /** @type {{ marker: Marker | null, x: number, y: number, pan: boolean, moved: boolean } | null} */
@@ -89,6 +93,12 @@ export class FrameCanvas extends LiveElement {
     this.draw();
   }
 
+  /** @param {Outline[]} outlines of what is proposed */
+  setOutlines(outlines) {
+    this.#outlines = outlines;
+    this.draw();
+  }
+
   fit() {
     this.#view = fit(this.#size, { width: Math.max(this.clientWidth, 1), height: Math.max(this.clientHeight, 1) });
     this.#fitted = true;
@@ -131,6 +141,7 @@ export class FrameCanvas extends LiveElement {
       const step = (this.#size.width / box.width) * scale; // masks come at preview size
       context.drawImage(bitmap, x + box.left * step, y + box.top * step, box.box_width * step, box.box_height * step);
     }
+    for (const outline of this.#outlines) drawOutline(context, this.#view, outline);
     for (const marker of this.#markers) this.#drawMarker(context, marker);
     if (this.#crosshair) this.#drawCrosshair(context, toScreen(this.#view, this.#crosshair));
   }

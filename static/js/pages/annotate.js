@@ -21,6 +21,7 @@ import { detailOf, h, icon, isTyping, LiveElement } from "../dom.js";
 import { FilmStrip } from "../elements/film-strip.js";
 import { FrameCanvas } from "../elements/frame-canvas.js";
 import { ObjectList } from "../elements/object-list.js";
+import { ProposalList } from "../elements/proposal-list.js";
 import { say, sayError } from "../elements/toasts.js";
 import { actionOf } from "../lib/keymap.js";
 import { rgbOf } from "../lib/masks.js";
@@ -41,6 +42,7 @@ export class AnnotatePage extends LiveElement {
   #canvas = new FrameCanvas();
   #strip = new FilmStrip();
   #list = new ObjectList();
+  #proposals = new ProposalList();
   #status = h("span", { class: "chip", role: "status" });
   #saved = h("span", { class: "chip", role: "status" });
   #tip = h("div", { class: "tip" });
@@ -77,6 +79,7 @@ export class AnnotatePage extends LiveElement {
 
   connected() {
     const undo = h("button", { type: "button", class: "quiet", "aria-label": "Undo" }, icon("undo"));
+    this.#proposals.project = this.project;
     const redo = h("button", { type: "button", class: "quiet", "aria-label": "Redo" }, icon("redo"));
     undo.addEventListener("click", () => this.#undoRedo("undo"));
     redo.addEventListener("click", () => this.#undoRedo("redo"));
@@ -97,6 +100,7 @@ export class AnnotatePage extends LiveElement {
             h("label", { class: "grow" }, h("span", { class: "muted" }, "Masks"), this.#opacity),
           ),
           this.#list,
+          this.#proposals,
           h("a", { class: "button primary", href: `/p/${this.project}/run` }, "Run…"),
         ),
         h("div", { class: "stage" }, this.#canvas, h("div", { class: "status" }, this.#status, this.#saved), this.#tip),
@@ -123,6 +127,9 @@ export class AnnotatePage extends LiveElement {
     on(this.#list, "delete", (id) => this.#delete(id));
     on(this.#list, "rename", ({ id, name, version }) => this.#patch(id, { name, version }));
     on(this.#list, "categorise", ({ id, category, version }) => this.#patch(id, { category, version }));
+    on(this.#proposals, "proposals-changed", () => this.#drawProposals());
+    on(this.#proposals, "show-frame", (index) => this.#seek(this.#frames.findIndex((frame) => frame.index === index)));
+    on(this.#proposals, "objects-made", (objects) => this.#adopt(objects));
     on(live, "object", ({ object }) => object.project === this.project && this.#store(object));
     on(live, "mask", (mask) => this.#receive(mask));
     on(live, "segment", (message) => this.#segment(message));
@@ -269,6 +276,10 @@ export class AnnotatePage extends LiveElement {
     this.#later();
   }
 
+  #drawProposals() {
+    this.#canvas.setOutlines(this.#frame ? this.#proposals.outlinesOn(this.#frame.index) : []);
+  }
+
   #drawMasks() {
     const frame = this.#frame;
     if (!frame) return;
@@ -387,6 +398,13 @@ export class AnnotatePage extends LiveElement {
     this.#draw();
   }
 
+  /** @param {SceneObject[]} objects confirmed just now: the next click starts a new object */
+  #adopt(objects) {
+    for (const object of objects) this.#objects.set(object.id, object);
+    this.#select(null);
+    this.#saved.textContent = `saved ${new Date().toLocaleTimeString()}`;
+  }
+
   /** @param {number | null} id */
   #select(id) {
     this.#current = id !== null && this.#objects.has(id) ? id : null;
@@ -440,6 +458,7 @@ export class AnnotatePage extends LiveElement {
     }
     this.#drawLanes();
     this.#drawMasks();
+    this.#drawProposals();
   }
 
   #drawLanes() {
@@ -498,6 +517,11 @@ export class AnnotatePage extends LiveElement {
     undo: () => this.#undoRedo("undo"),
     redo: () => this.#undoRedo("redo"),
     "delete-point": () => this.#deleteLast(),
+    "confirm-proposal": () => this.#proposals.confirm(),
+    "dismiss-proposal": () => this.#proposals.dismiss(),
+    "next-proposal": () => this.#proposals.move(1),
+    "previous-proposal": () => this.#proposals.move(-1),
+    "confirm-all": () => this.#proposals.confirmAll(),
     hide: () => this.#current !== null && this.#toggle(this.#current),
     solo: () => this.#solo(),
     raw: () => this.#raw(true),

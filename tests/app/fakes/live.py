@@ -1,6 +1,7 @@
 """A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
-A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded.
+A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded. Two drawers and a bottle
+are proposed.
 """
 
 import json
@@ -16,6 +17,7 @@ from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.masks import pack_mask
 
 FRAMES = (3, 0, 7)
+PROPOSED = (("front", "drawer", 0.95, 30.5), ("front", "drawer", 0.9, 60.5), ("thing", "bottle", 0.4, 100.5))
 
 
 def say(**message: object) -> None:
@@ -27,6 +29,27 @@ def rectangle(x: float, y: float) -> dict[str, object]:
     mask = np.zeros((120, 160), bool)
     mask[max(int(y) - 5, 0) : int(y) + 5, max(int(x) - 5, 0) : int(x) + 5] = True
     return mask_bits(pack_mask(mask), 160)
+
+
+def propose() -> None:
+    found = [
+        {
+            "id": f"proposal{k}",
+            "kind": kind,
+            "category": category,
+            "confidence": confidence,
+            "frame": 3,
+            "x": x,
+            "y": 60.5,
+            "size_m": [0.5, 0.58, 0.2],
+            "outline": [[x - 5, 55.5], [x + 5, 55.5], [x + 5, 65.5], [x - 5, 65.5]],
+            "handle": [],
+            "mask": rectangle(x, 60.5),
+        }
+        for k, (kind, category, confidence, x) in enumerate(PROPOSED)
+    ]
+    say(proposals=found[:1], fraction=0.5)
+    say(proposals=found, fraction=1.0)
 
 
 def main() -> None:
@@ -42,6 +65,8 @@ def main() -> None:
     say(state="preparing", fraction=0.5, text="halfway")
     say(state="ready", total=3)
     while (command := commands.get()) is not None:
+        if command["cmd"] == "propose":
+            propose()
         if command["cmd"] != "segment":
             continue
         number, key, point = command["object"], command["key"], command["prompt"]["points"][0]
@@ -61,7 +86,7 @@ def main() -> None:
             except Empty:
                 continue
             commands.put(newer)
-            if newer is None or newer["object"] == number:
+            if newer is None or newer.get("object") == number:
                 break
         else:
             say(object=number, key=key, end="done")

@@ -70,7 +70,7 @@ def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Propo
         masks = {name: masks[proposal.click.frame] for name, masks in boxes[1].items()}
         own = name_of(proposal, boxes[1])
         for name, mask in masks.items():
-            assert is_taken(proposal, [mask]) == (name == own)
+            assert is_taken(unpack_mask(proposal.outline), [mask]) == (name == own)
 
 
 def bar(width: float, height: float) -> GridHandle:

@@ -1,0 +1,53 @@
+"""Proposals as they go over the wire and lie in the project's folder."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app.jobs.mask_wire import mask_bits
+from r2c2r_core.arrays import Mask
+from r2c2r_core.geometry.masks import unpack_mask
+from r2c2r_core.model.proposal import Proposal
+
+_SMOOTH = 0.002  # of the frame's width: how far the drawn outline may leave the mask's border
+
+
+def proposal_line(proposal: Proposal, preview_width: int) -> dict[str, Any]:
+    """schemas.Proposal, and its mask at preview size under "mask"."""
+    click = proposal.click
+    content = json.dumps([click.frame, click.x, click.y])
+    return {
+        "id": hashlib.sha256(content.encode()).hexdigest()[:12],
+        "kind": proposal.kind,
+        "category": proposal.category,
+        "confidence": proposal.confidence,
+        "frame": click.frame,
+        "x": click.x,
+        "y": click.y,
+        "size_m": [round(float(side), 3) for side in proposal.size_m],
+        "outline": _outline(unpack_mask(proposal.outline)),
+        "handle": [list(corner) for corner in proposal.handle_px],
+        "mask": mask_bits(proposal.outline, preview_width),
+    }
+
+
+def read_proposals(path: Path) -> list[dict[str, Any]] | None:
+    """The lines stored in a file; None when there are none, or only half a file."""
+    try:
+        lines: list[dict[str, Any]] = json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return None
+    return lines
+
+
+def _outline(mask: Mask) -> list[list[float]]:
+    """The border of the mask's largest part, in pixels of the frame."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    if not contours:
+        return []
+    border = cv2.approxPolyDP(max(contours, key=cv2.contourArea), _SMOOTH * mask.shape[1], closed=True)
+    return [[float(x) + 0.5, float(y) + 0.5] for x, y in border[:, 0]]

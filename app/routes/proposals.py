@@ -1,0 +1,33 @@
+"""Objects proposed without a click."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.services import proposals
+
+router = APIRouter(prefix="/api/projects/{project}/proposals", tags=["proposals"])
+
+
+@router.get("", operation_id="getProposals")
+def get_proposals(context: Ctx, project: str) -> schemas.Proposals:
+    """What is proposed now, surest first."""
+    return proposals.current(context, project)
+
+
+@router.post("/confirm", operation_id="confirmProposals", status_code=201)
+def confirm_proposals(context: Ctx, project: str, body: schemas.ProposalIds) -> list[schemas.SceneObject]:
+    """Make objects of them; undo takes each back."""
+    return proposals.confirm(context, project, body.ids)
+
+
+@router.post("/dismiss", operation_id="dismissProposals")
+def dismiss_proposals(context: Ctx, project: str, body: schemas.ProposalIds) -> schemas.Proposals:
+    """Leave them out from now on."""
+    return proposals.dismiss(context, project, body.ids)
+
+
+@router.post("/restore", operation_id="restoreProposals")
+def restore_proposals(context: Ctx, project: str) -> schemas.Proposals:
+    """Bring all dismissed ones back."""
+    return proposals.restore(context, project)

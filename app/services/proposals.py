@@ -1,0 +1,127 @@
+"""Objects proposed without a click: confirmed ones become objects like any other, dismissals are remembered as events."""
+
+import time
+from typing import Any
+
+import numpy as np
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading, writing
+from app.db.tables import Event
+from app.errors import NotFound
+from app.jobs.mask_wire import bits_mask
+from app.jobs.proposal_wire import read_proposals
+from app.services import masks, prompts
+from app.services.context import Context
+from r2c2r_core.segment.proposals import is_taken
+
+_SCOPE = "proposals"
+
+
+def current(context: Context, project_id: str) -> schemas.Proposals:
+    """What is proposed now."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        gone = _dismissed(session, project_id)
+    at_work = context.live.proposing(project_id)
+    stored = read_proposals(context.files(project).proposals) if at_work is None else None
+    lines = at_work[1] if at_work is not None else stored or []
+    left = _without_objects(context, project_id, lines)
+    return schemas.Proposals(
+        state="running" if at_work is not None else "none" if stored is None else "done",
+        fraction=at_work[0] if at_work is not None else float(stored is not None),
+        items=[_shape(line) for line in left if line["id"] not in gone],
+        dismissed=sum(line["id"] in gone for line in left),
+    )
+
+
+def confirm(context: Context, project_id: str, ids: list[str]) -> list[schemas.SceneObject]:
+    """Make objects of proposals: each its click, under its category."""
+    items = {item.id: item for item in current(context, project_id).items}
+    wanted = [_known(items, proposal) for proposal in dict.fromkeys(ids)]
+    made = [
+        prompts.create(
+            context,
+            project_id,
+            schemas.ObjectIn(category=item.category, points=[schemas.PointIn(frame=item.frame, x=item.x, y=item.y, label=1)]),
+            infer=True,
+            what="confirmed proposal",
+        )
+        for item in wanted
+    ]
+    _tell(context, project_id)
+    return made
+
+
+def dismiss(context: Context, project_id: str, ids: list[str]) -> schemas.Proposals:
+    """Leave proposals out from now on."""
+    items = {item.id: item for item in current(context, project_id).items}
+    wanted = [_known(items, proposal) for proposal in dict.fromkeys(ids)]
+    with writing(context.engine) as session:
+        for item in wanted:
+            text = f"dismissed a proposed {item.category}, frame {item.frame}"
+            session.add(_event(context, project_id, "dismiss", text, item.frame, {"proposal": item.id}))
+    _tell(context, project_id)
+    return current(context, project_id)
+
+
+def restore(context: Context, project_id: str) -> schemas.Proposals:
+    """Bring all dismissed proposals back."""
+    with writing(context.engine) as session:
+        queries.project_row(session, project_id)
+        if _dismissed(session, project_id):
+            session.add(_event(context, project_id, "restore", "brought dismissed proposals back", None, None))
+    _tell(context, project_id)
+    return current(context, project_id)
+
+
+def _known(items: dict[str, schemas.Proposal], proposal: str) -> schemas.Proposal:
+    if proposal not in items:
+        raise NotFound(f"no proposal {proposal}", hint="it may have been confirmed or dismissed meanwhile")
+    return items[proposal]
+
+
+def _event(context: Context, project_id: str, action: str, text: str, frame: int | None, after: dict[str, Any] | None) -> Event:
+    event = Event(project_id=project_id, scope=_SCOPE, action=action, text=text, who=context.settings.user, at=time.time())
+    event.frame, event.after = frame, after
+    return event
+
+
+def _dismissed(session: Session, project_id: str) -> set[str]:
+    query = select(Event).where(Event.project_id == project_id, Event.scope == _SCOPE).order_by(col(Event.id))
+    gone: set[str] = set()
+    for event in session.exec(query):
+        if event.action == "restore":
+            gone.clear()
+        else:
+            gone.add(str((event.after or {})["proposal"]))
+    return gone
+
+
+def _without_objects(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The proposals that no object covers, whether it was confirmed or clicked."""
+    objects = prompts.list_objects(context, project_id, deleted=False)
+    clicks = {(point.frame, point.x, point.y) for item in objects for point in item.points if point.label}
+    shown: dict[int, list[np.ndarray]] = {}
+    left = []
+    for line in lines:
+        frame = line["frame"]
+        if (frame, line["x"], line["y"]) in clicks:
+            continue
+        if frame not in shown:
+            shown[frame] = [bits_mask(mask.mask.model_dump()) for mask in masks.on_frame(context, project_id, frame)]
+        outline = bits_mask(line["mask"])
+        if not is_taken(outline, [mask for mask in shown[frame] if mask.shape == outline.shape]):
+            left.append(line)
+    return left
+
+
+def _shape(line: dict[str, Any]) -> schemas.Proposal:
+    return schemas.Proposal(**{key: value for key, value in line.items() if key != "mask"})
+
+
+def _tell(context: Context, project_id: str) -> None:
+    at_work = context.live.proposing(project_id)
+    context.hub.publish("proposals", project_id, fraction=at_work[0] if at_work else 1.0, changed=True)

@@ -1,0 +1,242 @@
+/**
+ * What the segmenter found by itself, to confirm or dismiss. Emits "proposals-changed" (draw them anew), "show-frame" frame,
+ * "objects-made" SceneObject[]. The page asks for the outlines of a frame with `outlinesOn`.
+ */
+
+import { confirmProposals, dismissProposals, getProposals, restoreProposals } from "../api.js";
+import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { counted } from "../lib/format.js";
+import { neighbour, surest } from "../lib/proposals.js";
+import { live } from "../live.js";
+import { say, sayError } from "./toasts.js";
+
+/** @typedef {import("../api-types").Proposal} Proposal */
+/** @typedef {import("../api-types").Proposals} Proposals */
+/** @typedef {import("../api-types").SceneObject} SceneObject */
+
+const KINDS = { front: "front", appliance: "appliance", thing: "free-standing" };
+const SOON_MS = 400;
+
+export class ProposalList extends LiveElement {
+  project = "";
+  /** @type {Proposals} */
+  #all = { state: "none", fraction: 0, items: [], dismissed: 0 };
+  /** @type {string | null} */
+  #current = null;
+  #heading = h("h2", {}, "Proposals");
+  #progress = h("progress", { max: 1, value: 0, "aria-label": "Looking for objects" });
+  #note = h("p", { class: "muted", role: "status" });
+  #list = h("ul", { class: "proposal-list" });
+  #least = h(
+    "select",
+    { "aria-label": "Least confidence" },
+    ...[95, 90, 80, 70, 50].map((percent) => h("option", { value: String(percent / 100) }, `${percent} %`)),
+  );
+  #every = h("button", { type: "button" });
+  #bulk = h("div", { class: "row" }, this.#every, h("span", { class: "muted" }, "from"), this.#least);
+  #restore = h("button", { type: "button", class: "quiet" });
+  #timer = 0;
+  #busy = false;
+
+  connected() {
+    this.#least.value = "0.8";
+    this.replaceChildren(
+      h(
+        "section",
+        { class: "proposals", "aria-label": "Proposals" },
+        this.#heading,
+        this.#progress,
+        this.#note,
+        this.#bulk,
+        this.#list,
+        this.#restore,
+      ),
+    );
+    const { signal } = this;
+    this.#least.addEventListener("change", () => this.#draw(), { signal });
+    this.#every.addEventListener("click", () => this.confirmAll(), { signal });
+    this.#restore.addEventListener(
+      "click",
+      () => this.#act(async () => this.#take(await restoreProposals(this.project))),
+      {
+        signal,
+      },
+    );
+    live.addEventListener("proposals", (event) => this.#told(detailOf(event)), { signal });
+    live.addEventListener("object", () => this.#soon(), { signal });
+    live.addEventListener("hello", (event) => detailOf(event).reset && this.#soon(), { signal });
+    signal.addEventListener("abort", () => clearTimeout(this.#timer));
+    this.#draw();
+    this.load();
+  }
+
+  async load() {
+    if (!this.project) return;
+    try {
+      this.#take(await getProposals(this.project, this.signal));
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** @param {number} frame */
+  outlinesOn(frame) {
+    return this.#all.items
+      .filter((item) => item.frame === frame)
+      .map((item) => ({
+        points: item.outline,
+        handle: item.handle,
+        label: `${item.category} ${percent(item)}`,
+        current: item.id === this.#current,
+      }));
+  }
+
+  /** @param {1 | -1} step */
+  move(step) {
+    this.#show(neighbour(this.#all.items, this.#current, step));
+  }
+
+  /** Confirm the highlighted one and go to the next; with none highlighted, show the first: nobody confirms what they have not seen. */
+  confirm() {
+    if (!this.#chosen) return this.move(1);
+    return this.#confirm([this.#chosen.id]);
+  }
+
+  dismiss() {
+    const chosen = this.#chosen;
+    if (!chosen) return this.move(1);
+    this.#dismiss(chosen);
+  }
+
+  confirmAll() {
+    const ids = surest(this.#all.items, Number(this.#least.value)).map((item) => item.id);
+    if (ids.length) this.#confirm(ids);
+  }
+
+  get #chosen() {
+    return this.#all.items.find((item) => item.id === this.#current) ?? null;
+  }
+
+  /** @param {string[]} ids */
+  #confirm(ids) {
+    const next = ids.length === 1 ? neighbour(this.#all.items, this.#current, 1, new Set(ids)) : null;
+    this.#act(async () => {
+      const made = await confirmProposals(this.project, ids);
+      this.#all = { ...this.#all, items: this.#all.items.filter((item) => !ids.includes(item.id)) };
+      this.emit("objects-made", made);
+      say(made.length === 1 ? `Confirmed ${made[0]?.name}` : `Confirmed ${counted(made.length, "proposal")}`);
+      this.#show(next);
+    });
+  }
+
+  /** @param {Proposal} item */
+  #dismiss(item) {
+    const next = neighbour(this.#all.items, item.id, 1, new Set([item.id]));
+    this.#act(async () => {
+      this.#take(await dismissProposals(this.project, [item.id]));
+      this.#show(next);
+    });
+  }
+
+  /**
+   * One change at a time: a key held down must not confirm twice.
+   * @param {() => Promise<void>} change
+   */
+  async #act(change) {
+    if (this.#busy) return;
+    this.#busy = true;
+    try {
+      await change();
+    } catch (error) {
+      sayError(error);
+      await this.load();
+    } finally {
+      this.#busy = false;
+    }
+  }
+
+  /** @param {Proposal | null} item */
+  #show(item) {
+    this.#current = item?.id ?? null;
+    this.#draw();
+    this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+    if (item) this.emit("show-frame", item.frame);
+    this.emit("proposals-changed");
+  }
+
+  /** @param {Proposals} all */
+  #take(all) {
+    this.#all = all;
+    if (!this.#chosen) this.#current = null;
+    this.#draw();
+    this.emit("proposals-changed");
+  }
+
+  /** @param {{ fraction: number, changed: boolean }} message */
+  #told({ fraction, changed }) {
+    if (changed || this.#all.state === "none") return this.#soon();
+    this.#all = { ...this.#all, fraction };
+    this.#drawState();
+  }
+
+  /** Objects change by the dozen while masks arrive: ask once. */
+  #soon() {
+    clearTimeout(this.#timer);
+    this.#timer = window.setTimeout(() => this.load(), SOON_MS);
+  }
+
+  #draw() {
+    this.#drawState();
+    const sure = surest(this.#all.items, Number(this.#least.value)).length;
+    this.#bulk.hidden = !this.#all.items.length;
+    this.#every.textContent = `Confirm ${sure}`;
+    this.#every.disabled = sure === 0;
+    this.#list.replaceChildren(...this.#all.items.map((item) => this.#row(item)));
+    this.#restore.hidden = this.#all.dismissed === 0;
+    this.#restore.textContent = `Bring back ${this.#all.dismissed} dismissed`;
+  }
+
+  #drawState() {
+    const { state, items, fraction } = this.#all;
+    this.#heading.textContent = `Proposals (${items.length})`;
+    this.#progress.hidden = state !== "running";
+    this.#progress.value = fraction;
+    this.#note.textContent =
+      state === "running"
+        ? `Looking for fronts and things… ${Math.round(100 * fraction)} %`
+        : items.length
+          ? "Y confirms the highlighted one, X dismisses it, N and P move."
+          : state === "done"
+            ? "Nothing left to confirm. Click what is missing."
+            : "They appear once the scan is prepared.";
+  }
+
+  /** @param {Proposal} item */
+  #row(item) {
+    const current = item.id === this.#current;
+    const name = `${item.category} on frame ${item.frame}`;
+    const pick = h(
+      "button",
+      { type: "button", class: "pick", "aria-pressed": String(current), "aria-label": `Show the proposed ${name}` },
+      h("strong", {}, item.category),
+      h("span", { class: "muted" }, `${percent(item)} · ${KINDS[item.kind]} · ${size(item)}`),
+    );
+    pick.addEventListener("click", () => this.#show(item));
+    const yes = h("button", { type: "button", class: "quiet", "aria-label": `Confirm the ${name}` }, icon("check"));
+    yes.addEventListener("click", () => this.#confirm([item.id]));
+    const no = h("button", { type: "button", class: "quiet", "aria-label": `Dismiss the ${name}` }, icon("cross"));
+    no.addEventListener("click", () => this.#dismiss(item));
+    return h("li", { class: current ? "current" : "" }, pick, yes, no);
+  }
+}
+
+/** @param {Proposal} item */
+function percent(item) {
+  return `${Math.round(100 * item.confidence)} %`;
+}
+
+/** @param {Proposal} item width × height, in centimetres */
+function size(item) {
+  const [width = 0, , height = 0] = item.size_m;
+  return `${Math.round(100 * width)} × ${Math.round(100 * height)} cm`;
+}

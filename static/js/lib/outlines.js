@@ -1,0 +1,83 @@
+/** A proposal on a frame: a dashed outline over a dark one, so that it shows on any picture, and a chip with its name. */
+
+import { toScreen } from "./view.js";
+
+const CURRENT = "#ffe14d";
+const OTHER = "#ffffff";
+const FONT = "600 12px system-ui, sans-serif";
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./view.js").View} view
+ * @param {{ points: number[][], handle: number[][], label: string, current: boolean }} outline
+ */
+export function drawOutline(context, view, { points, handle, label, current }) {
+  const colour = current ? CURRENT : OTHER;
+  context.save();
+  for (const [shape, width] of /** @type {[number[][], number][]} */ ([
+    [points, current ? 3 : 1.75],
+    [handle, 1.25],
+  ])) {
+    if (shape.length < 3) continue;
+    trace(context, view, shape);
+    context.setLineDash([]);
+    context.lineWidth = width + 2;
+    context.strokeStyle = "rgb(0 0 0 / 55%)";
+    context.stroke();
+    context.setLineDash([7, 5]);
+    context.lineWidth = width;
+    context.strokeStyle = colour;
+    context.stroke();
+  }
+  context.setLineDash([]);
+  if (points.length) drawChip(context, chipPlace(view, points), label, colour);
+  context.restore();
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./view.js").View} view
+ * @param {number[][]} shape
+ */
+function trace(context, view, shape) {
+  context.beginPath();
+  shape.forEach(([x = 0, y = 0], k) => {
+    const at = toScreen(view, { x, y });
+    if (k === 0) context.moveTo(at.x, at.y);
+    else context.lineTo(at.x, at.y);
+  });
+  context.closePath();
+}
+
+/**
+ * The middle of the shape's box: inside for fronts and things alike.
+ * @param {import("./view.js").View} view
+ * @param {number[][]} points
+ */
+function chipPlace(view, points) {
+  const xs = points.map(([x = 0]) => x);
+  const ys = points.map(([, y = 0]) => y);
+  return toScreen(view, {
+    x: (Math.min(...xs) + Math.max(...xs)) / 2,
+    y: (Math.min(...ys) + Math.max(...ys)) / 2,
+  });
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {{ x: number, y: number }} at
+ * @param {string} label
+ * @param {string} colour
+ */
+function drawChip(context, at, label, colour) {
+  context.font = FONT;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const width = context.measureText(label).width + 14;
+  context.fillStyle = "rgb(10 12 16 / 82%)";
+  context.beginPath();
+  context.roundRect(at.x - width / 2, at.y - 11, width, 22, 6);
+  context.fill();
+  context.fillStyle = colour;
+  context.fillText(label, at.x, at.y + 0.5);
+}

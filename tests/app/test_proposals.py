@@ -1,0 +1,84 @@
+from collections.abc import Callable
+from typing import Any
+
+from tests.app.conftest import Running
+
+CLICK = {"frame": 3, "x": 100.5, "y": 60.5, "label": 1}
+
+
+def proposed(web: Running, project: str, *, count: int = 3) -> list[dict[str, Any]]:
+    """The proposals, once the live segmenter has made them all."""
+    web.post(f"/api/projects/{project}/live/open")
+
+    def ready() -> bool:
+        found = web.get(f"/api/projects/{project}/proposals")
+        return bool(found["state"] == "done" and len(found["items"]) == count)
+
+    web.until(ready)
+    items: list[dict[str, Any]] = web.get(f"/api/projects/{project}/proposals")["items"]
+    return items
+
+
+def names(web: Running, project: str) -> list[str]:
+    return [item["name"] for item in web.get(f"/api/projects/{project}/objects")]
+
+
+def test_nothing_is_proposed_before_the_segmenter_has_looked(web: Running) -> None:
+    project = web.sample()
+    assert web.get(f"/api/projects/{project}/proposals") == {"state": "none", "fraction": 0.0, "items": [], "dismissed": 0}
+
+
+def test_a_confirmed_proposal_is_an_object_with_its_click_and_undo_brings_it_back(web: Running) -> None:
+    project = web.sample()
+    before = names(web, project)
+    first, *rest = proposed(web, project)
+    (made,) = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": [first["id"]]}, 201)
+    assert made["category"] == first["category"]
+    assert [(p["frame"], p["x"], p["y"], p["label"]) for p in made["points"]] == [(first["frame"], first["x"], first["y"], 1)]
+    assert [item["id"] for item in proposed(web, project, count=2)] == [item["id"] for item in rest]
+    assert web.get(f"/api/projects/{project}/history?limit=1")[0]["text"] == f"confirmed proposal {made['name']}"
+    web.until(lambda: web.get(f"/api/projects/{project}/objects")[-1]["segment"] == "done")
+    undone = web.post(f"/api/projects/{project}/undo", {})
+    assert undone["object"]["deleted"]
+    assert names(web, project) == before
+    assert [item["id"] for item in proposed(web, project)] == [first["id"], *(item["id"] for item in rest)]
+
+
+def test_several_are_confirmed_at_once(web: Running) -> None:
+    project = web.sample()
+    ids = [item["id"] for item in proposed(web, project)]
+    made = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": [*ids, ids[0]]}, 201)
+    assert [item["category"] for item in made] == ["drawer", "drawer", "bottle"]
+    assert len({item["name"] for item in made}) == 3
+    assert web.get(f"/api/projects/{project}/proposals")["items"] == []
+
+
+def test_an_object_clicked_by_hand_takes_its_proposal(web: Running) -> None:
+    project = web.sample()
+    proposed(web, project)
+    click = {**CLICK, "x": 102.5}  # beside the proposal's own click, within its outline
+    web.post(f"/api/projects/{project}/objects", {"category": "bottle", "points": [click]}, 201)
+    left = proposed(web, project, count=2)
+    assert [item["category"] for item in left] == ["drawer", "drawer"]
+
+
+def test_dismissals_outlive_the_server_and_can_be_taken_back(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        first = proposed(web, project)[0]
+        after = web.post(f"/api/projects/{project}/proposals/dismiss", {"ids": [first["id"]]})
+        assert (len(after["items"]), after["dismissed"]) == (2, 1)
+    with start() as web:  # proposals themselves are kept too: no segmenter is needed to show them
+        kept = web.get(f"/api/projects/{project}/proposals")
+        assert (kept["state"], len(kept["items"]), kept["dismissed"]) == ("done", 2, 1)
+        assert web.get(f"/api/projects/{project}/live")["state"] == "off"
+        back = web.post(f"/api/projects/{project}/proposals/restore")
+        assert (len(back["items"]), back["dismissed"]) == (3, 0)
+
+
+def test_a_proposal_that_is_gone_is_refused(web: Running) -> None:
+    project = web.sample()
+    first = proposed(web, project)[0]
+    web.post(f"/api/projects/{project}/proposals/dismiss", {"ids": [first["id"]]})
+    refused = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": [first["id"]]}, 404)
+    assert refused["kind"] == "not-found"
