@@ -11,6 +11,7 @@ from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.consensus import agreed_body
@@ -114,6 +115,10 @@ class LearnedSession:
             fused = with_evidence(self.bench.scene, fused, body, self.config.least_area_px)
         progress.at(0.95, f"{prompt.name}: measuring it")
         return self._track(prompt, fused, measure(self.bench, prompt, fused.masks, body))
+
+    def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
+        """What the weight-free segmenter sees; the model follows what is confirmed."""
+        return self.bench.propose()
 
     def _track(self, prompt: ObjectPrompt, fused: Fused, measured: Measured) -> MaskTrack:
         return MaskTrack(
