@@ -613,7 +613,7 @@ class ViewerSession(Shape):
     state: Literal["ready", "down"]
     url: str | None  # for the iframe, ends in a slash
     message: str
-    fallback_glb: str | None
+    fallback_page: str | None  # the bundle's own 3D page
     fallback_image: str | None
 
 

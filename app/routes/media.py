@@ -67,6 +67,17 @@ def scene_report(context: Ctx, request: Request, project: str) -> Response:
     return answer
 
 
+@router.get("/review.html", operation_id="sceneReview")
+def scene_review(context: Ctx, request: Request, project: str, v: str = "") -> Response:
+    """The newest bundle's 3D page: its own script may run, in an origin of its own, and reach nothing."""
+    answer = send(request, bundles.member(context, project, "review.html"), "text/html", immutable=bool(v))
+    answer.headers["content-security-policy"] = (
+        "sandbox allow-scripts; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+        "img-src data:; frame-ancestors 'self'"
+    )
+    return answer
+
+
 @router.get("/bundles/{version}.zip", operation_id="downloadBundle")
 def download_bundle(context: Ctx, project: str, version: RowId) -> FileResponse:
     """A bundle; ranges are answered, so a download can go on where it stopped."""

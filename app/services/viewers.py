@@ -24,7 +24,7 @@ def open_view(context: Context, project_id: str, session_id: str) -> schemas.Vie
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     instead = {
-        "fallback_glb": f"/media/{project_id}/scene.glb?v={bundle.version}" if bundle else None,
+        "fallback_page": f"/media/{project_id}/review.html?v={bundle.version}" if bundle else None,
         "fallback_image": f"/media/{project_id}/preview.png?v={bundle.version}"
         if bundle
         else f"/media/{project_id}/thumbnail.jpg",

@@ -555,7 +555,7 @@ export interface ViewerSession {
   state: "ready" | "down";
   url: string | null;
   message: string;
-  fallback_glb: string | null;
+  fallback_page: string | null;
   fallback_image: string | null;
 }
 
@@ -697,6 +697,8 @@ export interface Operations {
   scenePicture: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/report.html */
   sceneReport: { parameters: { project: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/review.html */
+  sceneReview: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/scene.glb */
   sceneMesh: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/thumbnail.jpg */

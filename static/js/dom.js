@@ -1,7 +1,7 @@
 /** Small helpers around the DOM. Text enters by textContent, never as markup. */
 
 /**
- * Make an element: properties are set, `on…` functions become listeners, dashed names and `role`, `for` become attributes.
+ * Make an element: properties are set, `on…` functions become listeners, dashed names and a few more become attributes.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
  * @param {Record<string, unknown>} [props]
@@ -24,7 +24,7 @@ function assign(element, props) {
     if (value === undefined || value === null) continue;
     if (name.startsWith("on") && typeof value === "function") {
       element.addEventListener(name.slice(2).toLowerCase(), /** @type {EventListener} */ (value));
-    } else if (name.includes("-") || ["role", "for", "list", "class"].includes(name)) {
+    } else if (name.includes("-") || ["role", "for", "list", "class", "sandbox"].includes(name)) {
       element.setAttribute(name, String(value));
     } else {
       Reflect.set(element, name, value);

@@ -57,3 +57,12 @@ def test_the_report_may_not_run_anything(web: Running) -> None:
     policy = web.client.get(f"/media/{project}/report.html").headers["content-security-policy"]
     assert policy.startswith("sandbox;")
     assert "script-src" not in policy
+
+
+def test_the_scenes_page_runs_in_an_origin_of_its_own_and_reaches_nothing(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    policy = web.client.get(f"/media/{project}/review.html").headers["content-security-policy"]
+    assert policy.startswith("sandbox allow-scripts; default-src 'none'")
+    assert "allow-same-origin" not in policy
+    assert "connect-src" not in policy

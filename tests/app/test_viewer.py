@@ -84,7 +84,7 @@ def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any
         session = web.post(f"/api/projects/{project}/viewer")
         assert (session["state"], session["url"]) == ("down", None)
         assert session["message"]
-        assert web.client.get(session["fallback_glb"]).status_code == 200
+        assert web.client.get(session["fallback_page"]).status_code == 200
         assert web.client.get(session["fallback_image"]).status_code == 200
 
 

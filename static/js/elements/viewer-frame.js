@@ -1,4 +1,4 @@
-/** The 3D view: viser in an iframe of our own origin; a picture and a retry when it is down. */
+/** The 3D view: viser in an iframe of our own origin; the bundle's own 3D page, or a picture, and a retry when it is down. */
 
 import { ApiError, openViewer, showInViewer } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -25,7 +25,7 @@ export class ViewerFrame extends LiveElement {
     this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
     try {
       const session = await openViewer(project);
-      if (session.state === "down" || !session.url) return this.#down(session.message, session.fallback_image);
+      if (session.state === "down" || !session.url) return this.#down(session.message, session);
       const dark = getComputedStyle(document.documentElement).colorScheme === "dark" || isDark() ? "?darkMode" : "";
       this.replaceChildren(h("iframe", { src: session.url + dark, title: "3D view of the project" }));
       this.#opened = true;
@@ -53,15 +53,24 @@ export class ViewerFrame extends LiveElement {
 
   /**
    * @param {string} message
-   * @param {string | null} image
+   * @param {{ fallback_page: string | null, fallback_image: string | null } | null} instead
    */
-  #down(message, image) {
+  #down(message, instead) {
     this.#opened = false;
     const retry = h("button", { type: "button", onClick: () => this.open(this.#project, this.#wanted) }, "Try again");
+    const said = h("p", {}, `The 3D view is not there: ${message}`);
+    if (instead?.fallback_page) {
+      const page = h("iframe", {
+        src: instead.fallback_page,
+        title: "The newest bundle's scene",
+        sandbox: "allow-scripts",
+      });
+      this.replaceChildren(h("div", { class: "fallback-bar" }, said, retry), page);
+      return;
+    }
+    const image = instead?.fallback_image;
     const picture = image ? h("img", { src: image, alt: "The scene, closed and open" }) : null;
-    this.replaceChildren(
-      h("div", { class: "fallback" }, picture, h("p", {}, `The 3D view is not there: ${message}`), retry),
-    );
+    this.replaceChildren(h("div", { class: "fallback" }, picture, said, retry));
   }
 }
 

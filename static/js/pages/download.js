@@ -16,6 +16,7 @@ const CONTENT = [
   ["scene.glb", "the scene for the web and for editors"],
   ["meshes/", "textured OBJ visuals and convex colliders, relative paths"],
   ["manifest.json", "every dimension and joint with where it came from"],
+  ["review.html", "the scene to open and turn, in any browser, without a server"],
   ["report.html", "certificate and accuracy, for a person"],
 ];
 
@@ -75,6 +76,7 @@ function button(bundle) {
 /** @param {string} project */
 function content(project) {
   const report = h("a", { href: `/media/${project}/report.html`, target: "_blank" }, "Open the report");
+  const scene = h("a", { href: `/media/${project}/review.html`, target: "_blank" }, "Open the scene in 3D");
   return h(
     "section",
     { class: "card stack" },
@@ -84,7 +86,7 @@ function content(project) {
       { class: "facts" },
       ...CONTENT.flatMap(([name, text]) => [h("dt", {}, h("code", {}, name ?? "")), h("dd", {}, text ?? "")]),
     ),
-    h("p", {}, report),
+    h("p", { class: "row" }, report, scene),
   );
 }
 

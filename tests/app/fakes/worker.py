@@ -51,6 +51,7 @@ def main() -> int:
             archive.writestr("manifest.json", json.dumps({"stages": [{"name": "segment", "backend": "fake", "seconds": 2.0}]}))
             archive.writestr("preview.png", b"png")
             archive.writestr("report.html", "<h1>report</h1>")
+            archive.writestr("review.html", "<script>1</script>")
             archive.writestr("report.json", json.dumps({"certificate": {"passed": True, "findings": [], "drift_m": 0.001}}))
     say(done=stage, computed=[], failures={}, passed=True)
     if behaviour == "lingers":
