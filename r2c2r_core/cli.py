@@ -150,8 +150,9 @@ def evaluate(options: argparse.Namespace) -> int:
 def dataset(options: argparse.Namespace) -> int:
     """A finished work folder as a dataset: labelled frames, candidate meshes, matched points, aligned meshes (paper §3)."""
     from r2c2r_core.dataset.stage import LabelledObject, StoredFrames, write_dataset
+    from r2c2r_core.disk import explained_io
     from r2c2r_core.ingest.store import depth_path, rgb_path
-    from r2c2r_core.workspace import Workspace, explained_io
+    from r2c2r_core.workspace import Workspace
 
     workdir = _existing(options.workdir)
     if not (workdir / "nouns").is_dir():
