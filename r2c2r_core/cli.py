@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     from r2c2r_core.config import ReconstructConfig, read_config
     from r2c2r_core.disk import explained_io
     from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
-    from r2c2r_core.pipeline import Request, Tools, reconstruct
+    from r2c2r_core.pipeline import Request, Tools, reconstruct, restricted_licences
     from r2c2r_core.segment.prompts import read_prompts
     from r2c2r_core.workspace import Workspace
 
@@ -70,6 +70,8 @@ def run(options: argparse.Namespace) -> int:
         tools=Tools(**_given(options, "segmenter", "generator", "matcher")),
         seed=options.seed,
     )
+    for line in restricted_licences(request.tools):
+        print(f"r2c2r: {line}", file=sys.stderr)
     work = Workspace(options.workdir or destination.with_suffix(".work"))
     with show_progress() as progress:
         outcome = reconstruct(request, work, progress=progress)

@@ -144,6 +144,13 @@ def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]
     return result, certificate.value
 
 
+def restricted_licences(tools: Tools) -> list[str]:
+    """A line for every chosen backend whose licence forbids some uses."""
+    chosen = ((SEGMENTERS, tools.segmenter), (GENERATORS, tools.generator), (MATCHERS, tools.matcher))
+    backends = [(registry.seam, registry.get(name)) for registry, name in chosen]
+    return [f"{seam} {b.name}: {b.licence}" for seam, b in backends if b.licence_class == "restricted"]
+
+
 def make_candidates(
     request: Request, ledger: Ledger, capture: Capture, tracks: dict[str, Kept[MaskTrack]]
 ) -> dict[str, Kept[CandidateSet]]:

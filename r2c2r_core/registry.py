@@ -10,6 +10,7 @@ from typing import Any, Literal
 from r2c2r_core.errors import BackendUnavailable, InputError
 
 LicenceClass = Literal["open", "restricted"]  # restricted: gated, non-commercial, or bound to a field of use
+MODEL_FILES = ("config.json", "*.safetensors")  # how transformers keeps a model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +20,7 @@ class Weights:
     usual: str  # a hub id
     variable: str  # of the environment; names a folder or another hub id
     gated: bool = False  # the hub asks to accept a licence first
+    holds: tuple[str, ...] = MODEL_FILES  # patterns of files that make a folder such a model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +31,7 @@ class Backend:
     target: str  # "module:Class"
     extra: str | None = None  # the extra of pyproject.toml that brings its libraries
     needs: tuple[str, ...] = ()  # modules that must be importable
+    install: str = ""  # how to get them where no extra and no plain name does
     weights: Weights | None = None
     licence: str = "Apache-2.0 (this project)"
     licence_class: LicenceClass = "open"
@@ -41,6 +44,7 @@ class Registry:
 
     seam: str
     backends: tuple[Backend, ...]
+    setting: str = "segment.weights"  # where a configuration names the weights
 
     @property
     def default(self) -> str:
@@ -71,15 +75,18 @@ class Registry:
         backend = self.get(name)
         missing = [m for m in backend.needs if importlib.util.find_spec(m) is None]
         if missing:
-            step = f"pip install 'r2c2r[{backend.extra}]'" if backend.extra else f"install {', '.join(missing)}"
+            step = (
+                f"pip install 'r2c2r[{backend.extra}]'" if backend.extra else f"install {backend.install or ', '.join(missing)}"
+            )
             raise BackendUnavailable(f"{self.seam} '{name}' is not available: missing {', '.join(missing)}", hint=step)
         if backend.weights is None:
             return None
         named = self.weights_named(name, weights)
-        folder = find_weights(named)
+        folder = find_weights(named, backend.weights.holds)
         if folder is None:
             raise BackendUnavailable(
-                f"{self.seam} '{name}' is not available: no weights at {named}", hint=_how_to_get(backend.weights, named)
+                f"{self.seam} '{name}' is not available: no weights at {named}",
+                hint=_how_to_get(backend.weights, named, self.setting),
             )
         return folder
 
@@ -100,18 +107,18 @@ class Registry:
         return getattr(importlib.import_module(module_name), class_name)(**options)
 
 
-def find_weights(named: str) -> Path | None:
+def find_weights(named: str, holds: tuple[str, ...] = MODEL_FILES) -> Path | None:
     """The folder that holds the weights called `named`, itself a folder or a hub id already downloaded; never downloads."""
     folder = Path(named).expanduser()
     if folder.is_dir():
-        return folder if _is_model(folder) else None
+        return folder if _is_model(folder, holds) else None
     repository = hub_cache() / f"models--{named.replace('/', '--')}"
     try:
         newest = (repository / "refs" / "main").read_text().strip()
         snapshots = [repository / "snapshots" / newest]
     except OSError:
         snapshots = sorted((repository / "snapshots").glob("*"))
-    return next((snapshot for snapshot in snapshots if _is_model(snapshot)), None)
+    return next((snapshot for snapshot in snapshots if _is_model(snapshot, holds)), None)
 
 
 def hub_cache() -> Path:
@@ -120,13 +127,13 @@ def hub_cache() -> Path:
     return Path(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub").expanduser()
 
 
-def _is_model(folder: Path) -> bool:
-    return (folder / "config.json").is_file() and any(folder.glob("*.safetensors"))
+def _is_model(folder: Path, holds: tuple[str, ...]) -> bool:
+    return all(any(folder.glob(pattern)) for pattern in holds)
 
 
-def _how_to_get(weights: Weights, named: str) -> str:
-    where = f"name a folder or hub id in {weights.variable} or segment.weights"
+def _how_to_get(weights: Weights, named: str, setting: str) -> str:
+    where = f"name a folder or hub id in {weights.variable} or {setting}"
     if Path(named).expanduser().is_absolute() or named.startswith("."):
-        return f"a folder with config.json and *.safetensors is expected; {where}"
+        return f"a folder with {' and '.join(weights.holds)} is expected; {where}"
     first = f"accept the licence at https://huggingface.co/{named} and log in (hf auth login), " if weights.gated else ""
     return f"{first}hf download {named}; or {where}"

@@ -1,11 +1,12 @@
 """What a keypoint matcher must do, and the table of matchers."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from r2c2r_core.arrays import Image, Mask, Pixels
-from r2c2r_core.registry import Backend, Registry
+from r2c2r_core.registry import Backend, Registry, Weights
 
 
 class Features(NamedTuple):
@@ -22,6 +23,9 @@ class Matches(NamedTuple):
     second: np.ndarray  # (k,) int
 
 
+NO_MATCH = Matches(np.zeros(0, np.int64), np.zeros(0, np.int64))
+
+
 class Matcher(Protocol):
     """Finds the same spots in two images. Features are computed once an image and used in many pairs."""
 
@@ -30,6 +34,9 @@ class Matcher(Protocol):
 
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that look alike, one to one."""
+
+    def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
+        """The pairs with each of the others; a slow matcher may give none for those that look least alike."""
 
 
 MATCHERS = Registry(
@@ -41,5 +48,26 @@ MATCHERS = Registry(
             needs=("cv2",),
             summary="SIFT with RootSIFT descriptors, ratio and mutual test; no weights",
         ),
+        Backend(
+            name="lightglue",
+            target="r2c2r_core.align.lightglue:LightGlueMatcher",
+            extra="learned",
+            needs=("torch", "transformers"),
+            weights=Weights(usual="ETH-CVG/lightglue_superpoint", variable="R2C2R_LIGHTGLUE_WEIGHTS"),
+            licence="LightGlue Apache-2.0, its SuperPoint weights for non-commercial research only",
+            licence_class="restricted",
+            summary="SuperPoint keypoints matched by LightGlue",
+        ),
+        Backend(
+            name="superglue",
+            target="r2c2r_core.align.superglue:SuperGlueMatcher",
+            extra="learned",
+            needs=("torch", "transformers"),
+            weights=Weights(usual="magic-leap-community/superglue_indoor", variable="R2C2R_SUPERGLUE_WEIGHTS"),
+            licence="Magic Leap: non-commercial research only (SuperPoint and SuperGlue weights)",
+            licence_class="restricted",
+            summary="SuperPoint keypoints matched by SuperGlue, as in the paper",
+        ),
     ),
+    setting="align.weights",
 )

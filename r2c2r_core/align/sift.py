@@ -1,9 +1,11 @@
 """SIFT keypoints with RootSIFT descriptors (Arandjelović and Zisserman 2012), ratio and mutual test."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
-from r2c2r_core.align.protocol import Features, Matches
+from r2c2r_core.align.protocol import NO_MATCH, Features, Matches
 from r2c2r_core.arrays import Image, Mask
 
 
@@ -26,7 +28,7 @@ class SiftMatcher:
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that are each other's best and clearly better than the second best."""
         if len(first.uv_px) < 2 or len(second.uv_px) < 2:
-            return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64))
+            return NO_MATCH
         likeness = first.descriptors @ second.descriptors.T  # of unit vectors: distance^2 = 2 - 2 * likeness
         best = likeness.argmax(axis=1)
         rows = np.arange(len(best))
@@ -38,3 +40,7 @@ class SiftMatcher:
         mutual = likeness.argmax(axis=0)[best] == rows
         chosen = np.flatnonzero(clear & mutual)
         return Matches(chosen, best[chosen])
+
+    def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
+        """The pairs with each of the others."""
+        return [self.match(first, other) for other in others]

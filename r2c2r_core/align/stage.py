@@ -5,6 +5,7 @@ rendered masks, depth and colours against the photos. Nothing but the mesh's sur
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -42,6 +43,7 @@ class AlignConfig:
     settled: int = 36  # hypotheses rendered and compared
     refined: int = 8  # of them refined
     least_iou: float = 0.2  # below it nothing is trustworthy
+    weights: str = ""  # of a learned matcher: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +71,7 @@ def place_mesh(
     _require_evidence(observation, track)
     shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
     progress.at(0.15, f"{asset.object_name}: matching keypoints")
-    lifted = _match(capture, track, asset.mesh, observation, MATCHERS.load(matcher), config)
+    lifted = _match(capture, track, asset.mesh, observation, _loaded(matcher, config.weights), config)
     scale_range = _scale_range(shape, observation)
     votes = vote(lifted, shape.diameter, scale_range, rng)
     progress.at(0.5, f"{asset.object_name}: trying poses")
@@ -90,6 +92,13 @@ def place_mesh(
             hint="choose another candidate, or add a click on a frame that shows more of the object",
         )
     return _placement(best, trials, lifted, votes, shape, observation, track, asset, matcher)
+
+
+@cache
+def _loaded(matcher: str, weights: str) -> Matcher:
+    """The matcher, kept for the next object: learned ones take seconds to load."""
+    backend: Matcher = MATCHERS.load(matcher, weights=weights)
+    return backend
 
 
 def _require_evidence(observation: Observation, track: MaskTrack) -> None:

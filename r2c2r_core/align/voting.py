@@ -94,7 +94,7 @@ def _lift_photo(
     own = matcher.describe(photo.colour.clip(0, 255).astype(np.uint8), photo.mask)
     depth = depth_at(own.uv_px, photo.depth_m)
     points_world = photo.world_from_camera.apply(unproject(own.uv_px, depth, photo.camera))
-    pairs = [matcher.match(own, features) for features in render_features]
+    pairs = matcher.match_many(own, render_features)
     order = sorted(range(len(pairs)), key=lambda k: -len(pairs[k].first))[:best_views]
     mesh_points, photo_rows = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for k in order:

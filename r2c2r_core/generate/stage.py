@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import cv2
 
@@ -19,7 +19,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.registry import Backend, Registry
+from r2c2r_core.registry import Backend, Registry, Weights
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +35,12 @@ GENERATORS = Registry(
             name="trellis",
             target="r2c2r_core.generate.trellis:Trellis",
             needs=("trellis", "torch"),
+            install="github.com/microsoft/TRELLIS in an environment of its own and serve it to 'remote'",
+            weights=Weights(
+                usual="microsoft/TRELLIS-image-large",
+                variable="R2C2R_TRELLIS_WEIGHTS",
+                holds=("pipeline.json", "ckpts/*.safetensors"),
+            ),
             licence="MIT (code and weights); its CUDA dependencies carry licences of their own, some non-commercial",
             summary="TRELLIS in this process: several photos in, a textured mesh out; an NVIDIA GPU with 16 GB",
         ),
@@ -45,6 +51,7 @@ GENERATORS = Registry(
             summary="a generator on another machine: serve_worker.py, or TRELLIS as NVIDIA NIM",
         ),
     ),
+    setting="generate.weights",
 )
 
 
@@ -55,7 +62,7 @@ class GenerateConfig:
     count: int = 5  # the paper samples up to 10; 5 take about 4 s an object on one core
     pool_frames: int = 20  # the paper divides the images into 20 intervals (§4.2)
     rule: Literal["medoid", "mean"] = "medoid"  # "mean" is the paper's; see consensus.py for why not
-    weights: str = ""  # of a learned generator: a folder or a hub id
+    weights: str = ""  # of a learned generator: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
     url: str = field(default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""))  # of the remote generator
 
     def __post_init__(self) -> None:
@@ -98,11 +105,8 @@ def generate_candidates(
 
 def load_generator(name: str, config: GenerateConfig, progress: Progress = SILENT) -> MeshGenerator:
     """The generator of that name with its settings; raises BackendUnavailable with the next step."""
-    options: dict[str, dict[str, Any]] = {
-        "trellis": {"weights": config.weights},
-        "remote": {"url": config.url, "progress": progress},
-    }
-    backend: MeshGenerator = GENERATORS.load(name, **options.get(name, {}))
+    served = {"url": config.url, "progress": progress} if name == "remote" else {}
+    backend: MeshGenerator = GENERATORS.load(name, weights=config.weights, **served)
     return backend
 
 

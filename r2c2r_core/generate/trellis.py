@@ -1,11 +1,11 @@
 """TRELLIS in this process: several masked photos in, a textured mesh out (paper §4.2; Xiang et al. 2025).
 
-Needs the repository's own environment (github.com/microsoft/TRELLIS; Linux, an NVIDIA GPU with 16 GB) and weights that
-the person names in `generate.weights`: a folder, or a hub id such as microsoft/TRELLIS-image-large, which TRELLIS then
-fetches itself (and DINOv2 through torch.hub: cache both to work offline).
+Needs the repository's own environment (github.com/microsoft/TRELLIS; Linux, an NVIDIA GPU with 16 GB) and its weights in a
+folder. TRELLIS loads DINOv2 beside them through torch.hub: run it once with a network, or fill torch.hub's cache.
 """
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed
@@ -23,12 +23,7 @@ _TEXTURE_PX = 1024
 class Trellis:
     """Makes candidates with TrellisImageTo3DPipeline."""
 
-    def __init__(self, *, weights: str) -> None:
-        if not weights:
-            raise BackendUnavailable(
-                "generator 'trellis' has no weights",
-                hint="set generate.weights to a folder or a hub id, such as microsoft/TRELLIS-image-large",
-            )
+    def __init__(self, *, weights: Path) -> None:
         self._pipeline = _pipeline(weights)
 
     def make(self, evidence: Evidence, candidate_id: str, seed: int) -> MeshAsset:
@@ -51,7 +46,7 @@ class Trellis:
 
 
 @cache
-def _pipeline(weights: str) -> Any:
+def _pipeline(weights: Path) -> Any:
     """The loaded pipeline, once a process: loading takes most of a minute and 16 GB of GPU memory."""
     try:
         from trellis.pipelines import TrellisImageTo3DPipeline
@@ -61,12 +56,12 @@ def _pipeline(weights: str) -> Any:
             hint="install github.com/microsoft/TRELLIS, or use the 'remote' generator",
         ) from error
     try:
-        pipeline = TrellisImageTo3DPipeline.from_pretrained(weights)
+        pipeline = TrellisImageTo3DPipeline.from_pretrained(str(weights))
         pipeline.cuda()
     except Exception as error:  # hub, file and CUDA errors of every kind: each means that it cannot be used here
         raise BackendUnavailable(
             f"generator 'trellis': {weights} cannot be loaded ({_first_line(error)})",
-            hint="check the folder or hub id in generate.weights, and that the GPU has 16 GB",
+            hint="check the folder, that DINOv2 is in torch.hub's cache, and that the GPU has 16 GB",
         ) from error
     return pipeline
 

@@ -10,7 +10,7 @@ from r2c2r_core.errors import BackendUnavailable
 from r2c2r_core.generate.stage import GenerateConfig
 from r2c2r_core.ledger import Kept, Ledger
 from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
-from r2c2r_core.pipeline import Request, Tools, make_candidates
+from r2c2r_core.pipeline import Request, Tools, make_candidates, restricted_licences
 from r2c2r_core.progress import SILENT
 from r2c2r_core.workspace import Workspace
 from tests.core.generate import scenes
@@ -84,3 +84,10 @@ def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles
     request = replace(request_for("http://h"), config=ReconstructConfig())
     with pytest.raises(BackendUnavailable, match="generator 'remote' has no address"):
         make_candidates(request, Ledger(Workspace(tmp_path), SILENT), capture, tracks)
+
+
+def test_a_licence_that_forbids_some_uses_is_said_where_it_is_chosen_and_never_the_default():
+    assert restricted_licences(Tools()) == []
+    (line,) = restricted_licences(Tools(matcher="superglue"))
+    assert "matcher superglue" in line
+    assert "non-commercial" in line

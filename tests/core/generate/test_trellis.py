@@ -3,6 +3,7 @@
 import sys
 import types
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from r2c2r_core.generate import trellis
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.geometry.meshes import is_watertight
 from tests.core.generate.stub import textured_box
+
+WEIGHTS = Path("weights")
 
 
 class FakePipeline:
@@ -98,7 +101,7 @@ def evidence(bottle_scene):
 
 
 def test_samples_differ_in_pictures_and_settings_and_come_out_closed(package, evidence):
-    backend = trellis.Trellis(weights="weights")
+    backend = trellis.Trellis(weights=WEIGHTS)
     assets = [backend.make(evidence, f"c{k}", 0) for k in range(10)]
     calls = backend._pipeline.calls
     assert {call["mode"] for call in calls} == {"stochastic", "multidiffusion"}
@@ -117,17 +120,17 @@ def test_samples_differ_in_pictures_and_settings_and_come_out_closed(package, ev
 
 
 def test_one_picture_goes_the_single_image_way(package, evidence):
-    backend = trellis.Trellis(weights="weights")
+    backend = trellis.Trellis(weights=WEIGHTS)
     backend.make(replace(evidence, pool=evidence.pool[:1]), "c0", 0)
     assert backend._pipeline.calls[-1]["call"] == "run"
 
 
 def test_the_model_is_loaded_once_for_all_objects(package):
-    assert trellis.Trellis(weights="weights")._pipeline is trellis.Trellis(weights="weights")._pipeline
+    assert trellis.Trellis(weights=WEIGHTS)._pipeline is trellis.Trellis(weights=WEIGHTS)._pipeline
 
 
 def test_masks_too_small_for_a_picture_fail_before_the_model_is_asked(package, evidence):
-    backend = trellis.Trellis(weights="weights")
+    backend = trellis.Trellis(weights=WEIGHTS)
     empty = tuple(replace(view, mask=np.zeros_like(view.mask)) for view in evidence.pool)
     with pytest.raises(GenerationFailed, match="bottle_1: its masks are too small"):
         backend.make(replace(evidence, pool=empty), "c0", 0)
@@ -135,7 +138,7 @@ def test_masks_too_small_for_a_picture_fail_before_the_model_is_asked(package, e
 
 
 def test_a_mask_that_fills_the_crop_still_has_transparency(package, evidence):
-    backend = trellis.Trellis(weights="weights")
+    backend = trellis.Trellis(weights=WEIGHTS)
     full = replace(evidence.pool[0], mask=np.ones_like(evidence.pool[0].mask))
     assert backend.make(replace(evidence, pool=(full,)), "c0", 0).watertight
 
@@ -146,14 +149,14 @@ def test_what_the_model_raises_costs_one_candidate(package, evidence, monkeypatc
 
     monkeypatch.setattr(package, "to_glb", out_of_memory)
     with pytest.raises(GenerationFailed, match=r"bottle_1: TRELLIS failed on c0: CUDA out of memory\.$") as refusal:
-        trellis.Trellis(weights="weights").make(evidence, "c0", 0)
+        trellis.Trellis(weights=WEIGHTS).make(evidence, "c0", 0)
     assert "\n" not in str(refusal.value)
 
 
 def test_absent_package_and_absent_weights_are_one_line_each(package, monkeypatch):
     with pytest.raises(BackendUnavailable, match="absent-folder cannot be loaded") as refusal:
-        trellis.Trellis(weights="absent-folder")
+        trellis.Trellis(weights=Path("absent-folder"))
     assert "\n" not in str(refusal.value)
     monkeypatch.setitem(sys.modules, "trellis.pipelines", None)
     with pytest.raises(BackendUnavailable, match="TRELLIS package cannot be imported"):
-        trellis.Trellis(weights="other")
+        trellis.Trellis(weights=Path("other"))

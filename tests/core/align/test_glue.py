@@ -1,0 +1,141 @@
+"""SuperGlue and LightGlue through transformers' own classes, with tiny random weights written to a folder."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+transformers = pytest.importorskip("transformers")
+
+import r2c2r_core.align.glue as glue  # noqa: E402  # after the skips
+from r2c2r_core.align.lightglue import LightGlueMatcher  # noqa: E402
+from r2c2r_core.align.superglue import SuperGlueMatcher  # noqa: E402
+from r2c2r_core.errors import BackendUnavailable  # noqa: E402
+
+torch.set_num_threads(1)
+DETECTOR = transformers.SuperPointConfig(
+    encoder_hidden_sizes=[8, 8, 16, 16], decoder_hidden_size=16, descriptor_decoder_dim=16, keypoint_threshold=0.0
+)
+MATCHERS = {"superglue": SuperGlueMatcher, "lightglue": LightGlueMatcher}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Weights of both kinds, as `from_pretrained` finds them."""
+    torch.manual_seed(1)
+    superglue = transformers.SuperGlueConfig(
+        keypoint_detector_config=DETECTOR,
+        hidden_size=16,
+        keypoint_encoder_sizes=[8, 16],
+        gnn_layers_types=["self", "cross"],
+        num_attention_heads=2,
+        sinkhorn_iterations=20,
+    )
+    lightglue = transformers.LightGlueConfig(
+        keypoint_detector_config=DETECTOR,
+        descriptor_dim=16,
+        num_hidden_layers=2,
+        num_attention_heads=2,
+        filter_threshold=0.0,
+        initializer_range=0.5,  # at 0.02 all keypoints look the same to it
+    )
+    found = {}
+    for name, model in {
+        "superglue": transformers.SuperGlueForKeypointMatching(superglue),
+        "lightglue": transformers.LightGlueForKeypointMatching(lightglue),
+    }.items():
+        found[name] = tmp_path_factory.mktemp(name)
+        model.save_pretrained(found[name])
+    return found
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """Two photos of one textured patch, the second moved by (24, 16) pixels."""
+    rng = np.random.default_rng(0)
+    patch = rng.integers(0, 255, (40, 40, 3)).astype(np.uint8).repeat(4, axis=0).repeat(4, axis=1)
+    images, masks = [], []
+    for left, top in ((20, 20), (44, 36)):
+        image, mask = np.full((220, 240, 3), 128, np.uint8), np.zeros((220, 240), bool)
+        image[top : top + 160, left : left + 160], mask[top : top + 160, left : left + 160] = patch, True
+        images.append(image)
+        masks.append(mask)
+    return images, masks
+
+
+@pytest.mark.parametrize("name", MATCHERS)
+def test_keypoints_lie_on_the_object_are_capped_and_keep_their_place(folders, pictures, name):
+    matcher = MATCHERS[name](weights=folders[name])
+    (first, second), masks = pictures
+    features = matcher.describe(first, masks[0])
+    assert 100 < len(features.uv_px) <= glue.KEYPOINTS
+    column, row = features.uv_px.astype(int).T
+    assert masks[0][row, column].all()
+    # the same patch elsewhere in the picture gives the same keypoints, moved: crop and scale are undone exactly
+    moved = matcher.describe(second, masks[1])
+    assert np.allclose(moved.uv_px - features.uv_px, [24, 16], atol=1e-3)
+    assert np.allclose(moved.descriptors, features.descriptors, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", MATCHERS)
+def test_kept_keypoints_match_as_the_model_s_own_call_does(folders, name):
+    """Whole canvas, one image each: what `forward` finds with its own detection is what we find with kept keypoints."""
+    matcher = MATCHERS[name](weights=folders[name])
+    rng = np.random.default_rng(3)
+    side = glue.CANVAS_PX
+    image = rng.integers(0, 255, (side // 8, side // 8)).astype(np.uint8).repeat(8, 0).repeat(8, 1)
+    images = [image, (image.astype(int) + rng.integers(-20, 20, image.shape)).clip(0, 255).astype(np.uint8)]
+    whole = np.ones((side, side), bool)
+    model = matcher._model
+    model.keypoint_detector.keypoint_decoder.max_keypoints = 300  # below our cap: nothing is dropped on our side
+    features = [matcher.describe(np.repeat(image[..., None], 3, axis=2), whole) for image in images]
+    ours = matcher.match(*features)
+    assert len(ours.first) > 0
+    pixels = torch.from_numpy(np.stack(images)[None, :, None].astype(np.float32) / 255).repeat(1, 1, 3, 1, 1)
+    with torch.inference_mode():
+        out = model(pixels)
+    theirs = {}
+    for k, partner in enumerate(out.matches[0, 0].tolist()):
+        if partner >= 0:
+            theirs[place(out.keypoints[0, 0, k], side)] = place(out.keypoints[0, 1, partner], side)
+    assert {tuple(features[0].uv_px[a]): tuple(features[1].uv_px[b]) for a, b in zip(*ours, strict=True)} == theirs
+
+
+def place(share, side):
+    return tuple((share.double() * side).round().numpy() + 0.5)
+
+
+@pytest.mark.parametrize("name", MATCHERS)
+def test_pairs_are_one_to_one_and_nothing_matches_nothing(folders, pictures, name):
+    matcher = MATCHERS[name](weights=folders[name])
+    images, masks = pictures
+    first, second = (matcher.describe(image, mask) for image, mask in zip(images, masks, strict=True))
+    pairs = matcher.match(first, second)
+    assert len(set(pairs.first)) == len(pairs.first) == len(pairs.second) == len(set(pairs.second)) > 0
+    nothing = matcher.describe(images[0], np.zeros_like(masks[0]))
+    assert len(nothing.uv_px) == 0
+    assert len(matcher.match(first, nothing).first) == 0
+    assert len(matcher.match(nothing, nothing).first) == 0
+
+
+def test_of_many_views_only_the_most_alike_go_through_the_network(folders, pictures, monkeypatch):
+    matcher = SuperGlueMatcher(weights=folders["superglue"])
+    images, masks = pictures
+    first, same = (matcher.describe(image, mask) for image, mask in zip(images, masks, strict=True))
+    rng = np.random.default_rng(1)
+    other = matcher.describe(rng.integers(0, 255, images[0].shape).astype(np.uint8), masks[0])
+    monkeypatch.setattr(glue, "SHORTLIST", 1)
+    asked = []
+    match = matcher.match
+    monkeypatch.setattr(matcher, "match", lambda a, b: asked.append(b) or match(a, b))
+    found = matcher.match_many(first, [other, same, other])
+    assert len(asked) == 1
+    assert asked[0] is same
+    assert [len(pairs.first) > 0 for pairs in found] == [False, True, False]
+
+
+@pytest.mark.parametrize("name", MATCHERS)
+def test_a_folder_without_such_weights_is_one_line(tmp_path, name):
+    (tmp_path / "config.json").write_text("{}")
+    with pytest.raises(BackendUnavailable, match=str(tmp_path)) as refusal:
+        MATCHERS[name](weights=tmp_path)
+    assert "\n" not in str(refusal.value)
