@@ -12,6 +12,7 @@ from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.depth import usable_depth
 from r2c2r_core.ingest.gravity import level_room
 from r2c2r_core.ingest.planes import sample_surface
+from r2c2r_core.ingest.poses import refine_poses
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.rgb import stored_jpeg
@@ -51,20 +52,23 @@ def read_capture(
     with new_store(store) as partial:
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
     images = StoredImages(store)
+    refined = refine_poses(
+        frames, images, most_keyframes=config.fused_frames, far_m=config.fused_far_m, progress=progress.part(0.5, 0.6)
+    )
     surface, voxel_m = fuse_frames(
-        frames,
+        refined.frames,
         images,
         most_frames=config.fused_frames,
         finest_voxel_m=config.finest_voxel_m,
         coarsest_voxel_m=config.coarsest_voxel_m,
         depth_max_m=config.fused_far_m,
         smallest_part_m2=config.smallest_part_m2,
-        progress=progress.part(0.5, 0.9),
+        progress=progress.part(0.6, 0.9),
     )
     progress.at(0.9, "levelling")
     rng = np.random.default_rng(config.seed)
     sample = sample_surface(surface.vertices, surface.faces, 30_000, rng)
-    levelled = level_room(sample, [f.world_from_camera for f in frames], recording.up_capture, overrides, rng)
+    levelled = level_room(sample, [f.world_from_camera for f in refined.frames], recording.up_capture, overrides, rng)
     progress.at(0.97, "hashing")
     sha256 = recording.files.sha256(recording.names)
     progress.at(1.0, f"{len(frames)} frames")
@@ -72,7 +76,7 @@ def read_capture(
         name=source.stem if source.is_file() else source.name,
         sha256=sha256,
         format=recording.format,
-        frames=tuple(_in_world(f, levelled.world_from_capture) for f in frames),
+        frames=tuple(_in_world(f, levelled.world_from_capture) for f in refined.frames),
         world_from_capture=levelled.world_from_capture,
         room=levelled.room,
         surface=SceneSurface(
@@ -82,7 +86,8 @@ def read_capture(
             voxel_m=voxel_m,
         ),
         images=images,
-        notices=(*recording.notices, *thinned, *unsure, *bad, *levelled.notices),
+        notices=(*recording.notices, *thinned, *unsure, *bad, *refined.notices, *levelled.notices),
+        poses=refined.evidence,
     )
 
 

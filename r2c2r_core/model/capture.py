@@ -57,6 +57,15 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PoseEvidence:
+    """Where the poses come from, and how far frames that see one place at different times disagree (median, metres)."""
+
+    source: Literal["file", "refined", "odometry"]
+    given_gap_m: float | None  # with the recording's own poses; None: it has none, or no place was seen twice
+    gap_m: float | None  # with the poses used
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneSurface:
     """The fused scan in the world frame."""
 
@@ -79,6 +88,7 @@ class Capture:
     surface: SceneSurface
     images: FrameImages
     notices: tuple[str, ...]  # one line each, for a person
+    poses: PoseEvidence | None = None  # None: not examined
 
     def frame(self, frame_index: int) -> Frame:
         """The frame with that number; KeyError when the recording lacks it."""
