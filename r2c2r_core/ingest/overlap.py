@@ -120,6 +120,24 @@ def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_f
     )
 
 
+class Agreement(NamedTuple):
+    """How two views fit under a relative pose."""
+
+    seen: float  # share of the first one's points that fall on known depth of the second
+    coincide: float  # share of those that lie on its surface, within 3 cm
+
+
+def agreement(first: SmallView, second: SmallView, first_from_second: Rigid3) -> Agreement:
+    """How well `second` fits `first`."""
+    if not len(first.points):
+        return Agreement(0.0, 0.0)
+    there = first_from_second.inverse.apply(first.points)
+    measured, inside = sample_nearest(second.depth_m, project(there, second.camera))
+    seen = int((inside & (measured > 0) & (there[:, 2] > 0.05)).sum())
+    found = match(first, second, Rigid3(), first_from_second, 0.03)
+    return Agreement(seen / len(first.points), len(found.weights) / seen if seen >= 100 else 0.0)
+
+
 def _smoothed(depth_m: DepthMetres) -> DepthMetres:
     """Depth averaged over its own surface; unknown stays unknown."""
     wide = np.where(depth_m > 0, depth_m, np.float32(-10))  # farther from every depth than the filter reaches

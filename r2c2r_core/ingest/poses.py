@@ -33,7 +33,7 @@ _STAY_M, _STAY_DEG = 0.3, 10.0  # keeps the whole from floating away
 _REACHES_M = (0.15, 0.12, 0.08, 0.06, 0.04, 0.04)
 
 
-class Refined(NamedTuple):
+class SettledPoses(NamedTuple):
     """The frames with the poses to use, and why."""
 
     frames: tuple[Frame, ...]
@@ -43,25 +43,25 @@ class Refined(NamedTuple):
 
 def refine_poses(
     frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
-) -> Refined:
+) -> SettledPoses:
     """Poses moved to agree with the depth where that clearly helps pairs which had no part in it; else the given ones."""
     keyframes = spread_frames(frames, most_keyframes)
     views = [small_view(f, images, far_m) for f in progress.each(keyframes, "checking the poses, frame")]
     given = [f.world_from_camera for f in keyframes]
     near, loops = overlapping_pairs(overlaps(views, given))
     if len(loops) < _LEAST_LOOPS:
-        return Refined(tuple(frames), PoseEvidence(source="file", given_gap_m=None, gap_m=None), ())
+        return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=None, gap_m=None), ())
     judges = loops[::_HELD_OUT]
     moved = bring_together(views, given, [*near, *(p for p in loops if p not in set(judges))])
     before, after = median_gap(views, given, judges), median_gap(views, moved, judges)
     if before is None or after is None or not _is_drift(given, moved, before, after):
-        return Refined(tuple(frames), PoseEvidence(source="file", given_gap_m=before, gap_m=before), ())
+        return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=before, gap_m=before), ())
     shift_m = np.linalg.norm([a.translation - b.translation for a, b in zip(moved, given, strict=True)], axis=1)
     notice = (
         f"the poses drift: frames that see one place at different times disagreed by {before * 1000:.1f} mm, "
         f"{after * 1000:.1f} mm after moving the cameras by up to {shift_m.max() * 1000:.0f} mm"
     )
-    return Refined(
+    return SettledPoses(
         carried(frames, keyframes, moved), PoseEvidence(source="refined", given_gap_m=before, gap_m=after), (notice,)
     )
 

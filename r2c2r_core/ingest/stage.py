@@ -11,8 +11,9 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.depth import usable_depth
 from r2c2r_core.ingest.gravity import level_room
+from r2c2r_core.ingest.odometry import estimate_poses
 from r2c2r_core.ingest.planes import sample_surface
-from r2c2r_core.ingest.poses import refine_poses
+from r2c2r_core.ingest.poses import SettledPoses, refine_poses
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.rgb import stored_jpeg
@@ -47,28 +48,27 @@ def read_capture(
     """Read a recording; its images are written below `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
     progress.at(0.0, "opening the recording")
     recording = open_recording(source)
-    raw, thinned = _thinned(_posed(recording), config.most_frames)
+    raw, thinned = _thinned(recording.frames, config.most_frames)
     least_confidence, unsure = _least_confidence(recording, raw, config)
     with new_store(store) as partial:
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
     images = StoredImages(store)
-    refined = refine_poses(
-        frames, images, most_keyframes=config.fused_frames, far_m=config.fused_far_m, progress=progress.part(0.5, 0.6)
-    )
+    settled = _settle_poses(frames, raw, images, config, progress.part(0.5, 0.65))
     surface, voxel_m = fuse_frames(
-        refined.frames,
+        settled.frames,
         images,
         most_frames=config.fused_frames,
         finest_voxel_m=config.finest_voxel_m,
         coarsest_voxel_m=config.coarsest_voxel_m,
         depth_max_m=config.fused_far_m,
         smallest_part_m2=config.smallest_part_m2,
-        progress=progress.part(0.6, 0.9),
+        progress=progress.part(0.65, 0.9),
     )
     progress.at(0.9, "levelling")
     rng = np.random.default_rng(config.seed)
     sample = sample_surface(surface.vertices, surface.faces, 30_000, rng)
-    levelled = level_room(sample, [f.world_from_camera for f in refined.frames], recording.up_capture, overrides, rng)
+    file_up = None if settled.evidence.source == "odometry" else recording.up_capture  # such a world is the first camera's
+    levelled = level_room(sample, [f.world_from_camera for f in settled.frames], file_up, overrides, rng)
     progress.at(0.97, "hashing")
     sha256 = recording.files.sha256(recording.names)
     progress.at(1.0, f"{len(frames)} frames")
@@ -76,7 +76,7 @@ def read_capture(
         name=source.stem if source.is_file() else source.name,
         sha256=sha256,
         format=recording.format,
-        frames=tuple(_in_world(f, levelled.world_from_capture) for f in refined.frames),
+        frames=tuple(_in_world(f, levelled.world_from_capture) for f in settled.frames),
         world_from_capture=levelled.world_from_capture,
         room=levelled.room,
         surface=SceneSurface(
@@ -86,8 +86,8 @@ def read_capture(
             voxel_m=voxel_m,
         ),
         images=images,
-        notices=(*recording.notices, *thinned, *unsure, *bad, *refined.notices, *levelled.notices),
-        poses=refined.evidence,
+        notices=(*recording.notices, *thinned, *unsure, *bad, *settled.notices, *levelled.notices),
+        poses=settled.evidence,
     )
 
 
@@ -128,22 +128,29 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     )
     write_rgb(store, frame.index, jpeg)
     write_depth(store, frame.index, depth)
-    assert frame.capture_from_camera is not None, "frames without a pose were left out"
     return Frame(
         index=frame.index,
         timestamp_s=frame.timestamp_s,
         rgb_camera=frame.rgb_camera,
         depth_camera=frame.depth_camera,
-        world_from_camera=frame.capture_from_camera,
+        world_from_camera=frame.capture_from_camera or Rigid3(),  # settled once all frames are there
         sharpness=sharpness,
     )
 
 
-def _posed(recording: Recording) -> tuple[RawFrame, ...]:
-    frames = tuple(f for f in recording.frames if f.capture_from_camera is not None)
-    if not frames:
-        raise CaptureError(f"{recording.files.source}: no frame has a pose", hint="record again with tracking")
-    return frames
+def _settle_poses(
+    frames: tuple[Frame, ...], raw: Sequence[RawFrame], images: StoredImages, config: IngestConfig, progress: Progress
+) -> SettledPoses:
+    """The recording's poses, refined where they drift; estimated where it has none at all."""
+    posed = {f.index for f in raw if f.capture_from_camera is not None}
+    if not posed:
+        return estimate_poses(frames, images, most_keyframes=config.fused_frames, far_m=config.fused_far_m, progress=progress)
+    kept = tuple(f for f in frames if f.index in posed)
+    settled = refine_poses(kept, images, most_keyframes=config.fused_frames, far_m=config.fused_far_m, progress=progress)
+    if len(kept) == len(frames):
+        return settled
+    lost = f"{len(frames) - len(kept)} of {len(frames)} frames have no pose and were left out"
+    return settled._replace(notices=(lost, *settled.notices))
 
 
 def _thinned(frames: tuple[RawFrame, ...], most: int) -> tuple[tuple[RawFrame, ...], tuple[str, ...]]:

@@ -31,7 +31,7 @@ class Views:
 @pytest.fixture(scope="module")
 def walk() -> tuple[list[Frame], Views]:
     there = ROOM.poses()
-    poses = [*there, *(Rigid3(p.rotation, p.translation + [0.02, -0.05, 0.08]) for p in reversed(there))]
+    poses = [*there, *(Rigid3(p.rotation, p.translation + np.array([0.02, -0.05, 0.08])) for p in reversed(there))]
     camera = ROOM.depth_camera
     frames = [
         Frame(index=k, timestamp_s=None, rgb_camera=ROOM.camera, depth_camera=camera, world_from_camera=p, sharpness=1.0)
@@ -93,7 +93,9 @@ def test_right_poses_stay_exactly_as_they_are(walk):
 def test_a_wrong_convention_is_no_drift(walk):
     frames, views = walk
     wrong = [
-        replace(f, world_from_camera=Rigid3(f.world_from_camera.rotation @ np.diag([1.0, -1, -1]), f.world_from_camera.translation))
+        replace(
+            f, world_from_camera=Rigid3(f.world_from_camera.rotation @ np.diag([1.0, -1, -1]), f.world_from_camera.translation)
+        )
         for f in frames
     ]
     result = refined(wrong, views)

@@ -1,0 +1,85 @@
+"""Points of a colour image that can be found again, with their depth, and the motion between two frames they tell."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import sample_nearest, unproject
+from r2c2r_core.geometry.registration import DegenerateFitError, similarity_ransac, umeyama
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Frame, FrameImages
+
+_WIDTH = 480  # pixels of the searched image: larger ones take longer and find no more that is found again
+_MOST = 600
+_RATIO = 0.8  # Lowe 2004
+_LEAST = 12  # agreeing landmarks: by chance a handful does
+
+
+class Landmarks(NamedTuple):
+    """SIFT key points that have depth: where they are in the camera's frame, and what they look like (RootSIFT)."""
+
+    points: Points
+    descriptors: np.ndarray  # (n, 128), unit length
+
+
+class Motion(NamedTuple):
+    """How one camera stands to another, and how many landmarks say so."""
+
+    first_from_second: Rigid3
+    agreeing: int
+
+
+def find_landmarks(frame: Frame, images: FrameImages, far_m: float) -> Landmarks:
+    """The frame's landmarks within `far_m`."""
+    grey = cv2.cvtColor(images.rgb(frame.index), cv2.COLOR_RGB2GRAY)
+    height = round(grey.shape[0] * _WIDTH / grey.shape[1])
+    small = cv2.resize(grey, (_WIDTH, height), interpolation=cv2.INTER_AREA)
+    found, descriptors = cv2.SIFT.create(nfeatures=_MOST, contrastThreshold=0.02).detectAndCompute(small, None)
+    if not found:
+        return Landmarks(np.zeros((0, 3)), np.zeros((0, 128), np.float32))
+    camera = frame.depth_camera
+    uv = (np.array([p.pt for p in found]) + 0.5) * [camera.width / _WIDTH, camera.height / height]
+    depth, inside = sample_nearest(images.depth(frame.index).metres, uv)
+    known = inside & (depth > 0) & (depth < far_m)
+    root = np.sqrt(descriptors[known] / np.maximum(descriptors[known].sum(axis=1, keepdims=True), 1e-9))
+    return Landmarks(unproject(uv[known], depth[known].astype(np.float64), camera), root)
+
+
+def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator) -> Motion | None:
+    """The rigid motion most of their common landmarks agree on; None when fewer than a dozen do."""
+    there, here = _common(first, second)
+    if len(there) < _LEAST:
+        return None
+    noise_m = 0.01 + 0.006 * first.points[there, 2] ** 2  # of one depth pixel of a Kinect, with the key point a pixel off
+    fit = similarity_ransac(
+        second.points[here],
+        first.points[there],
+        threshold=noise_m,
+        rng=rng,
+        scale_range=(0.97, 1.03),
+        minimum_inliers=_LEAST,
+        rounds=2,
+    )
+    if fit is None:
+        return None
+    try:
+        rigid = umeyama(second.points[here][fit.inliers], first.points[there][fit.inliers], scale=1.0)
+    except DegenerateFitError:
+        return None
+    return Motion(Rigid3(rigid.rotation, rigid.translation), int(fit.inliers.sum()))
+
+
+def _common(first: Landmarks, second: Landmarks) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into both of landmarks that are each other's best match, clearly better than the next."""
+    if min(len(first.points), len(second.points)) < _LEAST:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    likeness = second.descriptors @ first.descriptors.T
+    best = likeness.argmax(axis=1)
+    runner_up, winner = np.partition(likeness, -2, axis=1)[:, -2:].T
+    here = np.arange(len(best))
+    clear = (1.0 - winner) < _RATIO**2 * (1.0 - runner_up)
+    mutual = likeness.argmax(axis=0)[best] == here
+    chosen = clear & mutual
+    return best[chosen], here[chosen]

@@ -1,0 +1,227 @@
+"""Poses for a recording that has none: landmarks and depth from frame to frame and keyframe, loops closed on a pose graph."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.cloud import spread_frames
+from r2c2r_core.ingest.landmarks import Landmarks, find_landmarks, motion_between
+from r2c2r_core.ingest.overlap import SmallView, agreement, overlaps, small_view
+from r2c2r_core.ingest.poses import SettledPoses, bring_together, carried, median_gap, overlapping_pairs
+from r2c2r_core.model.capture import Frame, FrameImages, PoseEvidence
+from r2c2r_core.progress import SILENT, Progress
+
+_AGREEING = 0.7  # share of the common surface that must coincide: right motions reach 0.75 to 0.95
+_RETURN_M, _RETURN_DEG = 0.015, 0.7  # how near there and back must end where it began; wrong motions end centimetres off
+_KEY_OVERLAP = 0.6  # a frame that shares less than this with its keyframe becomes the next one
+_LOOP_LANDMARKS = 20
+_PAIR_REACHES_M = (0.08, 0.05, 0.03)
+_LOOSE_M, _LOOSE_DEG = 0.01, 0.5  # how far the depth may move a motion told by landmarks, one sigma
+_LEAST_FRAMES, _LEAST_SHARE = 5, 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    """What one frame offers for tracking."""
+
+    frame: Frame
+    view: SmallView
+    landmarks: Landmarks
+
+
+@dataclass(slots=True)
+class _Track:
+    """A stretch of frames tracked without a gap; poses are stretch_from_camera."""
+
+    sights: list[_Sight]
+    poses: list[Rigid3]
+    keys: list[int]  # positions of the keyframes
+
+
+def estimate_poses(
+    frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
+) -> SettledPoses:
+    """Poses by RGB-D odometry. A recording with breaks is cut to its longest stretch; raises CaptureError below half of it."""
+    rng = np.random.default_rng(0)
+    track = max(_tracks(frames, images, far_m, rng, progress.part(0.0, 0.7)), key=lambda t: len(t.poses))
+    count = len(track.poses)
+    if count < max(_LEAST_FRAMES, _LEAST_SHARE * len(frames)):
+        raise CaptureError(
+            f"no poses in the recording, and only {count} of {len(frames)} frames could be tracked in one piece",
+            hint="record with tracking on, or move slower and keep textured things in view",
+        )
+    progress.at(0.75, "closing loops")
+    found = _close_loops(track, rng)
+    posed = tuple(replace(s.frame, world_from_camera=p) for s, p in zip(track.sights, found, strict=True))
+    keyframes = spread_frames(posed, most_keyframes)
+    views = {s.frame.index: s.view for s in track.sights}
+    chosen = [views[f.index] for f in keyframes]
+    start = [f.world_from_camera for f in keyframes]
+    near, loops = overlapping_pairs(overlaps(chosen, start))
+    moved = bring_together(chosen, start, [*near, *loops], step_m=_LOOSE_M, step_deg=_LOOSE_DEG)
+    gap_m = median_gap(chosen, moved, loops or near)
+    notices = ["the recording has no poses; they were estimated from its images and depth"]
+    if count < len(frames):
+        first, last = posed[0].index, posed[-1].index
+        notices.append(f"tracking broke: only frames {first} to {last} are used, {count} of {len(frames)}")
+    return SettledPoses(
+        carried(posed, keyframes, moved), PoseEvidence(source="odometry", given_gap_m=None, gap_m=gap_m), tuple(notices)
+    )
+
+
+def _tracks(
+    frames: Sequence[Frame], images: FrameImages, far_m: float, rng: np.random.Generator, progress: Progress
+) -> list[_Track]:
+    """Stretches of frames that could be tracked without a gap."""
+    tracks: list[_Track] = []
+    for position, frame in enumerate(frames):
+        progress.at(position / len(frames), f"tracking frame {position + 1}/{len(frames)}")
+        sight = _Sight(frame, small_view(frame, images, far_m), find_landmarks(frame, images, far_m))
+        pose = _next_pose(tracks[-1], sight, images, rng) if tracks else None
+        if pose is None:
+            tracks.append(_Track([sight], [Rigid3()], [0]))
+            continue
+        track = tracks[-1]
+        track.sights.append(sight)
+        track.poses.append(pose)
+        key = track.keys[-1]
+        shared = agreement(track.sights[key].view, sight.view, track.poses[key].inverse @ pose)
+        if shared.seen < _KEY_OVERLAP:
+            track.keys.append(len(track.poses) - 1)
+    return tracks
+
+
+def _next_pose(track: _Track, sight: _Sight, images: FrameImages, rng: np.random.Generator) -> Rigid3 | None:
+    """Pose of the next frame, to the keyframe where the depth confirms it, else to the frame before; None when it is lost."""
+    before = len(track.poses) - 1
+    for position in dict.fromkeys((track.keys[-1], before)):
+        known = track.sights[position]
+        told = motion_between(known.landmarks, sight.landmarks, rng)
+        confirmed = _confirmed(known, sight, told.first_from_second) if told is not None else None
+        if confirmed is not None:
+            return track.poses[position] @ confirmed
+    steady = track.poses[before - 1].inverse @ track.poses[before] if before > 0 else Rigid3()
+    for guess in (steady, Rigid3()):
+        dense = _dense_motion(track.sights[before], sight, images, guess)
+        if dense is not None:
+            return track.poses[before] @ dense
+    return None
+
+
+def _confirmed(first: _Sight, second: _Sight, first_from_second: Rigid3) -> Rigid3 | None:
+    """The motion, settled on the depth of both frames; None when their surfaces then do not coincide."""
+    a, b = bring_together(
+        [first.view, second.view],
+        [Rigid3(), first_from_second],
+        [(0, 1), (1, 0)],
+        reaches_m=_PAIR_REACHES_M,
+        step_m=_LOOSE_M,
+        step_deg=_LOOSE_DEG,
+    )
+    settled = a.inverse @ b
+    return settled if agreement(first.view, second.view, settled).coincide > _AGREEING else None
+
+
+def _dense_motion(first: _Sight, second: _Sight, images: FrameImages, guess: Rigid3) -> Rigid3 | None:
+    """first_from_second by the colour and depth of every pixel, where landmarks are too few; None unless both ways agree.
+
+    Plain surfaces fit wherever they are slid to, so coinciding depth alone proves nothing here.
+    """
+    there = _rgbd_odometry(first.frame, second.frame, images, guess)
+    back = _rgbd_odometry(second.frame, first.frame, images, guess.inverse)
+    if there is None or back is None:
+        return None
+    missed = there @ back
+    turned_deg = np.degrees(np.arccos(np.clip((np.trace(missed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
+    if np.linalg.norm(missed.translation) > _RETURN_M or turned_deg > _RETURN_DEG:
+        return None
+    return _confirmed(first, second, there)
+
+
+def _rgbd_odometry(first: Frame, second: Frame, images: FrameImages, guess: Rigid3) -> Rigid3 | None:
+    """first_from_second by Open3D's colour and depth odometry (Park et al. 2017); None where it finds nothing in common."""
+    import open3d as o3d
+
+    odometry: Any = o3d.t.pipelines.odometry
+    core: Any = o3d.core
+    matrix = first.depth_camera.matrix
+    matrix[:2, 2] -= 0.5  # Open3D's odometry counts pixel centres at integers
+    try:
+        result = odometry.rgbd_odometry_multi_scale(
+            _rgbd(second, images),
+            _rgbd(first, images),
+            core.Tensor(matrix),
+            core.Tensor(guess.matrix),
+            1.0,
+            5.0,
+            [odometry.OdometryConvergenceCriteria(n) for n in (12, 8, 5)],
+            odometry.Method.Hybrid,
+            odometry.OdometryLossParams(0.07, 0.05, 0.1),
+        )
+    except RuntimeError:  # "Singular 6x6 linear system detected, tracking failed."
+        return None
+    return Rigid3.from_matrix(result.transformation.numpy())
+
+
+def _rgbd(frame: Frame, images: FrameImages) -> Any:
+    import open3d as o3d
+
+    size = (frame.depth_camera.width, frame.depth_camera.height)
+    colour = cv2.resize(images.rgb(frame.index), size, interpolation=cv2.INTER_AREA)
+    image: Any = o3d.t.geometry.Image
+    return o3d.t.geometry.RGBDImage(
+        image(np.ascontiguousarray(colour)), image(np.ascontiguousarray(images.depth(frame.index).metres))
+    )
+
+
+def _close_loops(track: _Track, rng: np.random.Generator) -> list[Rigid3]:
+    """The track's poses after its keyframes were held together by every loop that landmarks and depth confirm."""
+    import open3d as o3d
+
+    registration: Any = o3d.pipelines.registration
+    keys = track.keys
+    graph = registration.PoseGraph()
+    for key in keys:
+        graph.nodes.append(registration.PoseGraphNode(track.poses[key].matrix))
+    for i in range(len(keys) - 1):
+        motion = track.poses[keys[i]].inverse @ track.poses[keys[i + 1]]
+        graph.edges.append(_edge(i + 1, i, motion.matrix, uncertain=False))
+    loops = 0
+    for i in range(len(keys)):
+        for j in range(i + 2, len(keys)):
+            first, second = track.sights[keys[i]], track.sights[keys[j]]
+            told = motion_between(first.landmarks, second.landmarks, rng)
+            if told is None or told.agreeing < _LOOP_LANDMARKS:
+                continue
+            settled = _confirmed(first, second, told.first_from_second)
+            if settled is not None:
+                graph.edges.append(_edge(j, i, settled.matrix, uncertain=True))
+                loops += 1
+    if not loops:
+        return list(track.poses)
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        registration.global_optimization(
+            graph,
+            registration.GlobalOptimizationLevenbergMarquardt(),
+            registration.GlobalOptimizationConvergenceCriteria(),
+            registration.GlobalOptimizationOption(
+                max_correspondence_distance=0.05, edge_prune_threshold=0.25, reference_node=0
+            ),
+        )
+    key_poses = [Rigid3.from_matrix(np.asarray(node.pose)) for node in graph.nodes]
+    owner = np.searchsorted(keys, np.arange(len(track.poses)), side="right") - 1
+    return [key_poses[k] @ track.poses[keys[k]].inverse @ pose for k, pose in zip(owner.tolist(), track.poses, strict=True)]
+
+
+def _edge(source: int, target: int, target_from_source: np.ndarray, *, uncertain: bool) -> Any:
+    import open3d as o3d
+
+    # One sigma of 5 mm and 0.2 deg, as measured between keyframes; the rotation comes first
+    information = np.diag([1.0 / np.radians(0.2) ** 2] * 3 + [1.0 / 0.005**2] * 3)
+    edge: Any = o3d.pipelines.registration.PoseGraphEdge
+    return edge(source, target, target_from_source, information, uncertain)
