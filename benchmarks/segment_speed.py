@@ -26,6 +26,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.model.capture import Capture
@@ -36,6 +37,7 @@ from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
 
 RESULTS = Path(__file__).resolve().parent / "segment.json"
+_PREVIEW_WIDTH = 960  # of the app's masks
 _SEEN_PX = 400  # a smaller true mask is no target for a click, and no measure of overlap
 
 
@@ -68,6 +70,7 @@ def measure(sample: Path, capture: Capture, cache: Path, options: argparse.Names
     with _timed() as second:
         session = open_session(capture, cache)
     numbers["reopen"] = second.seconds
+    fresh = open_session(capture, cache)  # knows no object yet
     prompts = [p for p in read_prompts(sample / "prompts.json").objects if not options.objects or p.name in options.objects]
     truth = {prompt.name: _truth(sample, prompt.name) for prompt in prompts}
     rng = np.random.default_rng(options.seed)
@@ -82,7 +85,7 @@ def measure(sample: Path, capture: Capture, cache: Path, options: argparse.Names
         second_clicks += again
         entry: dict[str, Any] = {"first_ms": [span.millis for span in spans], "second_ms": [span.millis for span in again]}
         if options.stream:
-            entry |= _stream(session, prompt, truth[prompt.name])
+            entry |= _stream(session, fresh, prompt, truth[prompt.name])
         objects[prompt.name] = entry
         print(prompt.name, entry, file=sys.stderr, flush=True)
     numbers |= {"first_click": _distribution(first_clicks), "second_click": _distribution(second_clicks)}
@@ -120,17 +123,18 @@ def _timed() -> Iterator[_Span]:
 
 
 def _click(session: SegmentSession, prompt: ObjectPrompt) -> _Span:
-    """From a click to the mask in the frame that was clicked last."""
+    """From a click to the first mask in the frame that was clicked last, as in the app."""
     with _timed() as span:
         try:
-            session.mask_at(prompt, prompt.points[-1].frame)
+            first = session.glimpse(prompt) or next(session.stream(prompt))
+            mask_bits(first[1], _PREVIEW_WIDTH)
         except Exception as error:  # a click may miss; the time still counts
             print(f"{prompt.name}: {error}", file=sys.stderr)
     return span
 
 
-def _stream(session: SegmentSession, prompt: ObjectPrompt, truth: dict[int, Path]) -> dict[str, Any]:
-    """All frames of one object: masks a second, and how good they are."""
+def _stream(session: SegmentSession, fresh: SegmentSession, prompt: ObjectPrompt, truth: dict[int, Path]) -> dict[str, Any]:
+    """All frames of one object: masks a second, how good they are, and how well the first look agreed with them."""
     with _timed() as span:
         masks = {index: packed for index, packed, _ in session.stream(prompt)}
     overlaps = []
@@ -139,12 +143,14 @@ def _stream(session: SegmentSession, prompt: ObjectPrompt, truth: dict[int, Path
         if true.sum() >= _SEEN_PX:
             overlaps.append(mask_iou(unpack_mask(masks[index]), true) if index in masks else 0.0)
     kind = session.track(prompt).kind
+    coarse = fresh.glimpse(prompt)
     return {
         "kind": kind,
         "frames": len(masks),
         "fps": round(len(masks) / span.wall_s, 1),
         "cpu_fps": round(len(masks) / span.cpu_s, 1),
         "iou": round(float(np.mean(overlaps)), 4) if overlaps else None,
+        "preview_iou": round(mask_iou(unpack_mask(coarse[1]), unpack_mask(masks[coarse[0]])), 3) if coarse else None,
     }
 
 
@@ -157,6 +163,7 @@ def _by_kind(objects: dict[str, Any]) -> dict[str, Any]:
         table[kind] = {
             "least_fps": min(entry["fps"] for entry in members),
             "least_cpu_fps": min(entry["cpu_fps"] for entry in members),
+            "least_preview_iou": min((entry["preview_iou"] for entry in members if entry["preview_iou"]), default=None),
             "mean_iou": round(float(np.mean([entry["iou"] for entry in members if entry["iou"] is not None])), 4),
         }
     return table

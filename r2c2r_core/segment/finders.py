@@ -19,7 +19,7 @@ from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import small_mask
-from r2c2r_core.segment.small import find_small
+from r2c2r_core.segment.small import find_small, glimpse_small
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import Thing, find_thing, thing_mask
 
@@ -139,6 +139,14 @@ def find_object(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, posi
     )
 
 
+def glimpse_object(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> "Found | None":
+    """A first look at what is slow to find, from depth alone: small things. None for the rest, which are found at once."""
+    if hint.kind != "thing" or hint.thing.radius_m >= _SMALL_M or not len(positives):
+        return None
+    small = glimpse_small(bench.scene, positives, negatives, hint.thing, _structure_off(bench, positives[0]))
+    return FoundThing(small, bench.scene, small=True, round=hint.thing.round) if small is not None else None
+
+
 def _front(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> FoundFront | None:
     region = region_at(bench.planes, positives[0])
     run = bench.run_of(region) if region is not None else None
@@ -211,10 +219,15 @@ def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
 def _thing(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> FoundThing | None:
     config = hint.thing
     if config.radius_m < _SMALL_M:
-        structure = tuple(plane for plane in bench.planes if plane.area_m2 > 0.4)
-        structure = tuple(plane for plane in structure if plane is not region_at(structure, positives[0], 0.02))
-        small = find_small(bench.scene, positives, negatives, config, structure)
+        small = find_small(bench.scene, positives, negatives, config, _structure_off(bench, positives[0]))
         if small is not None:
             return FoundThing(small, bench.scene, small=True, round=config.round)
     thing = find_thing(bench.scene, positives, negatives, config)
     return FoundThing(thing, bench.scene) if thing is not None else None
+
+
+def _structure_off(bench: Workbench, point: Vector3) -> tuple[PlaneRegion, ...]:
+    """Walls and runs that a thing may touch; not the one it is itself."""
+    structure = tuple(plane for plane in bench.planes if plane.area_m2 > 0.4)
+    own = region_at(structure, point, 0.02)
+    return tuple(plane for plane in structure if plane is not own)

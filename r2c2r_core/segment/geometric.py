@@ -18,12 +18,13 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.segment.categories import Kind, hint_for
-from r2c2r_core.segment.finders import appliance_margins, find_object
+from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
+from r2c2r_core.segment.finders import appliance_margins, find_object, glimpse_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import kept
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.proposals import propose_steps
+from r2c2r_core.segment.protocol import Glimpse
 from r2c2r_core.segment.runs import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.segment.stage import SegmentConfig
@@ -91,6 +92,13 @@ class GeometricSession:
             )
         return self.find(prompt).mask(self.scene.frame(frame_index))[0]
 
+    def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
+        """A first mask in the frame clicked last: what `stream` brings there, or for small things, from depth alone."""
+        found = self._found.get(prompt) or glimpse_object(self, *self._clicked(prompt)) or self.find(prompt)
+        frame = self.scene.frame(prompt.points[-1].frame)
+        mask, trust = found.mask(frame)
+        return (frame.index, pack_mask(mask), trust) if np.count_nonzero(mask) >= self.config.least_area_px else None
+
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
         """The object in every frame that sees it; raises ObjectNotSeen when none does."""
         progress.at(0.0, f"{prompt.name}: finding it")
@@ -119,10 +127,10 @@ class GeometricSession:
             warnings=found.warnings,
         )
 
-    def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
-        """Frame, mask, confidence: the clicked frame first, then outwards both ways."""
+    def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:
+        """Frame, mask, confidence: the frame clicked last, then outwards both ways."""
         found = self.find(prompt)
-        for frame in _outwards(self.scene.frames, prompt.points[0].frame):
+        for frame in _outwards(self.scene.frames, prompt.points[-1].frame):
             mask, trust = found.mask(frame)
             if np.count_nonzero(mask) >= self.config.least_area_px:
                 yield frame.index, pack_mask(mask), trust
@@ -133,13 +141,11 @@ class GeometricSession:
 
     def find(self, prompt: ObjectPrompt) -> Found:
         """What the clicks mean, computed once a prompt."""
-        if prompt not in self._found:
-            check_prompt(self.scene.capture, prompt)
-            hint = hint_for(prompt.category)
-            positives = self._points(prompt, 1, must_hit=hint.kind != "appliance")
-            negatives = self._points(prompt, 0, must_hit=False)
-            self._found[prompt] = find_object(self, prompt, hint, positives, negatives)
-        return self._found[prompt]
+        found = self._found.get(prompt)
+        if found is None:
+            hint, positives, negatives = self._clicked(prompt)
+            found = self._found[prompt] = find_object(self, prompt, hint, positives, negatives)
+        return found
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
         """The furniture run on a plane, and this far around it; computed once."""
@@ -156,6 +162,13 @@ class GeometricSession:
         tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
         for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
             progress.at(done / len(tasks), f"cutting furniture runs {done}/{len(tasks)}")
+
+    def _clicked(self, prompt: ObjectPrompt) -> tuple[CategoryHint, Points, Points]:
+        """What the category says, and the world points clicked on it and off it."""
+        check_prompt(self.scene.capture, prompt)
+        hint = hint_for(prompt.category)
+        positives = self._points(prompt, 1, must_hit=hint.kind != "appliance")
+        return hint, positives, self._points(prompt, 0, must_hit=False)
 
     def _points(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Points:
         """World points under the clicks of one label; raises PromptError where one must hit a surface and does not."""

@@ -90,6 +90,10 @@ class LearnedSession:
         assert found is not None
         return unpack_mask(found)
 
+    def glimpse(self, prompt: ObjectPrompt) -> Found | None:
+        """None: the model's own first mask comes first in `stream`, and the model is not for two threads."""
+        return None
+
     def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
         """Frame, mask and confidence as the model gives them: clicked frames first, then outwards both ways."""
         return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)

@@ -11,10 +11,10 @@ from typing import Generic, TypeVar
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import DepthMetres, Image, Vector3
+from r2c2r_core.arrays import DepthMetres, Image, Points, Vector3
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.segment.surface import draw, drawn_size, in_threads, parts_of
+from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, in_threads, parts_of
 
 T = TypeVar("T", Image, DepthMetres)
 
@@ -27,7 +27,9 @@ class Scene:
 
     capture: Capture
     rendered_mm: dict[int, np.ndarray]  # uint16 millimetres, 0 = nothing
+    parts: SurfaceParts
     _frames: dict[int, Frame] = field(default_factory=dict)
+    _camera_from_world: np.ndarray | None = None
     _rgb: "_Recent[Image]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES))
     _depth: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
     _filled: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
@@ -42,6 +44,12 @@ class Scene:
         if not self._frames:
             self._frames = {frame.index: frame for frame in self.capture.frames}
         return self._frames[frame_index]
+
+    def seen_from_all(self, point_world: Vector3) -> Points:
+        """A world point in the camera frame of every frame, (frames, 3)."""
+        if self._camera_from_world is None:
+            self._camera_from_world = np.stack([frame.world_from_camera.inverse.matrix for frame in self.frames])[:, :3]
+        return np.asarray(self._camera_from_world @ np.append(point_world, 1.0))
 
     def rgb(self, frame_index: int) -> Image:
         """The colour image; the latest few hundred megabytes stay in memory."""
@@ -114,12 +122,12 @@ def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT)
     """Draw the fused surface into every frame, or take it from `cache`."""
     path = cache / "surface_depth.npz"
     indices = np.array([frame.index for frame in capture.frames])
+    parts = parts_of(capture.surface)
     if path.is_file():
         with np.load(path) as stored:
             if np.array_equal(stored["frames"], indices):
-                images = stored["millimetres"]
-                return Scene(capture=capture, rendered_mm=dict(zip(indices.tolist(), images, strict=True)))
-    parts = parts_of(capture.surface)
+                drawn_before = dict(zip(indices.tolist(), stored["millimetres"], strict=True))
+                return Scene(capture=capture, rendered_mm=drawn_before, parts=parts)
     rendered: dict[int, np.ndarray] = {}
     for frame, drawn in zip(capture.frames, in_threads(lambda frame: draw(parts, frame), capture.frames), strict=True):
         rendered[frame.index] = drawn
@@ -129,7 +137,7 @@ def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT)
         unfinished = cache / f".surface_depth.{os.getpid()}.npz"
         np.savez(unfinished, frames=indices, millimetres=np.stack(list(rendered.values())))
         unfinished.replace(path)
-    return Scene(capture=capture, rendered_mm=rendered)
+    return Scene(capture=capture, rendered_mm=rendered, parts=parts)
 
 
 class _Recent(Generic[T]):

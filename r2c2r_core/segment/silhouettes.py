@@ -6,7 +6,7 @@ import numpy as np
 from r2c2r_core.arrays import Mask, Pixels, Points, Vector3
 from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.occlusion import colour_gradient
+from r2c2r_core.segment.occlusion import colour_gradient, flood
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import Thing
 
@@ -29,7 +29,7 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
     shift = _best_shift(hull, gradient, reach_px=round(thing.pose_error_m * scale))
     hull = _moved(hull, shift)
     band_m = band_m or (0.006 if len(thing.faces) else 0.010)  # a mere cylinder says little about the outline
-    mask = _snapped(hull, hidden | _behind(thing, scene, frame)[area], gradient, max(1.5, band_m * scale))
+    mask = _snapped(hull, hidden | _behind(thing, scene, frame, area), gradient, max(1.5, band_m * scale))
     empty[area] = mask & ~hidden
     return empty, share
 
@@ -98,24 +98,29 @@ def hull_view(thing: Thing, scene: Scene, frame: Frame, pad_m: float) -> tuple[M
     if hull.sum() < 8:
         return None
     area = (slice(top, bottom), slice(left, right))
-    return hull > 0, occluders(thing, scene, frame)[area], area, scale
+    return hull > 0, occluders(thing, scene, frame, area), area, scale
 
 
-def occluders(thing: Thing, scene: Scene, frame: Frame) -> Mask:
-    """Colour pixels where something stands clearly nearer than the thing."""
+def occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice] | None = None) -> Mask:
+    """Colour pixels (all, or of an area) where something stands clearly nearer than the thing."""
     nearest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].min())
     depth = scene.filled_depth(frame.index)
-    hidden = (depth > 0) & (depth < nearest - 0.03 - 0.01 * nearest)
-    size = (frame.rgb_camera.width, frame.rgb_camera.height)
-    return np.asarray(cv2.resize(hidden.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
+    return _at_colour((depth > 0) & (depth < nearest - 0.03 - 0.01 * nearest), frame, area)
 
 
-def _behind(thing: Thing, scene: Scene, frame: Frame) -> Mask:
-    """Colour pixels where the sensor saw something clearly farther than the thing."""
+def _behind(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> Mask:
+    """Colour pixels of an area where the sensor saw something clearly farther than the thing."""
     farthest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].max())
-    farther = scene.depth(frame.index) > farthest + 0.02 + 0.01 * farthest
-    size = (frame.rgb_camera.width, frame.rgb_camera.height)
-    return np.asarray(cv2.resize(farther.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
+    return _at_colour(scene.depth(frame.index) > farthest + 0.02 + 0.01 * farthest, frame, area)
+
+
+def _at_colour(flags: Mask, frame: Frame, area: tuple[slice, slice] | None) -> Mask:
+    """Flags of depth pixels at the colour pixels that they lie under."""
+    width, height = frame.rgb_camera.width, frame.rgb_camera.height
+    rows, columns = area or (slice(0, height), slice(0, width))
+    row = np.arange(rows.start, rows.stop) * flags.shape[0] // height
+    column = np.arange(columns.start, columns.stop) * flags.shape[1] // width
+    return flags[row[:, None], column]
 
 
 def _splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
@@ -156,8 +161,6 @@ def _moved(hull: Mask, shift: tuple[int, int]) -> Mask:
 
 def _snapped(hull: Mask, off: Mask, gradient: np.ndarray, band_px: float) -> Mask:
     """The hull with its border moved, within the band, onto the strongest edge."""
-    from skimage.segmentation import watershed
-
     outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
     inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     deep = min(band_px, 0.6 * float(inside.max()))
@@ -167,4 +170,4 @@ def _snapped(hull: Mask, off: Mask, gradient: np.ndarray, band_px: float) -> Mas
     markers[off & (outside > 0.25 * band_px)] = 2
     if not (markers == 1).any() or not (markers == 2).any():
         return hull
-    return np.asarray(watershed(gradient, markers) == 1)
+    return np.asarray(flood(gradient, markers) == 1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
@@ -13,7 +13,10 @@ from r2c2r_core.segment.upright import upright_shape
 from r2c2r_core.segment.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 
 _FRAMES = 18
+_GLIMPSE_FRAMES = 6
+_VOXELS, _GLIMPSE_VOXELS = 100_000, 25_000
 _POSES_AGREE_M = 0.006  # phones: below 0.005; KinectFusion on the real kitchen: 0.009
+_NEAR_SUPPORT_M = 0.05  # more than a frame's height may be off
 _OFF_SUPPORT_M, _OFF_WALL_M = 0.012, 0.03  # nearer points are the structure's
 _DEPTH_SLACK_M = 0.022  # what coarse depth of a curved thing is off by
 _SEEN_THROUGH = 0.12  # share of the views that may err before a voxel counts as empty
@@ -32,11 +35,7 @@ def find_small(
     spread = _pose_spread(scene, views, support, positives.mean(axis=0))
     if spread > _POSES_AGREE_M:
         return upright_shape(scene, positives, views, config, support)  # frames disagree by more than fusing bears
-    front = _seen_points(scene, views, voxels, positives, support, structure)
-    if len(front) < 12:
-        return None
-    solid = _carve(voxels, scene, views, support) & _as_deep_as_wide(voxels, front, views)
-    solid = part_at(solid, voxels, positives, negatives, reach_m=0.03)
+    solid = _depth_hull(scene, views, voxels, positives, negatives, support, structure)
     if solid is None:
         return None
     voxels, solid = cropped(voxels, solid)
@@ -60,6 +59,36 @@ def find_small(
     return thing
 
 
+def glimpse_small(
+    scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
+) -> Thing | None:
+    """The same from the depth of a few frames alone: a first look within the time of a click."""
+    support = support_height(scene, positives, config)
+    views = _best_views(scene, positives.mean(axis=0), _GLIMPSE_FRAMES)[:_GLIMPSE_FRAMES]
+    if len(views) < 2:
+        return None
+    voxels = _voxels_around(scene, positives, config, support, _GLIMPSE_VOXELS)
+    solid = _depth_hull(scene, views, voxels, positives, negatives, support, structure)
+    return mesh_of(solid.astype(np.float32), 0.5, voxels, support) if solid is not None else None
+
+
+def _depth_hull(
+    scene: Scene,
+    views: list[Frame],
+    voxels: Voxels,
+    positives: Points,
+    negatives: Points,
+    support: float | None,
+    structure: tuple[PlaneRegion, ...],
+) -> np.ndarray | None:
+    """The solid that depth leaves at the clicks; None where it shows nothing that stands apart."""
+    front = _seen_points(scene, views, voxels, positives, support, structure)
+    if len(front) < 12:
+        return None
+    solid = _carve(voxels, scene, views, support) & _as_deep_as_wide(voxels, front, views)
+    return part_at(solid, voxels, positives, negatives, reach_m=0.03)
+
+
 def _too_wide(thing: Thing, config: ThingConfig) -> bool:
     """Whether the hull is far wider than such a thing can be: it took in a neighbour."""
     width = np.ptp(np.quantile(thing.vertices[:, :2], [0.02, 0.98], axis=0), axis=0).min()
@@ -79,7 +108,7 @@ def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre
     return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0
 
 
-def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None) -> Voxels:
+def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None, count: int = _VOXELS) -> Voxels:
     reach = 1.25 * config.radius_m + 0.02
     low, high = positives.min(axis=0) - reach, positives.max(axis=0) + reach
     low[2], high[2] = positives[:, 2].min() - 2.2 * config.radius_m, positives[:, 2].max() + 2.2 * config.radius_m
@@ -94,15 +123,14 @@ def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support
         low + 0.3 * reach * away / max(np.linalg.norm(away), 1e-6),
         high + 0.3 * reach * away / max(np.linalg.norm(away), 1e-6),
     )
-    size = max(0.003, float(np.prod(high - low) / 100_000) ** (1 / 3))
+    size = max(0.003, float(np.prod(high - low) / count) ** (1 / 3))
     return Voxels(low, size, tuple(np.ceil((high - low) / size).astype(int).tolist()))
 
 
 def _best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
     """Frames in which nothing hides the point, spread over the directions they look from."""
     rated: list[tuple[float, Frame, float]] = []
-    for frame in scene.frames:
-        local = frame.world_from_camera.inverse.apply(point[None])[0]
+    for frame, local in zip(scene.frames, scene.seen_from_all(point), strict=True):
         camera = frame.rgb_camera
         if local[2] < 0.2:
             continue
@@ -155,10 +183,10 @@ def _seen_points(
     cell = max(voxels.size_m, 0.008)
     extent = np.array(voxels.shape) * voxels.size_m
     shape = np.ceil(extent / cell).astype(int)
+    low, high = voxels.origin - _NEAR_SUPPORT_M, voxels.origin + shape * cell + _NEAR_SUPPORT_M
     hits = np.zeros(shape, np.int32)
     for frame in views:
-        depth = scene.depth(frame.index)
-        points = frame.world_from_camera.apply(depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64))
+        points = frame.world_from_camera.apply(_depth_points_near(scene, frame, low, high))
         points = raised(points, -support_offset(scene, frame, support, positives.mean(axis=0)))
         at = np.floor((points - voxels.origin) / cell).astype(int)
         at[:, 2] = np.where(points[:, 2] < voxels.origin[2] + _OFF_SUPPORT_M, -1, at[:, 2])
@@ -175,6 +203,21 @@ def _seen_points(
     grid = Voxels(voxels.origin, cell, tuple(shape.tolist()))
     chosen = {label for point in positives if (label := label_near(labels, grid, point, 0.035))}
     return (np.argwhere(np.isin(labels, sorted(chosen))) + 0.5) * cell + voxels.origin if chosen else np.zeros((0, 3))
+
+
+def _depth_points_near(scene: Scene, frame: Frame, low: Vector3, high: Vector3) -> Points:
+    """Camera-frame points of the depth pixels under a world box, and of some around it."""
+    depth, camera = scene.depth(frame.index), frame.depth_camera
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
+    local = frame.world_from_camera.inverse.apply(corners)
+    left, top, right, bottom = 0, 0, camera.width, camera.height
+    if local[:, 2].min() > 0.05:
+        uv = project(local, camera)
+        left, top = np.clip(np.floor(uv.min(axis=0)), 0, [right, bottom]).astype(int)
+        right, bottom = np.clip(np.ceil(uv.max(axis=0)), 0, [right, bottom]).astype(int)
+    row, column = np.nonzero(depth[top:bottom, left:right] > 0)
+    row, column = row + top, column + left
+    return unproject(np.stack([column + 0.5, row + 0.5], axis=1), depth[row, column].astype(np.float64), camera)
 
 
 def _as_deep_as_wide(voxels: Voxels, front: Points, views: list[Frame]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The fused surface as each frame would see it: occluders that the sensor missed, and depth where it has none."""
+"""The fused surface in parts: what lies near a point, and what each frame would see of it."""
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame, SceneSurface
@@ -17,7 +17,8 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 WIDTH_PX = 256  # of the drawn surface: the occluders that sensors miss are broad
-_PART_M = 0.5  # parts of the surface outside the view are left out
+_PART_M = 0.5
+_NONE = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,17 +27,33 @@ class SurfaceParts:
 
     vertices: Points  # float32
     faces: Faces  # sorted by part
+    numbers: np.ndarray  # of each of them in the surface
     starts: np.ndarray  # of each part in `faces`, and the end
     centres: Points
     radii_m: np.ndarray
+    upward: np.ndarray  # cosine between each face's normal and up, by its number in the surface
+
+    def faces_near(self, point_world: Vector3, reach_m: float, *, any_height: bool = False) -> np.ndarray:
+        """Numbers, in order, of the surface's faces that may have a corner within reach; farther ones may be among them."""
+        away = (self.centres - point_world)[:, : 2 if any_height else 3]
+        near = np.flatnonzero(np.linalg.norm(away, axis=1) < reach_m + self.radii_m)
+        return np.sort(np.concatenate([self.numbers[self.starts[i] : self.starts[i + 1]] for i in near] or [_NONE]))
 
 
 def parts_of(surface: SceneSurface) -> SurfaceParts:
     """Cut a surface at a coarse grid."""
+    if len(surface.faces) == 0:
+        empty = surface.faces.astype(np.int32)
+        nothing = np.zeros(0)
+        return SurfaceParts(
+            surface.vertices_world.astype(np.float32), empty, _NONE, _NONE[:1], np.zeros((0, 3)), nothing, nothing
+        )
     corners = surface.vertices_world[surface.faces]
     middles = corners.mean(axis=1)
     cells = np.floor(middles / _PART_M).astype(np.int64)
-    _, part = np.unique(cells, axis=0, return_inverse=True)
+    cells -= cells.min(axis=0)
+    span = cells.max(axis=0) + 1
+    _, part = np.unique((cells[:, 0] * span[1] + cells[:, 1]) * span[2] + cells[:, 2], return_inverse=True)
     order = np.argsort(part, kind="stable")
     counts = np.bincount(part)
     centres = np.stack([np.bincount(part, middles[:, k]) for k in range(3)], axis=1) / np.maximum(counts, 1)[:, None]
@@ -44,9 +61,17 @@ def parts_of(surface: SceneSurface) -> SurfaceParts:
     radii = np.zeros(len(counts))
     np.maximum.at(radii, part, reach)
     starts = np.concatenate([[0], counts.cumsum()])
-    return SurfaceParts(
-        surface.vertices_world.astype(np.float32), surface.faces[order].astype(np.int32), starts, centres, radii
-    )
+    vertices = surface.vertices_world.astype(np.float32)
+    faces = surface.faces[order].astype(np.int32)
+    return SurfaceParts(vertices, faces, order, starts, centres, radii, _upward(corners))
+
+
+def _upward(corners: np.ndarray) -> np.ndarray:
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    x = first[:, 1] * second[:, 2] - first[:, 2] * second[:, 1]
+    y = first[:, 2] * second[:, 0] - first[:, 0] * second[:, 2]
+    z = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return np.asarray(z / np.maximum(np.sqrt(x * x + y * y + z * z), 1e-12))
 
 
 def draw(parts: SurfaceParts, frame: Frame) -> np.ndarray:

@@ -117,17 +117,17 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
         return 0.0 if scene.capture.room.floor_found else None
     vertices, faces = scene.capture.surface.vertices_world, scene.capture.surface.faces
     lowest = positives[np.argmin(positives[:, 2])]
-    near = np.linalg.norm(vertices[:, :2] - lowest[:2], axis=1) < _SUPPORT_REACH_M + config.radius_m
-    local = faces[near[faces].all(axis=1)]
-    if len(local) == 0:
+    reach = _SUPPORT_REACH_M + config.radius_m
+    near = scene.parts.faces_near(lowest, reach, any_height=True)
+    corners = vertices[faces[near[scene.parts.upward[near] > _LEVEL_COS]]]
+    corners = corners[(np.linalg.norm(corners[..., :2] - lowest[:2], axis=2) < reach).all(axis=1)]
+    if len(corners) == 0:
         return None
-    corners = vertices[local]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1) / 2
-    level = cross[:, 2] > _LEVEL_COS * 2 * np.maximum(area, 1e-12)
-    heights, areas = corners.mean(axis=1)[level, 2], area[level]
+    heights = corners[..., 2].mean(axis=1)
     below = heights < lowest[2] - 0.004
-    heights, areas = heights[below], areas[below]
+    heights, areas = heights[below], area[below]
     if len(heights) == 0:
         return None
     bins = np.floor((heights - heights.min()) / 0.005).astype(int)
@@ -169,14 +169,21 @@ def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: flo
     reach = reach_m + float(np.linalg.norm(positives - centre, axis=1).max())
     if voxel_m is None or voxel_m >= scene.capture.surface.voxel_m:
         surface = scene.capture.surface
-        vertices, faces, colours = surface.vertices_world, surface.faces, surface.colours
+        vertices, colours = surface.vertices_world, surface.colours
+        faces = surface.faces[scene.parts.faces_near(centre, reach)]
     else:
         fine = fuse_depth(_views_of(scene, centre, reach), voxel_m, depth_max_m=4.0, block_count=32_000)
         vertices, faces, colours = fine.vertices, fine.faces, fine.colours
-    near = np.linalg.norm(vertices - centre, axis=1) < reach
-    faces = faces[near[faces].all(axis=1)] if len(faces) else faces
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return vertices[used], renumbered.reshape(-1, 3), colours[used]
+    near = (np.linalg.norm(vertices[faces] - centre, axis=2) < reach).all(axis=1)
+    used, renumbered = _renumbered(faces[near], len(vertices))
+    return vertices[used], renumbered, colours[used]
+
+
+def _renumbered(faces: Faces, count: int) -> tuple[np.ndarray, Faces]:
+    """The vertices (of `count`) that faces use, and the faces with numbers among them."""
+    used = np.zeros(count, bool)
+    used[faces] = True
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[faces]
 
 
 def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> list[DepthView]:
@@ -212,5 +219,5 @@ def _extract(vertices: Points, faces: Faces, chosen: np.ndarray, support: float 
     kept = faces[chosen]
     if len(kept) < 8:
         return None
-    used, renumbered = np.unique(kept, return_inverse=True)
-    return Thing(vertices[used], renumbered.reshape(-1, 3), support)
+    used, renumbered = _renumbered(kept, len(vertices))
+    return Thing(vertices[used], renumbered, support)
