@@ -109,10 +109,13 @@ def info(options: argparse.Namespace) -> int:
     from r2c2r_core.ingest.doctor import examine
     from r2c2r_core.ingest.readers.table import open_recording
     from r2c2r_core.ingest.stage import IngestConfig, read_capture
+    from r2c2r_core.overrides import read_overrides
 
     source = _existing(options.capture)
+    overrides = read_overrides(options.overrides) if options.overrides else None
     with tempfile.TemporaryDirectory(prefix="r2c2r-info-") as store, show_progress() as progress:
-        capture = read_capture(source, Path(store), IngestConfig(), progress=progress.for_stage("ingest"))
+        reading = progress.for_stage("ingest")
+        capture = read_capture(source, Path(store), IngestConfig(), overrides=overrides, progress=reading)
         report = examine(capture, open_recording(source))
     if options.json:
         _write_json(options.json, report.to_json())
@@ -245,6 +248,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_size(sampled)
     examined = add("info", info)
     examined.add_argument("capture", type=Path)
+    examined.add_argument("--overrides", type=Path, help="what a person said about the room: up, floor, manhattan_yaw, walls")
     examined.add_argument("--json", type=Path)
     ran = add("run", run)
     ran.add_argument("capture", type=Path)

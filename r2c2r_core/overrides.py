@@ -12,7 +12,7 @@ from r2c2r_core.model.inputs import HingeSide, ObjectOverride, Overrides
 NO_OVERRIDES = Overrides(objects={})
 
 _OBJECT_KEYS = ("candidate", "hinge", "dimensions_m", "pose", "joint_limits", "front", "rejected")
-_SCENE_KEYS = ("up", "floor", "manhattan_yaw")
+_SCENE_KEYS = ("up", "floor", "manhattan_yaw", "walls")
 
 
 def read_overrides(path: Path) -> Overrides:
@@ -20,7 +20,8 @@ def read_overrides(path: Path) -> Overrides:
 
     Per object: candidate (an id, or a mesh file relative to this file), hinge, dimensions_m [w, d, h], pose (4x4
     world_from_object), joint_limits [lower, upper], front [x, y, z] (world), rejected [candidate ids]. Per scene: up
-    [x, y, z] (capture frame), floor (metres along up), manhattan_yaw (rad).
+    [x, y, z] (capture frame), floor (metres along up), manhattan_yaw (rad), walls [[x, y, offset]] (world
+    frame: the normal in plan, into the room, and the plane's distance from the origin along it).
     """
     try:
         document = json.loads(path.read_text())
@@ -43,12 +44,15 @@ def overrides_from(document: Any, path: Path) -> Overrides:
         raise OverrideError(f"{where}: objects is {type(listed).__name__}", hint="expected a table of names")
     scene = document.get("scene", {})
     _refuse_unknown(where, "scene", scene, _SCENE_KEYS)
-    yaw, floor = scene.get("manhattan_yaw"), scene.get("floor")
+    yaw, floor, walls = scene.get("manhattan_yaw"), scene.get("floor"), scene.get("walls")
+    if walls is not None and (not isinstance(walls, list) or any(np.shape(wall) != (3,) for wall in walls)):
+        raise OverrideError(f"{where}: scene.walls is {walls!r}", hint="expected a list of [x, y, offset]")
     return Overrides(
         objects={name: _object_override(where, name, entry, path.parent) for name, entry in listed.items()},
         up_capture=_vector(where, "scene.up", scene.get("up")),
         floor_m=None if floor is None else float(floor),
         manhattan_yaw_rad=None if yaw is None else float(yaw),
+        walls=None if walls is None else tuple(np.asarray(wall, dtype=np.float64) for wall in walls),
     )
 
 

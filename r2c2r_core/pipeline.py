@@ -83,7 +83,7 @@ def _run(request: Request, ledger: Ledger) -> tuple[Reconstruction, Certificate]
         SEGMENTERS.require(tools.segmenter, config.segment.weights)
     capture = ledger.one(
         "ingest",
-        (file_key(request.source), config.ingest, overrides.up_capture, overrides.floor_m, overrides.manhattan_yaw_rad),
+        (file_key(request.source), config.ingest, _room_overrides(overrides)),
         lambda p: read_capture(request.source, work.frames, config.ingest, overrides=overrides, progress=p),
     )
     if ledger.until != "ingest":  # a recording may be looked at before anyone clicked
@@ -200,6 +200,11 @@ def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) 
         uploaded = [c.candidate_id for c in found.candidates if c.candidate_id.startswith("upload")]
         return chosen_by_person(found, uploaded[0] if Path(override.candidate).is_file() else override.candidate)
     return choose_candidate(found.candidates, rejected=override.rejected, rule=rule) if override.rejected else found
+
+
+def _room_overrides(overrides: Overrides) -> tuple[object, ...]:
+    """What a person said about the room: an input of ingest."""
+    return overrides.up_capture, overrides.floor_m, overrides.manhattan_yaw_rad, overrides.walls
 
 
 def _uploads(overrides: Overrides, name: str) -> tuple[Path, ...]:

@@ -15,6 +15,7 @@ from r2c2r_core.model.inputs import Overrides
 _UP = np.array([0.0, 0.0, 1.0])
 _MOST_CORRECTION_DEG = 3.0  # of a file's gravity: the real kitchen's is off by 1.5 deg
 _LEAST_CORRECTION_DEG = 1.0  # a phone's gravity is better than fitted planes below this
+_ALIGNED_DEG = 4.0  # planes farther off than this are not meant to be level, upright or along the room
 _FLOOR_BELOW_CAMERA_M = 0.75  # nobody films from lower; keeps a table top from being the floor
 
 
@@ -34,25 +35,32 @@ def level_room(
     rng: np.random.Generator,
 ) -> Levelled:
     """Level a recording: `sample` and `cameras` (capture_from_camera) are in its own world, and so is `file_up`."""
+    said = overrides or Overrides(objects={})
     planes = find_planes(sample, rng)
-    up, up_source, notices = _choose_up(planes, cameras, file_up, overrides)
+    up, up_source, notices = _choose_up(planes, cameras, file_up, said.up_capture)
     turn = Rigid3(rotation_between(up, _UP), np.zeros(3))
     turned = [_turned(p, turn) for p in planes]
     centres = np.array([c.translation for c in cameras]) @ turn.rotation.T
     points = turn.apply(sample.points)
-    floor_z = (
-        overrides.floor_m if overrides is not None and overrides.floor_m is not None else find_floor(turned, points, centres)
-    )
+    floor_z = said.floor_m if said.floor_m is not None else find_floor(turned, points, centres)
     if floor_z is None:
         notices.append("no floor was found; heights start at the recording's own origin")
     shift = np.array([0.0, 0.0, -(floor_z or 0.0)])
     levelled = [_turned(p, Rigid3(np.eye(3), shift)) for p in turned]
-    yaw = _chosen_yaw(overrides, turn.turn(sample.normals), levelled)
+    yaw = find_yaw(turn.turn(sample.normals), levelled) if said.manhattan_yaw_rad is None else said.manhattan_yaw_rad
+    walls = find_walls(levelled, points + shift, centres + shift) if said.walls is None else _given_walls(said.walls)
+    by_person = said.manhattan_yaw_rad is not None
     room = Room(
         up_source=up_source,
+        up_spread_deg=_up_spread_deg(levelled),
         floor_found=floor_z is not None,
-        manhattan_yaw_rad=yaw,
-        walls=find_walls(levelled, points + shift, centres + shift),
+        floor_source=None if floor_z is None else "surface" if said.floor_m is None else "person",
+        floor_spread_m=None if floor_z is None else _floor_spread_m(levelled),
+        manhattan_yaw_rad=float(np.mod(0.0 if yaw is None else yaw, np.pi / 2)),
+        yaw_source="person" if by_person else "assumed" if yaw is None else "surface",
+        yaw_spread_deg=None if yaw is None else _yaw_spread_deg(levelled, yaw),
+        walls=walls,
+        walls_source="surface" if said.walls is None else "person",
     )
     return Levelled(Rigid3(turn.rotation, shift), room, tuple(notices))
 
@@ -97,8 +105,8 @@ def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> floa
     return None
 
 
-def find_yaw(normals: Points, planes: Sequence[Plane]) -> float:
-    """Yaw in [0, pi/2) of one of the two dominant horizontal directions.
+def find_yaw(normals: Points, planes: Sequence[Plane]) -> float | None:
+    """Yaw in [0, pi/2) of one of the two dominant horizontal directions; None when nothing stands upright.
 
     The upright surface's normals vote in a histogram of 1 deg, which is robust; the large planes near the winner then say it
     exactly, as a plane's direction is far surer than a patch's.
@@ -107,7 +115,7 @@ def find_yaw(normals: Points, planes: Sequence[Plane]) -> float:
     fitted = [p for p in planes if abs(p.normal[2]) < 0.15]
     votes = np.mod(np.arctan2(upright[:, 1], upright[:, 0]), np.pi / 2)
     if not len(votes):
-        return 0.0
+        return None
     histogram = np.histogram(votes, bins=90, range=(0.0, np.pi / 2))[0]
     smooth = sum(np.roll(histogram, shift) * share for shift, share in ((-2, 1), (-1, 2), (0, 3), (1, 2), (2, 1)))
     yaw = (int(np.argmax(smooth)) + 0.5) * np.pi / 180.0
@@ -151,18 +159,19 @@ def find_walls(planes: Sequence[Plane], points: Points, centres: Points) -> tupl
         if behind > 0.1 * len(plane.points):
             continue
         if all(normal @ w.normal < 0.97 or abs(offset - w.offset_m) > 0.1 for w in walls):
-            walls.append(Wall(normal=normal, offset_m=offset, area_m2=plane.area_m2))
+            spread_m = float(np.sqrt(np.mean((plane.points @ normal - offset) ** 2)))
+            walls.append(Wall(normal=normal, offset_m=offset, area_m2=plane.area_m2, spread_m=spread_m))
     return tuple(walls)
 
 
 def _choose_up(
-    planes: Sequence[Plane], cameras: Sequence[Rigid3], file_up: Vector3 | None, overrides: Overrides | None
+    planes: Sequence[Plane], cameras: Sequence[Rigid3], file_up: Vector3 | None, said_up: Vector3 | None
 ) -> tuple[Vector3, Literal["file", "floor", "person", "assumed"], list[str]]:
-    if overrides is not None and overrides.up_capture is not None:
-        length = float(np.linalg.norm(overrides.up_capture))
+    if said_up is not None:
+        length = float(np.linalg.norm(said_up))
         if not np.isfinite(length) or length < 1e-6:
             raise OverrideError("overrides: 'up' has no direction", hint="give three numbers, such as [0, 1, 0]")
-        return np.asarray(overrides.up_capture) / length, "person", []
+        return np.asarray(said_up) / length, "person", []
     if file_up is not None:
         return _corrected_up(planes, file_up)
     best = _up_from_planes(planes, _mean_camera_up(cameras))
@@ -212,10 +221,41 @@ def _mean_camera_up(cameras: Sequence[Rigid3]) -> Vector3:
     return np.asarray(total / max(float(np.linalg.norm(total)), 1e-9))
 
 
-def _chosen_yaw(overrides: Overrides | None, normals: Points, planes: Sequence[Plane]) -> float:
-    if overrides is not None and overrides.manhattan_yaw_rad is not None:
-        return float(np.mod(overrides.manhattan_yaw_rad, np.pi / 2))
-    return find_yaw(normals, planes)
+def _given_walls(walls: Sequence[Vector3]) -> tuple[Wall, ...]:
+    """Walls a person gave as (x, y, offset): an upright plane's normal in plan, and its distance from the origin."""
+    lengths = [float(np.linalg.norm(wall[:2])) for wall in walls]
+    if not np.isfinite(np.array(walls)).all() or any(length < 1e-6 for length in lengths):
+        raise OverrideError("overrides: a wall has no direction", hint="give [x, y, offset], such as [0, -1, -2.4]")
+    return tuple(
+        Wall(normal=np.array([w[0], w[1], 0.0]) / length, offset_m=float(w[2]) / length, area_m2=0.0)
+        for w, length in zip(walls, lengths, strict=True)
+    )
+
+
+def _up_spread_deg(planes: Sequence[Plane]) -> float | None:
+    """Area-weighted rms angle by which nearly level and nearly upright planes miss it."""
+    off_level = np.degrees([np.arccos(min(abs(float(p.normal[2])), 1.0)) for p in planes])
+    off = np.minimum(off_level, np.abs(90.0 - off_level))
+    return _rms(off, np.array([p.area_m2 for p in planes]), off < _ALIGNED_DEG)
+
+
+def _yaw_spread_deg(planes: Sequence[Plane], yaw: float) -> float | None:
+    """Area-weighted rms angle by which upright planes that nearly face along the yaw miss it."""
+    upright = [p for p in planes if abs(p.normal[2]) < 0.15]
+    off = np.degrees(_off_axis(np.array([np.arctan2(p.normal[1], p.normal[0]) for p in upright]), yaw))
+    return _rms(off, np.array([p.area_m2 for p in upright]), np.abs(off) < _ALIGNED_DEG)
+
+
+def _floor_spread_m(planes: Sequence[Plane]) -> float | None:
+    """Area-weighted rms height of level planes within 6 cm of the floor."""
+    heights = [p.points[:, 2] for p in planes if p.normal[2] > np.cos(np.radians(8.0))]
+    near = [z for z in heights if abs(float(np.median(z))) < 0.06]
+    return float(np.sqrt(np.mean(np.concatenate(near) ** 2))) if near else None
+
+
+def _rms(values: np.ndarray, weights: np.ndarray, chosen: np.ndarray) -> float | None:
+    total = float(weights[chosen].sum()) if len(weights) else 0.0
+    return float(np.sqrt((weights[chosen] * values[chosen] ** 2).sum() / total)) if total > 0 else None
 
 
 def _turned(plane: Plane, destination_from_source: Rigid3) -> Plane:

@@ -61,9 +61,9 @@ def refine_poses(
         f"the poses drift: frames that see one place at different times disagreed by {before * 1000:.1f} mm, "
         f"{after * 1000:.1f} mm after moving the cameras by up to {shift_m.max() * 1000:.0f} mm"
     )
-    return SettledPoses(
-        carried(frames, keyframes, moved), PoseEvidence(source="refined", given_gap_m=before, gap_m=after), (notice,)
-    )
+    recorded = np.array([f.world_from_camera.matrix for f in frames])
+    evidence = PoseEvidence(source="refined", given_gap_m=before, gap_m=after, given=recorded)
+    return SettledPoses(carried(frames, keyframes, moved), evidence, (notice,))
 
 
 def _is_drift(given: Sequence[Rigid3], moved: Sequence[Rigid3], before_m: float, after_m: float) -> bool:

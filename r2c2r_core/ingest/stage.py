@@ -18,7 +18,7 @@ from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFr
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.rgb import stored_jpeg
 from r2c2r_core.ingest.store import StoredImages, new_store, open_images, write_depth, write_rgb
-from r2c2r_core.model.capture import Capture, Frame, SceneSurface
+from r2c2r_core.model.capture import Capture, Frame, PoseEvidence, SceneSurface
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.progress import SILENT, Progress
 
@@ -87,7 +87,7 @@ def read_capture(
         ),
         images=images,
         notices=(*recording.notices, *thinned, *unsure, *bad, *settled.notices, *levelled.notices),
-        poses=settled.evidence,
+        poses=_given_in_world(settled.evidence, levelled.world_from_capture),
     )
 
 
@@ -178,6 +178,10 @@ def _sure_share(recording: Recording, frame: RawFrame) -> float | None:
         return None
     with np.errstate(invalid="ignore"):
         return float(((raw.confidence >= 2) & (raw.metres > 0)).mean())
+
+
+def _given_in_world(evidence: PoseEvidence, world_from_capture: Rigid3) -> PoseEvidence:
+    return evidence if evidence.given is None else replace(evidence, given=world_from_capture.matrix @ evidence.given)
 
 
 def _in_world(frame: Frame, world_from_capture: Rigid3) -> Frame:

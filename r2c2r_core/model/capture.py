@@ -1,7 +1,9 @@
 """A recording, levelled: posed frames and what the whole room looks like."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
 
 from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
@@ -39,12 +41,22 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Room:
-    """What stands still: gravity, floor, walls. The world is levelled, so up is +Z and the floor, if found, z = 0."""
+    """What stands still: gravity, floor, walls. The world is levelled, so up is +Z and the floor, if found, z = 0.
+
+    Each comes with its source and its spread: how far the surfaces it could be taken from lie off it (rms, one sigma),
+    whoever said it; None where there are none.
+    """
 
     up_source: Literal["file", "floor", "person", "assumed"]
+    up_spread_deg: float | None = None  # of large level and upright planes
     floor_found: bool
+    floor_source: Literal["surface", "person"] | None = None  # None: not found
+    floor_spread_m: float | None = None  # of the surface near that height
     manhattan_yaw_rad: float  # in [0, pi/2): world yaw of one of the two dominant horizontal directions
+    yaw_source: Literal["surface", "person", "assumed"] = "surface"
+    yaw_spread_deg: float | None = None  # of large upright planes within 4 deg
     walls: tuple["Wall", ...]
+    walls_source: Literal["surface", "person"] = "surface"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +65,8 @@ class Wall:
 
     normal: Vector3
     offset_m: float
-    area_m2: float
+    area_m2: float  # of the surface seen on it
+    spread_m: float | None = None  # of that surface about the plane, one sigma; None: nothing was seen there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +76,7 @@ class PoseEvidence:
     source: Literal["file", "refined", "odometry"]
     given_gap_m: float | None  # with the recording's own poses; None: it has none, or no place was seen twice
     gap_m: float | None  # with the poses used
+    given: np.ndarray | None = None  # (n, 4, 4) world_from_camera as recorded, where others are used instead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,6 +103,14 @@ class Capture:
     images: FrameImages
     notices: tuple[str, ...]  # one line each, for a person
     poses: PoseEvidence | None = None  # None: not examined
+
+    @property
+    def as_recorded(self) -> "Capture":
+        """The same capture with the recording's own poses, where they were refined."""
+        if self.poses is None or self.poses.given is None:
+            return self
+        given = (Rigid3.from_matrix(matrix) for matrix in self.poses.given)
+        return replace(self, frames=tuple(replace(f, world_from_camera=g) for f, g in zip(self.frames, given, strict=True)))
 
     def frame(self, frame_index: int) -> Frame:
         """The frame with that number; KeyError when the recording lacks it."""

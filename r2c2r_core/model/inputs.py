@@ -56,6 +56,7 @@ class Overrides:
     up_capture: Vector3 | None = None  # in the capture frame
     floor_m: float | None = None  # height of the floor along up_capture, in the capture frame
     manhattan_yaw_rad: float | None = None
+    walls: tuple[Vector3, ...] | None = None  # each (x, y, offset): normal in plan, into the room; world frame
 
     def of(self, name: str) -> ObjectOverride:
         """The object's corrections; empty when there are none."""

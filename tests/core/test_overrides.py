@@ -42,6 +42,7 @@ def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
         ({"objects": {"door": {"joint_limits": [2, 1]}}}, "lower, upper"),
         ({"objects": {"door": {"pose": [[1]]}}}, "4x4"),
         ({"scene": {"gravity": 1}}, "unknown key 'gravity'"),
+        ({"scene": {"walls": [[0, 1]]}}, "scene.walls"),
     ],
 )
 def test_what_cannot_be_used_is_one_clear_line(tmp_path: Path, document: object, says: str) -> None:

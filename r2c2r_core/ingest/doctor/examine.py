@@ -18,6 +18,7 @@ _REGISTERED = 30  # frames on which depth is laid over colour
 
 def examine(capture: Capture, recording: Recording | None = None) -> CaptureReport:
     """Look a recording over, by sixty of its frames; `recording` adds confidence and frames that thinning left out."""
+    capture = capture.as_recorded  # refined poses would hide what is wrong with the recording
     rng = np.random.default_rng(0)
     count = len(capture.frames)
     positions = np.unique(np.linspace(0, count - 1, min(_VIEWS, count)).round().astype(np.int64))

@@ -22,7 +22,7 @@ _CEILING_M = 1.9
 
 def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording | None) -> CaptureFigures:
     """The figures of a recording; `pairs` are neighbours among `views`."""
-    frames = capture.frames
+    frames, room = capture.frames, capture.room
     centres = np.array([f.world_from_camera.translation for f in frames])
     steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
     turns = [angle_deg(a.world_from_camera.rotation, b.world_from_camera.rotation) for a, b in pairwise(frames)]
@@ -60,9 +60,18 @@ def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording |
         pair_error_mm=float(1000 * np.median(errors)) if len(errors) else None,
         pair_overlap=float(compared.overlap.mean()) if len(pairs) else 0.0,
         drift_mm=float(1000 * np.nanmedian(again)) if np.isfinite(again).any() else None,
-        up_source=capture.room.up_source,
-        floor_found=capture.room.floor_found,
-        walls=len(capture.room.walls),
+        poses_source=capture.poses.source if capture.poses else "file",
+        up_source=room.up_source,
+        up_spread_deg=room.up_spread_deg,
+        floor_found=room.floor_found,
+        floor_source=room.floor_source,
+        floor_spread_mm=None if room.floor_spread_m is None else 1000 * room.floor_spread_m,
+        manhattan_yaw_deg=float(np.degrees(room.manhattan_yaw_rad)),
+        yaw_source=room.yaw_source,
+        yaw_spread_deg=room.yaw_spread_deg,
+        walls=len(room.walls),
+        walls_source=room.walls_source,
+        wall_spread_mm=tuple(1000 * w.spread_m for w in room.walls if w.spread_m is not None),
         camera_height_m=float(np.median(centres[:, 2])) if capture.room.floor_found else None,
         level_heights_m=heights.level,
         room_height_m=heights.ceiling,

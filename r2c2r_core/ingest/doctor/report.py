@@ -53,9 +53,18 @@ class CaptureFigures:
     pair_error_mm: float | None  # median disagreement of the depth of neighbouring frames; None: no overlap
     pair_overlap: float  # share of a frame's pixels its neighbour sees too
     drift_mm: float | None  # by how much the poses place the same surface apart on another visit; None: none is revisited
+    poses_source: str
     up_source: str
+    up_spread_deg: float | None
     floor_found: bool
+    floor_source: str | None
+    floor_spread_mm: float | None
+    manhattan_yaw_deg: float
+    yaw_source: str
+    yaw_spread_deg: float | None
     walls: int
+    walls_source: str
+    wall_spread_mm: tuple[float, ...]  # of each wall's surface about its plane
     camera_height_m: float | None  # above the floor
     level_heights_m: tuple[float, ...]  # of large level surfaces above the floor
     room_height_m: float | None  # where a ceiling was seen

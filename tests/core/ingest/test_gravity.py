@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from r2c2r_core.errors import OverrideError
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.gravity import level_room
 from r2c2r_core.ingest.planes import SurfaceSample, find_planes
@@ -118,6 +119,31 @@ def test_what_a_person_says_is_taken():
     assert result.world_from_capture.apply(on_floor[None])[0, 2] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_a_person_says_names_them_and_keeps_the_surfaces_verdict():
+    up = Rotation.from_euler("x", 90, degrees=True).as_matrix() @ np.array([0.0, np.sin(0.02), np.cos(0.02)])
+    walls = (np.array([0.0, -2.0, -5.0]),)
+    overrides = Overrides(objects={}, up_capture=up, floor_m=0.25, manhattan_yaw_rad=0.4, walls=walls)
+    room = levelled((90, 0, 0), file_up=0.0, overrides=overrides)[0].room
+    assert (room.up_source, room.floor_source, room.yaw_source, room.walls_source) == ("person",) * 4
+    assert room.up_spread_deg == pytest.approx(np.degrees(0.02), abs=0.5)  # the planes disagree, and that shows
+    assert np.allclose(room.walls[0].normal, [0, -1, 0])
+    assert room.walls[0].offset_m == pytest.approx(-2.5)
+
+
+def test_a_clean_room_is_sure_of_itself():
+    room = levelled((90, 0, 0), file_up=0.0)[0].room
+    assert (room.floor_source, room.yaw_source, room.walls_source) == ("surface",) * 3
+    assert room.up_spread_deg < 0.2
+    assert room.yaw_spread_deg < 0.2
+    assert room.floor_spread_m == pytest.approx(0.004, abs=0.001)  # the noise it was made with
+    assert all(w.spread_m == pytest.approx(0.004, abs=0.001) for w in room.walls)
+
+
+def test_a_wall_without_a_direction_is_refused():
+    with pytest.raises(OverrideError, match="no direction"):
+        levelled((90, 0, 0), file_up=0.0, overrides=Overrides(objects={}, walls=(np.zeros(3),)))
+
+
 def test_a_table_top_alone_is_not_taken_for_the_floor():
     rng = np.random.default_rng(0)
     points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0.73, 0.003, 4000)])
@@ -132,6 +158,8 @@ def test_without_planes_up_is_assumed_and_told():
     sample = SurfaceSample(points=np.zeros((0, 3)), normals=np.zeros((0, 3)), area_each_m2=0.0)
     result = level_room(sample, cameras(), None, None, np.random.default_rng(0))
     assert result.room.up_source == "assumed"
+    assert result.room.yaw_source == "assumed"
+    assert (result.room.up_spread_deg, result.room.floor_spread_m, result.room.yaw_spread_deg) == (None, None, None)
     assert result.room.walls == ()
 
 

@@ -73,6 +73,7 @@ def test_drift_of_3_cm_is_taken_out_and_told(walk):
     assert "drift" in result.notices[0]
     assert error_m(result.frames, views.poses) < 0.25 * error_m(bent, views.poses)
     assert error_m(result.frames, views.poses) < 0.003
+    assert np.allclose(result.evidence.given, [f.world_from_camera.matrix for f in bent])
 
 
 def test_frames_between_the_keyframes_move_along(walk):
