@@ -6,7 +6,7 @@ images in sensor orientation. (apple/ARKitScenes DATA.md, tenFpsDataLoader.py.)
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import cache, partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers
-from r2c2r_core.ingest.readers.trajectory import Trajectory
+from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _TRAJECTORY = "lowres_wide.traj"
 _STAMP = r"(?:[^/]*_)?(\d+\.\d+)"
@@ -39,14 +39,14 @@ def open_arkitscenes(files: Files) -> Recording:
     trajectory = _trajectory(files)
     found = Found(
         colour={number: colour[time_s] for number, time_s in times.items()},
-        depth=_at_times(times, depth, _SAME_S),
+        depth=named_at(times, depth, _SAME_S),
         poses={n: p for n, t in times.items() if (p := trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S)) is not None},
-        confidence=_at_times(times, confidence, _SAME_S),
+        confidence=named_at(times, confidence, _SAME_S),
         times_s=times,
     )
     size = first_size(files, colour.values(), "colour image")
     depth_size = first_size(files, depth.values(), "depth image")
-    camera_names = _at_times(times, pincam, np.inf)
+    camera_names = named_at(times, pincam, np.inf)
 
     @cache
     def camera(number: int) -> Intrinsics:
@@ -69,18 +69,6 @@ def _by_time(names: Iterable[str], pattern: str) -> dict[float, str]:
     return {float(match.group(1)): name for name in sorted(names) if (match := re.fullmatch(pattern, name))}
 
 
-def _at_times(times: Mapping[int, float], named: Mapping[float, str], apart_s: float) -> dict[int, str]:
-    """The file nearest in time to each frame, where one lies within `apart_s`."""
-    stamps = np.array(sorted(named))
-    matched = {}
-    for number, time_s in times.items():
-        after = int(np.searchsorted(stamps, time_s))
-        nearest = min(stamps[max(after - 1, 0) : after + 1], key=lambda stamp: abs(stamp - time_s), default=np.inf)
-        if abs(nearest - time_s) <= apart_s:
-            matched[number] = named[float(nearest)]
-    return matched
-
-
 def _trajectory(files: Files) -> Trajectory:
     from scipy.spatial.transform import Rotation
 
@@ -95,7 +83,7 @@ def _trajectory(files: Files) -> Trajectory:
 
 def _camera(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
     numbers = read_numbers(files.read(name))
-    if numbers is None or numbers.size != 6 or not (np.isfinite(numbers).all() and (numbers[:4] > 0).all()):
+    if numbers is None or numbers.size != 6 or not (np.isfinite(numbers).all() and (numbers[:4] >= 1).all()):
         raise CaptureError(f"{files.source}/{name}: expected 'w h fx fy cx cy'", hint="download the recording again")
     width, height, fx, fy, cx, cy = numbers
     return integer_centred(fx, fy, cx, cy, (width, height)).resized(*size)

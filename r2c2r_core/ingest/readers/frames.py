@@ -17,7 +17,7 @@ class Found:
 
     colour: Mapping[int, str]
     depth: Mapping[int, str]
-    poses: Mapping[int, Rigid3 | None]  # None: unusable
+    poses: Mapping[int, Rigid3 | None]  # None: unusable; empty: the recording has none
     confidence: Mapping[int, str] = field(default_factory=dict)
     times_s: Mapping[int, float] = field(default_factory=dict)
 
@@ -25,8 +25,12 @@ class Found:
 def joined_frames(
     files: Files, found: Found, rgb_camera: Callable[[int], Intrinsics], depth_camera: Callable[[int], Intrinsics]
 ) -> tuple[tuple[RawFrame, ...], list[str]]:
-    """The frames that have colour, depth and a pose, and what to tell about the others; raises CaptureError."""
-    shared = found.colour.keys() & found.depth.keys() & found.poses.keys()
+    """The frames that have colour, depth and a pose, and what to tell about the others; raises CaptureError.
+
+    In a recording without any pose, all frames are without one.
+    """
+    poses = found.poses or dict.fromkeys(found.colour)
+    shared = found.colour.keys() & found.depth.keys() & poses.keys()
     if not shared:
         counts = f"{len(found.colour)} colour images, {len(found.depth)} depth images, {len(found.poses)} poses"
         raise CaptureError(f"{files.source}: {counts}, none with the same number", hint="export or copy the recording again")
@@ -43,7 +47,7 @@ def joined_frames(
             confidence_name=found.confidence.get(number),
         )
         for number in sorted(shared)
-        if (pose := found.poses[number]) is not None
+        if (pose := poses[number]) is not None or not found.poses
     )
     if not frames:
         raise CaptureError(
@@ -59,9 +63,10 @@ def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | Non
 
 def _left_out(found: Found, shared: set[int], posed: int) -> list[str]:
     every = found.colour.keys() | found.depth.keys() | found.poses.keys()
+    poses = found.poses or dict.fromkeys(every)
     lacking = [
         f"{len(every - held.keys())} {what}"
-        for what, held in (("a colour image", found.colour), ("a depth image", found.depth), ("a pose", found.poses))
+        for what, held in (("a colour image", found.colour), ("a depth image", found.depth), ("a pose", poses))
         if every - held.keys()
     ]
     notices = []

@@ -97,7 +97,7 @@ def _camera(files: Files, setting: dict[str, Any], size: tuple[int, int]) -> Int
         raise CaptureError(
             f"{files.source}/{_TRANSFORMS}: fl_x, fl_y, cx, cy, w, h should be numbers ({problem})", hint="export it again"
         ) from problem
-    if not (np.isfinite([fx, fy, cx, cy, width, height]).all() and min(fx, fy, width, height) > 0):
+    if not (np.isfinite([fx, fy, cx, cy, width, height]).all() and min(fx, fy, width, height) >= 1):
         raise CaptureError(f"{files.source}/{_TRANSFORMS}: a focal length or a size is not positive", hint="export it again")
     return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=int(width), height=int(height)).resized(*size)
 

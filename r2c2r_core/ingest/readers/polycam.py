@@ -57,7 +57,7 @@ def open_polycam(files: Files) -> Recording:
 
 def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None:
     numbers = _numbers(document, ("fx", "fy", "cx", "cy", "width", "height"))
-    if numbers is None or not (numbers[[0, 1, 4, 5]] > 0).all():
+    if numbers is None or not (numbers[[0, 1, 4, 5]] >= 1).all():
         return None
     fx, fy, cx, cy, width, height = numbers
     return integer_centred(fx, fy, cx, cy, (width, height)).resized(*size)

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.images import colour_file, numbered
+from r2c2r_core.ingest.readers.images import MAX_PIXELS, colour_file, numbered
 from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.record3d import record3d_frames
 from r2c2r_core.ingest.readers.record3d_metadata import parse_metadata
@@ -70,8 +70,11 @@ def _channel(content: bytes, name: str) -> np.ndarray:
     import OpenEXR
 
     try:
+        low, high = OpenEXR.File(io.BytesIO(content), header_only=True).header()["dataWindow"]
+        if float(np.prod(high - low + 1.0)) > MAX_PIXELS:
+            raise ValueError("too large")
         channels = OpenEXR.File(io.BytesIO(content), separate_channels=True, num_threads=0).channels()
-    except (RuntimeError, ValueError, TypeError) as problem:
+    except (RuntimeError, ValueError, TypeError, KeyError) as problem:
         raise UnreadableFrame(f"{name}: not a readable OpenEXR image ({len(content)} bytes)") from problem
     if "R" not in channels:
         raise UnreadableFrame(f"{name}: channels {', '.join(sorted(channels)) or 'none'}, depth in 'R' was expected")

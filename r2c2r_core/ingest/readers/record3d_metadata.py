@@ -84,7 +84,9 @@ def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
         depth_size=(_positive(metadata, "dw", source), _positive(metadata, "dh", source)) if has_depth_size else None,
         cameras=_cameras(metadata, width, height, len(raw_poses), source),
         poses=tuple(_pose(row) for row in raw_poses),
-        timestamps_s=tuple(float(t) for t in times) if isinstance(times, list) and _all_numbers(times) else None,
+        timestamps_s=tuple(float(t) for t in times)
+        if isinstance(times, list) and _all_numbers(times) and np.isfinite(times).all()
+        else None,
         fps=float(metadata["fps"]) if isinstance(metadata.get("fps"), int | float) and metadata["fps"] > 0 else None,
         up_capture=_up(metadata, raw_poses),
     )
@@ -144,9 +146,10 @@ def _table(metadata: dict[str, Any], key: str, columns: int, source: str) -> np.
 
 def _positive(metadata: dict[str, Any], key: str, source: str) -> int:
     value = metadata.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 100_000:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 1 <= value < 100_000:
         raise CaptureError(
-            f"{source}: key '{key}' should be a positive number, found {_brief(value)}", hint="is this a Record3D export?"
+            f"{source}: key '{key}' should be a positive number of pixels, found {_brief(value)}",
+            hint="is this a Record3D export?",
         )
     return int(value)
 

@@ -1,10 +1,11 @@
-"""Redwood and Open3D: color/N.jpg (or image/, rgb/), depth/N.png, trajectory.log, and a camera's JSON where there is one.
+"""Redwood and Open3D: color/N.jpg (or image/, rgb/), depth/N.png, trajectory.log and a camera's JSON, or one of these two.
 
 trajectory.log holds, for each frame, a line "i j k" and a 4x4 camera-to-world matrix with OpenCV axes; depth is uint16
 millimetres registered to colour; without a calibration the camera is a PrimeSense (525, 525, 319.5, 239.5); pixel centres lie
 at integers; nothing tells which way is up.
 """
 
+import re
 from collections.abc import Collection
 from functools import partial
 
@@ -27,8 +28,8 @@ _ROW = 3 + 16  # numbers of one frame
 def open_redwood(files: Files) -> Recording:
     """The recording in a Redwood or Open3D folder; raises CaptureError."""
     colour, depth = numbered(files.names(), _COLOUR), numbered(files.names(), _DEPTH)
-    log = next(name for name in sorted(files.names(), key=len) if Part("", _LOG).is_in(frozenset({name})))
-    poses = _poses(files, log)
+    log = next((name for name in sorted(files.names(), key=len) if re.fullmatch(_LOG, name)), None)
+    poses = _poses(files, log) if log else {}
     notices = []
     if _starts_one_earlier(poses, colour.keys()):
         poses = {number + 1: pose for number, pose in poses.items()}
@@ -47,7 +48,7 @@ def open_redwood(files: Files) -> Recording:
         depth_of=partial(depth_file, files, 1000.0),
         up_capture=None,
         notices=(*notices, *left_out),
-        other_names=(log, *([camera_name] if camera_name else [])),
+        other_names=tuple(name for name in (log, camera_name) if name),
     )
 
 
@@ -62,7 +63,7 @@ def _poses(files: Files, log: str) -> dict[int, Rigid3 | None]:
 
 def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool:
     """Whether images count from 1 and poses from 0: every pose then has an image one number later, pose 0 none of its own."""
-    return bool(images) and min(poses) == 0 and min(images) == 1 and max(poses) + 1 <= max(images)
+    return bool(images and poses) and min(poses) == 0 and min(images) == 1 and max(poses) + 1 <= max(images)
 
 
 def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None]:
@@ -73,7 +74,7 @@ def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None
         try:
             k = np.array(matrix, np.float64).reshape(3, 3).T
             full = integer_centred(k[0, 0], k[1, 1], k[0, 2], k[1, 2], (int(width or 0), int(height or 0)))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             continue
         if np.isfinite(k).all() and min(full.fx, full.fy, full.width, full.height) > 0:
             return full.resized(*size), name
@@ -82,6 +83,10 @@ def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None
 
 READER = Reader(
     name="Redwood / Open3D",
-    parts=(Part("color/N.jpg", _COLOUR), Part("depth/N.png", _DEPTH), Part("trajectory.log", _LOG)),
+    parts=(
+        Part("color/N.jpg", _COLOUR),
+        Part("depth/N.png", _DEPTH),
+        Part("trajectory.log or a camera's .json", rf"{_LOG}|[^/]+\.json"),
+    ),
     open=open_redwood,
 )

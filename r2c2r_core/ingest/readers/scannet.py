@@ -35,7 +35,7 @@ def open_scannet(files: Files) -> Recording:
         depth_of=partial(depth_file, files, 1000.0),
         up_capture=np.array([0.0, 0.0, 1.0]),
         notices=(*notices, *left_out),
-        other_names=(_INTRINSIC_COLOUR, _INTRINSIC_DEPTH, *(poses[f.index] for f in frames)),
+        other_names=(_INTRINSIC_COLOUR, _INTRINSIC_DEPTH, *poses.values()),
     )
 
 
@@ -53,7 +53,6 @@ READER = Reader(
     parts=(
         Part("color/N.jpg", _COLOUR),
         Part("depth/N.png", _DEPTH),
-        Part("pose/N.txt", _POSE),
         Part(_INTRINSIC_COLOUR, _INTRINSIC_COLOUR),
         Part(_INTRINSIC_DEPTH, _INTRINSIC_DEPTH),
     ),

@@ -1,4 +1,4 @@
-"""7-Scenes-like folders: color/N.jpg, depth/N.png, pose/N.txt, intrinsics_color.txt, gravity-direction.txt.
+"""7-Scenes-like folders: color/N.jpg, depth/N.png, intrinsics_color.txt; also pose/N.txt and gravity-direction.txt.
 
 Depth is uint16 millimetres (0 and 65535 unknown), registered to colour; poses are 4x4 camera-to-world with OpenCV axes, their
 rotations off by up to 4e-4; pixel centres lie at integers; gravity-direction.txt points down.
@@ -31,7 +31,7 @@ def open_seven_scenes(files: Files) -> Recording:
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
     frames, notices = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
     up = _up(files)
-    others = [_INTRINSICS, *(poses[f.index] for f in frames), *([_GRAVITY] if up is not None else [])]
+    others = [_INTRINSICS, *poses.values(), *([_GRAVITY] if up is not None else [])]
     return Recording(
         format="7-Scenes folder",
         files=files,
@@ -60,7 +60,6 @@ READER = Reader(
     parts=(
         Part("color/N.jpg", _COLOUR),
         Part("depth/N.png", _DEPTH),
-        Part("pose/N.txt", _POSE),
         Part(_INTRINSICS, _INTRINSICS),
     ),
     open=open_seven_scenes,

@@ -34,6 +34,7 @@ READERS: tuple[Reader, ...] = (
     redwood.READER,
     nerfstudio.READER,
 )
+_DEEPEST, _WIDEST = 6, 50  # folders that are looked into
 
 
 def open_recording(source: Path) -> Recording:
@@ -56,8 +57,11 @@ def open_recording(source: Path) -> Recording:
 
 
 def _roots(files: Files) -> list[Files]:
-    """The top, then the folders right below it: a zip of a folder has one, an export may lie beside other things."""
-    return [files, *(SubFiles(files, folder) for folder in top_folders(files)[:50])]
+    """The top, the folders right below it (an export may lie beside other things), and down to the first fork."""
+    roots: list[Files] = [files]
+    while len(folders := top_folders(roots[-1])) == 1 and len(roots) < _DEEPEST:
+        roots.append(SubFiles(roots[-1], folders[0]))
+    return [*roots, *(SubFiles(roots[-1], folder) for folder in folders[:_WIDEST])]
 
 
 def _nearest_miss(roots: list[Files]) -> tuple[Reader, tuple[str, ...]] | None:

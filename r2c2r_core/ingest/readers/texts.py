@@ -73,7 +73,7 @@ def parse_json(content: bytes, source: str) -> dict[str, Any]:
     if len(content) > _MOST_JSON_BYTES:
         raise CaptureError(f"{source}: {len(content) >> 20} MiB of JSON, 64 at most are expected", hint=hint)
     try:
-        document = json.loads(content)
+        document = json.loads(content, parse_int=float)  # 400 digits become inf, not a number too long to convert
     except (ValueError, RecursionError) as problem:
         raise CaptureError(f"{source}: not JSON ({problem})", hint=hint) from problem
     if not isinstance(document, dict):

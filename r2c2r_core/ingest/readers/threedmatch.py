@@ -38,7 +38,7 @@ def open_threedmatch(files: Files) -> Recording:
         depth_of=partial(depth_file, files, 1000.0),
         up_capture=None,
         notices=(*notices, *left_out),
-        other_names=(*others, *(poses[f.index] for f in frames)),
+        other_names=(*others, *poses.values()),
     )
 
 
@@ -65,7 +65,6 @@ READER = Reader(
     parts=(
         Part("frame-N.color.png", _FOLDER + _COLOUR),
         Part("frame-N.depth.png", _FOLDER + _DEPTH),
-        Part("frame-N.pose.txt", _FOLDER + _POSE),
     ),
     open=open_threedmatch,
 )

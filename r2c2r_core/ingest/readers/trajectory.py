@@ -1,6 +1,6 @@
-"""A camera's path with its own clock, asked at the times of images."""
+"""Clocks: a camera's path and files with times of their own, asked at the times of images."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,3 +32,15 @@ class Trajectory(NamedTuple):
         share = (time_s - start_s) / (end_s - start_s)
         turn = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([a.rotation, b.rotation])))(share)
         return Rigid3(turn.as_matrix(), a.translation + share * (b.translation - a.translation))
+
+
+def named_at(times_s: Mapping[int, float], named: Mapping[float, str], apart_s: float) -> dict[int, str]:
+    """The file nearest in time to each frame, where one lies within `apart_s`; `named` are files by their times."""
+    stamps = np.array(sorted(named))
+    matched = {}
+    for number, time_s in times_s.items():
+        after = int(np.searchsorted(stamps, time_s))
+        nearest = min(stamps[max(after - 1, 0) : after + 1], key=lambda stamp: abs(stamp - time_s), default=np.inf)
+        if abs(nearest - time_s) <= apart_s:
+            matched[number] = named[float(nearest)]
+    return matched

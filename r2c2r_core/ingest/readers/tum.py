@@ -1,4 +1,4 @@
-"""TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; depth in 1/5000 m registered to colour; world z up; OpenCV camera-to-world.
+"""TUM RGB-D: rgb.txt, depth.txt, often groundtruth.txt; depth in 1/5000 m registered to colour; OpenCV camera-to-world, z up.
 
 Also the key-frame layout whose pose file is truth_cam_poses.txt (line i belongs to image i, the clocks differ) and whose
 calibration is an ORB-SLAM settings file. Clocks are associated within 20 ms, poses interpolated. Pixel centres lie at integers.
@@ -13,10 +13,11 @@ import numpy as np
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
-from r2c2r_core.ingest.readers.protocol import Part, RawFrame, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of
-from r2c2r_core.ingest.readers.trajectory import Trajectory
+from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers
+from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
 _APART_S = 0.02
@@ -30,10 +31,7 @@ _GENERIC_CAMERA = (525.0, 525.0, 319.5, 239.5)
 
 
 class _Calibration(NamedTuple):
-    fx: float
-    fy: float
-    cx: float
-    cy: float
+    coefficients: tuple[float, float, float, float]  # fx, fy, cx, cy, pixel centres at integers
     units_per_metre: float
     notice: str | None
     name: str | None
@@ -41,66 +39,57 @@ class _Calibration(NamedTuple):
 
 def open_tum(files: Files) -> Recording:
     """The recording in a TUM RGB-D folder; raises CaptureError."""
-    rgb, depth = _image_list(files, "rgb.txt"), _image_list(files, "depth.txt")
-    pose_name = next(n for n in _POSE_FILES if n in files.names())
-    poses = _pose_rows(files, pose_name)
+    rgb, rgb_lines = _image_list(files, "rgb.txt")
+    depth, _ = _image_list(files, "depth.txt")
+    pose_name = next((name for name in _POSE_FILES if name in files.names()), None)
     calibration = _calibration(files)
-    pairs = [(i, _nearest(t, [d for d, _ in depth])) for i, (t, _) in enumerate(rgb)]
-    placed, by_line = _pose_of_images(rgb, poses, files, pose_name)
-    wanted = [(i, j, placed[i]) for i, j in pairs if j is not None and placed[i] is not None]
-    if not wanted:
-        raise CaptureError(
-            f"{files.source}: {len(rgb)} colour images, {len(depth)} depth images, {len(poses)} poses: "
-            f"none agree within {_APART_S * 1000:.0f} ms",
-            hint=f"check the clocks of rgb.txt, depth.txt and {pose_name}",
-        )
-    size = first_size(files, (rgb[i][1] for i, _, _ in wanted), "colour image")
-    depth_size = first_size(files, (depth[j][1] for _, j, _ in wanted), "depth image")
-    camera = integer_centred(calibration.fx, calibration.fy, calibration.cx, calibration.cy, size)
-    notices = [n for n in (calibration.notice,) if n]
-    if by_line:
-        notices.append(f"the clocks of rgb.txt and {pose_name} differ, their counts agree: poses are matched by line")
-    if len(wanted) < len(rgb):
-        notices.append(f"{len(rgb) - len(wanted)} of {len(rgb)} images have no depth or pose within 20 ms and were left out")
-    others = ["rgb.txt", "depth.txt", pose_name, *([calibration.name] if calibration.name else [])]
+    colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
+    placed = _placed(files, pose_name, times, rgb_lines) if pose_name else _Placed({}, times, None)
+    found = Found(
+        colour=colour,
+        depth=named_at(times, dict(depth.values()), _APART_S),
+        poses=placed.poses,
+        times_s=placed.times_s,
+    )
+    camera = integer_centred(*calibration.coefficients, first_size(files, colour.values(), "colour image"))
+    depth_camera = camera.resized(*first_size(files, found.depth.values(), "depth image"))
+    frames, left_out = joined_frames(files, found, lambda _: camera, lambda _: depth_camera)
     return Recording(
         format="TUM RGB-D",
         files=files,
-        frames=tuple(
-            RawFrame(
-                index=i,
-                timestamp_s=poses[i, 0] - poses[0, 0] if by_line else rgb[i][0] - rgb[0][0],
-                rgb_camera=camera,
-                depth_camera=camera.resized(*depth_size),
-                capture_from_camera=pose,
-                rgb_name=rgb[i][1],
-                depth_name=depth[j][1],
-            )
-            for i, j, pose in wanted
-            if pose is not None
-        ),
+        frames=frames,
         colour_of=partial(colour_file, files),
         depth_of=partial(depth_file, files, calibration.units_per_metre),
-        up_capture=np.array([0.0, 0.0, 1.0]),
-        notices=tuple(notices),
-        other_names=tuple(others),
+        up_capture=np.array([0.0, 0.0, 1.0]) if pose_name else None,
+        notices=(*(notice for notice in (calibration.notice, placed.notice) if notice), *left_out),
+        other_names=("rgb.txt", "depth.txt", *(name for name in (pose_name, calibration.name) if name)),
     )
 
 
-def _pose_of_images(
-    rgb: list[tuple[float, str]], poses: np.ndarray, files: Files, pose_name: str
-) -> tuple[list[Rigid3 | None], bool]:
-    """A pose for each image, by clock; by line where the clocks have nothing in common and the counts agree."""
-    trajectory = Trajectory(poses[:, 0], [_rigid(row[1:]) for row in poses])
-    placed = [trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for t, _ in rgb]
-    if any(p is not None for p in placed):
-        return placed, False
-    if len(rgb) != len(poses):
+class _Placed(NamedTuple):
+    poses: dict[int, Rigid3 | None]
+    times_s: dict[int, float]
+    notice: str | None
+
+
+def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: int) -> _Placed:
+    """A pose for each image, by clock; by line where the clocks have nothing in common and the lines are as many."""
+    rows, pose_lines = _pose_rows(files, pose_name)
+    table = np.array(sorted(rows.values(), key=lambda row: float(row[0])))
+    trajectory = Trajectory(table[:, 0], [_rigid(row[1:]) for row in table])
+    near = {n: trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for n, t in times_s.items()}
+    if any(pose is not None for pose in near.values()):
+        return _Placed({n: pose for n, pose in near.items() if pose is not None}, times_s, None)
+    if rgb_lines != pose_lines:
         raise CaptureError(
-            f"{files.source}: {len(rgb)} images and {len(poses)} poses, and their clocks share no time ({pose_name})",
+            f"{files.source}: {rgb_lines} images and {pose_lines} poses, and their clocks share no time ({pose_name})",
             hint="the pose file belongs to another recording",
         )
-    return list(trajectory.poses), True
+    return _Placed(
+        {n: _rigid(row[1:]) for n, row in rows.items()},
+        {n: float(row[0]) for n, row in rows.items()},
+        f"the clocks of rgb.txt and {pose_name} differ, their counts agree: poses are matched by line",
+    )
 
 
 def _rigid(row: np.ndarray) -> Rigid3:
@@ -109,39 +98,33 @@ def _rigid(row: np.ndarray) -> Rigid3:
     return Rigid3(Rotation.from_quat(row[3:]).as_matrix(), row[:3].copy())
 
 
-def _pose_rows(files: Files, name: str) -> np.ndarray:
-    """Rows `t x y z qx qy qz qw`, by time; unusable ones left out."""
-    rows = []
-    for line in (text.split() for text in lines_of(files, name)):
-        try:
-            row = [float(word) for word in line]
-        except ValueError:
-            continue
-        if len(row) >= 8 and np.isfinite(row[:8]).all() and 0.5 < np.linalg.norm(row[4:8]) < 2.0:
-            rows.append(row[:8])
+def _pose_rows(files: Files, name: str) -> tuple[dict[int, np.ndarray], int]:
+    """Rows `t x y z qx qy qz qw` by line, unusable ones left out, and how many lines there are."""
+    rows = {}
+    lines = lines_of(files, name)
+    for number, line in enumerate(lines):
+        row = read_numbers(line.encode())
+        if row is not None and row.size >= 8 and np.isfinite(row[:8]).all() and 0.5 < np.linalg.norm(row[4:8]) < 2.0:
+            rows[number] = row[:8]
     if not rows:
         raise CaptureError(f"{files.source}/{name}: no line of the form 't x y z qx qy qz qw'", hint="check the pose file")
-    table = np.array(rows)
-    return table[np.argsort(table[:, 0], kind="stable")]
+    return rows, len(lines)
 
 
-def _image_list(files: Files, name: str) -> list[tuple[float, str]]:
+def _image_list(files: Files, name: str) -> tuple[dict[int, tuple[float, str]], int]:
+    """(time, file) by line, of the files that exist, and how many lines there are."""
     images = []
-    for line in (text.split() for text in lines_of(files, name)):
+    for line in lines_of(files, name):
         try:
-            images.append((float(line[0]), line[1]))
-        except (ValueError, IndexError) as problem:
-            raise CaptureError(f"{files.source}/{name}: line '{' '.join(line)}'", hint="expected 'time filename'") from problem
-    present = [(t, n) for t, n in images if n in files.names()]
+            time_s, image = line.split()[:2]
+            images.append((float(time_s), image))
+        except ValueError as problem:
+            raise CaptureError(f"{files.source}/{name}: line '{line[:80]}'", hint="expected 'time filename'") from problem
+    present = {n: (time_s, image) for n, (time_s, image) in enumerate(images) if image in files.names()}
     if not present:
         found = f"none of the {len(images)} files it names exist" if images else "it names no file"
         raise CaptureError(f"{files.source}/{name}: {found}", hint="copy the images beside it")
-    return images if len(present) == len(images) else present
-
-
-def _nearest(time_s: float, others_s: list[float]) -> int | None:
-    index = int(np.argmin(np.abs(np.array(others_s) - time_s)))
-    return index if abs(others_s[index] - time_s) <= _APART_S else None
+    return present, len(images)
 
 
 def _calibration(files: Files) -> _Calibration:
@@ -152,12 +135,12 @@ def _calibration(files: Files) -> _Calibration:
         if len(found) == 4 and found["fx"] > 0 and found["fy"] > 0:
             factor = re.search(r"^\s*(?:RGBD\.)?Dep[t]?h?MapFactor\s*:\s*([-+.\deE]+)", text, re.MULTILINE)
             units = float(factor.group(1)) if factor and float(factor.group(1)) > 1.0 else 5000.0
-            return _Calibration(found["fx"], found["fy"], found["cx"], found["cy"], units, None, name)
+            return _Calibration((found["fx"], found["fy"], found["cx"], found["cy"]), units, None, name)
     for name, camera in _KNOWN_CAMERAS.items():
         if name in str(files.source).lower():
             notice = None if name == "freiburg3" else f"{name}'s colour images are distorted; the lens is treated as ideal"
-            return _Calibration(*camera, 5000.0, notice, None)
-    return _Calibration(*_GENERIC_CAMERA, 5000.0, "no calibration was found: the generic Kinect's 525 px is assumed", None)
+            return _Calibration(camera, 5000.0, notice, None)
+    return _Calibration(_GENERIC_CAMERA, 5000.0, "no calibration was found: the generic Kinect's 525 px is assumed", None)
 
 
 READER = Reader(
@@ -165,7 +148,6 @@ READER = Reader(
     parts=(
         Part("rgb.txt", r"rgb\.txt"),
         Part("depth.txt", r"depth\.txt"),
-        Part(_POSE_FILES[0], "|".join(re.escape(name) for name in _POSE_FILES)),
     ),
     open=open_tum,
 )

@@ -1,0 +1,337 @@
+"""What is particular to each recording format, and its traps."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.readers.protocol import UnreadableFrame
+from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.ingest.readers.video import Video
+
+from .tiny import TinyRoom, integer_centred, write_seven_scenes, write_tum, zip_folder
+from .tiny_formats import (
+    HEVC,
+    sensor_images,
+    write_arkitscenes,
+    write_nerfstudio,
+    write_polycam,
+    write_redwood,
+    write_scannet,
+    write_stray,
+    write_threedmatch,
+)
+
+ROOM = TinyRoom()
+SMALL = replace(ROOM, count=4)
+
+
+def told(recording, words):
+    return any(words in notice for notice in recording.notices)
+
+
+# Stray Scanner
+
+
+def test_stray_older_files_take_their_camera_from_the_matrix(tmp_path):
+    recording = open_recording(write_stray(tmp_path / "s", ROOM, per_frame=False))
+    assert recording.frames[5].rgb_camera.fx == pytest.approx(ROOM.focal)
+
+
+def test_stray_frames_without_depth_are_left_out_and_the_film_stays_in_step(tmp_path):
+    recording = open_recording(write_stray(tmp_path / "s", ROOM, skip=(1, 6)))
+    assert [f.index for f in recording.frames] == [0, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+    assert told(recording, "2 of 12 frames were left out: 2 a depth image missing")
+    picture = ROOM.image(ROOM.poses()[7], ROOM.camera)[..., ::-1].astype(int)
+    assert np.abs(recording.colour_of(recording.frames[5]) - picture).mean() < 6.0
+
+
+def test_stray_without_its_camera_is_named_as_the_nearest_miss(tmp_path):
+    (write_stray(tmp_path / "s", SMALL) / "camera_matrix.csv").unlink()
+    with pytest.raises(CaptureError, match=r"looks like Stray Scanner, but camera_matrix\.csv is missing") as caught:
+        open_recording(tmp_path / "s")
+    assert "Polycam" in caught.value.hint
+
+
+def test_stray_columns_go_by_name(tmp_path):
+    folder = write_stray(tmp_path / "s", ROOM)
+    expected = open_recording(folder).frames[3]
+    rows = [line.split(", ") for line in (folder / "odometry.csv").read_text().split("\n")]
+    (folder / "odometry.csv").write_text("\n".join(",".join(row[::-1]) for row in rows))
+    frame = open_recording(folder).frames[3]
+    assert frame.index == 3
+    assert np.array_equal(frame.capture_from_camera.matrix, expected.capture_from_camera.matrix)
+    (folder / "odometry.csv").write_text("time, x, y\n1, 2, 3")
+    with pytest.raises(CaptureError, match="no column timestamp, frame"):
+        open_recording(folder)
+
+
+def test_the_real_odometry_and_matrix_of_a_phone_are_read(real, tmp_path):
+    source = real("stray-scanner-fragments")
+    folder = write_stray(tmp_path / "s", ROOM)
+    (folder / "odometry.csv").write_bytes((source / "odometry.head.csv").read_bytes())
+    (folder / "camera_matrix.csv").write_bytes((source / "camera_matrix.csv").read_bytes())
+    (folder / "rgb.mp4").unlink()
+    (folder / "rgb").mkdir()
+    for k in range(7):
+        image = np.zeros((1440, 1920, 3), np.uint8)
+        cv2.imwrite(str(folder / "rgb" / f"{k:06d}.jpg"), image)
+        depth = (source / "promptda_depth_256x192_mm.png").read_bytes()
+        (folder / "depth" / f"{k:06d}.png").write_bytes(depth)
+        cv2.imwrite(str(folder / "confidence" / f"{k:06d}.png"), np.full((192, 256), 2, np.uint8))
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == list(range(7))
+    frame = recording.frames[6]
+    assert frame.timestamp_s == pytest.approx(0.166692834)
+    # held upright: the quaternion's camera has up along its -x, so three quarter turns, and x and y change places
+    assert (frame.rgb_camera.fx, frame.rgb_camera.width, frame.rgb_camera.height) == (1597.4362, 1440, 1920)
+    metres = recording.depth_of(frame).metres
+    assert metres.shape == (256, 192)
+    assert 1.5 < metres.min() < metres.max() < 3.6
+
+
+# Film
+
+
+def test_a_film_can_be_asked_backwards(tmp_path):
+    video = Video(FolderFiles(HEVC.parent), HEVC.name)
+    pictures = sensor_images(ROOM)
+    for number in (8, 9, 9, 2, 11, 0):
+        off = [np.abs(video.frame(number).astype(int) - picture[..., ::-1]).mean() for picture in pictures]
+        assert int(np.argmin(off)) == number
+    with pytest.raises(UnreadableFrame, match="after 12 frames"):
+        video.frame(12)
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (lambda c: b"", "not a readable video"),
+        (lambda c: c[: len(c) // 2], "not a readable video"),
+        (lambda c: c.replace(b"hvc1", b"zzzz"), r"cannot decode the codec|not a readable video"),
+    ],
+)
+def test_a_film_that_cannot_be_decoded_is_one_clear_line(change, found, tmp_path):
+    folder = write_stray(tmp_path / "s", SMALL)
+    (folder / "rgb.mp4").write_bytes(change(HEVC.read_bytes()))
+    with pytest.raises(CaptureError, match=found) as caught:
+        open_recording(folder)
+    assert "rgb.mp4" in str(caught.value)
+
+
+def test_a_film_damaged_inside_costs_frames_only(tmp_path):
+    folder = write_stray(tmp_path / "s", ROOM)
+    content = bytearray(HEVC.read_bytes())
+    middle = content.index(b"mdat") + 6000
+    content[middle : middle + 3000] = bytes(3000)
+    (folder / "rgb.mp4").write_bytes(content)
+    recording = open_recording(folder)
+    for frame in recording.frames:
+        try:
+            assert recording.colour_of(frame).shape == (*ROOM.rgb_size[::-1], 3)
+        except UnreadableFrame:
+            continue
+
+
+# Polycam
+
+
+def test_polycams_confidence_has_three_levels(tmp_path):
+    levels = []
+    for value in (0, 127, 255):
+        recording = open_recording(write_polycam(tmp_path / str(value), SMALL, confidence=value))
+        levels.append(set(recording.depth_of(recording.frames[0]).confidence.ravel().tolist()))
+    assert levels == [{0}, {1}, {2}]
+
+
+def test_polycam_without_corrected_images_uses_the_others(tmp_path):
+    recording = open_recording(write_polycam(tmp_path / "p", SMALL, corrected=False))
+    assert recording.frames[0].rgb_camera == ROOM.camera
+    assert "keyframes/images/" in recording.frames[0].rgb_name
+    corrected = open_recording(write_polycam(tmp_path / "c", SMALL))
+    assert "keyframes/corrected_images/" in corrected.frames[0].rgb_name
+    assert corrected.frames[1].timestamp_s == pytest.approx(0.25)
+
+
+def test_polycams_frames_are_matched_by_time(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    sorted((folder / "keyframes" / "depth").iterdir())[1].unlink()
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == [0, 2, 3]
+    for frame in recording.frames:
+        assert frame.depth_name.split("/")[-1][:-4] == frame.rgb_name.split("/")[-1][:-4]
+
+
+# ARKitScenes
+
+
+def test_arkitscenes_images_between_poses_are_left_out(tmp_path):
+    recording = open_recording(write_arkitscenes(tmp_path / "a", ROOM))
+    assert [f.index for f in recording.frames] == list(range(0, 24, 2))
+    assert told(recording, "12 a pose missing")
+    assert told(recording, "turned by 90 deg")
+
+
+# ScanNet
+
+
+def test_scannets_lost_poses_are_dropped(tmp_path):
+    recording = open_recording(write_scannet(tmp_path / "s", ROOM, lost=(3, 4)))
+    assert not {3, 4} & {f.index for f in recording.frames}
+    assert told(recording, "2 frames have no usable pose")
+
+
+def test_scannets_calibration_follows_images_that_were_made_smaller(tmp_path):
+    room = replace(SMALL, rgb_size=(324, 242), depth_size=(160, 120), focal=290.0)  # a quarter of the sensor's 1296x968
+    folder = write_scannet(tmp_path / "s", room)
+    full = np.eye(4)
+    full[:3, :3] = integer_centred(room.camera.resized(1296, 968))
+    np.savetxt(folder / "intrinsic" / "intrinsic_color.txt", full)
+    recording = open_recording(folder)
+    assert recording.frames[0].rgb_camera == room.camera
+    assert told(recording, "calibration is for 1296x968")
+
+
+# 3DMatch and 7-Scenes
+
+
+def test_3dmatch_reads_one_sequence_and_names_the_choice(tmp_path):
+    recording = open_recording(write_threedmatch(tmp_path / "m", SMALL, sequences=2))
+    assert len(recording.frames) == 4
+    assert {f.rgb_name.split("/")[0] for f in recording.frames} == {"seq-01"}
+    assert told(recording, "of 2 sequences seq-01 is read")
+    assert open_recording(tmp_path / "m" / "seq-02").frames[0].rgb_name.startswith("frame-")
+
+
+def test_7scenes_without_calibration_is_told_to_be_unregistered(tmp_path):
+    room = replace(SMALL, rgb_size=(640, 480))
+    recording = open_recording(write_threedmatch(tmp_path / "m", room, intrinsics=False))
+    frame = recording.frames[0]
+    assert (frame.depth_camera.fx, frame.depth_camera.cx, frame.rgb_camera.fx) == (585.0, 320.0, 525.0)
+    assert told(recording, "not registered")
+
+
+# Redwood / Open3D
+
+
+def test_redwood_images_counted_from_one_find_their_poses(tmp_path):
+    recording = open_recording(write_redwood(tmp_path / "r", ROOM, first=1))
+    zero = open_recording(write_redwood(tmp_path / "z", ROOM))
+    assert [f.index for f in recording.frames] == list(range(1, 13))
+    assert told(recording, "numbered from 1")
+    for a, b in zip(recording.frames, zero.frames, strict=True):
+        assert np.array_equal(a.capture_from_camera.matrix, b.capture_from_camera.matrix)
+
+
+def test_redwood_without_a_camera_is_a_primesense(tmp_path):
+    room = replace(SMALL, rgb_size=(640, 480))
+    recording = open_recording(write_redwood(tmp_path / "r", room, calibrated=False))
+    assert (recording.frames[0].rgb_camera.fx, recording.frames[0].rgb_camera.cy) == (525.0, 240.0)
+    assert told(recording, "PrimeSense")
+
+
+# nerfstudio
+
+
+def test_nerfstudio_depth_may_be_an_array_or_in_other_units(tmp_path):
+    for k, options in enumerate(({"npy": True}, {"depth_unit_scale_factor": 0.002})):
+        recording = open_recording(write_nerfstudio(tmp_path / str(k), SMALL, **options))
+        frame = recording.frames[2]
+        exact = ROOM.depth(SMALL.poses()[2], ROOM.depth_camera) * (2 if k else 1)
+        assert np.abs(recording.depth_of(frame).metres - exact).max() < 0.0011
+
+
+def test_nerfstudio_without_depth_says_so(tmp_path):
+    with pytest.raises(CaptureError, match="0 of 4 frames name a depth image"):
+        open_recording(write_nerfstudio(tmp_path / "n", SMALL, depth=False))
+
+
+def test_nerfstudios_distortion_is_taken_out(tmp_path):
+    room = replace(SMALL, rgb_size=(192, 256), depth_size=(192, 256), focal=184.0)
+    lens = {"k1": 0.35, "k2": -0.1, "p1": 0.002, "p2": -0.001}
+    folder = write_nerfstudio(tmp_path / "n", room, **lens)
+    matrix, coefficients = integer_centred(room.camera), np.array([*lens.values(), 0.0])
+    pixels = np.indices((256, 192), np.float64)[::-1].reshape(2, -1).T
+    ideal = cv2.undistortPoints(pixels[:, None], matrix, coefficients, P=matrix).reshape(256, 192, 2).astype(np.float32)
+    for path in (folder / "images").iterdir():  # where a distorted pixel comes from in the ideal image
+        clean = room.image(room.poses()[int(path.stem[-2:])], room.camera)
+        cv2.imwrite(str(path), cv2.remap(clean, ideal[..., 0], ideal[..., 1], cv2.INTER_LINEAR))
+    recording = open_recording(folder)
+    seen = recording.colour_of(recording.frames[2])[20:-20, 20:-20].astype(int)
+    clean = room.image(room.poses()[2], room.camera)[..., ::-1][20:-20, 20:-20]
+    distorted = cv2.imread(str(folder / "images" / "frame_00002.jpg"))[..., ::-1][20:-20, 20:-20]
+    assert np.abs(seen - clean).mean() < 3.0 < 0.5 * np.abs(distorted.astype(int) - clean).mean()
+
+
+def test_nerfstudios_black_mask_hides_depth(tmp_path):
+    folder = write_nerfstudio(tmp_path / "n", SMALL)
+    document = json.loads((folder / "transforms.json").read_text())
+    mask = np.full(ROOM.rgb_size[::-1], 255, np.uint8)
+    mask[:, :48] = 0
+    cv2.imwrite(str(folder / "mask.png"), mask)
+    for entry in document["frames"]:
+        entry["mask_path"] = "mask.png"
+    (folder / "transforms.json").write_text(json.dumps(document))
+    recording = open_recording(folder)
+    metres = recording.depth_of(recording.frames[1]).metres
+    assert not metres[:, :24].any()
+    assert (metres[:, 24:] > 0).all()
+    assert "mask.png" in recording.names
+
+
+def test_nerfstudio_fisheyes_are_refused_and_colmaps_world_has_no_up(tmp_path):
+    with pytest.raises(CaptureError, match="camera model OPENCV_FISHEYE"):
+        open_recording(write_nerfstudio(tmp_path / "f", SMALL, camera_model="OPENCV_FISHEYE"))
+    folder = write_nerfstudio(tmp_path / "c", SMALL)
+    assert open_recording(folder).up_capture is not None
+    text = (folder / "transforms.json").read_text()
+    (folder / "transforms.json").write_text(text.replace('"file_path"', '"colmap_im_id": 3, "file_path"'))
+    assert open_recording(folder).up_capture is None
+
+
+# All of them
+
+
+@pytest.mark.parametrize(
+    ("write", "poses"),
+    [
+        (write_seven_scenes, "pose/*"),
+        (write_tum, "groundtruth.txt"),
+        (write_redwood, "trajectory.log"),
+        (write_scannet, "pose/*"),
+        (write_threedmatch, "seq-01/*.pose.txt"),
+    ],
+)
+def test_a_recording_without_any_pose_is_opened_without_poses(write, poses, tmp_path):
+    folder = write(tmp_path / "made", SMALL)
+    for path in list(folder.glob(poses)):
+        path.unlink()
+    recording = open_recording(folder)
+    assert [f.capture_from_camera for f in recording.frames] == [None] * 4
+
+
+def test_lone_outer_folders_are_looked_through(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    zipped = zip_folder(folder, tmp_path / "p.zip", top="export/2026-11-21/kitchen/")
+    assert open_recording(zipped).format == "Polycam raw export"
+
+
+def test_a_calibration_of_another_image_size_is_refused(tmp_path):
+    folder = write_seven_scenes(tmp_path / "k", SMALL)
+    np.savetxt(folder / "intrinsics_color.txt", integer_centred(ROOM.camera.resized(960, 1280)))
+    with pytest.raises(CaptureError, match="do not belong to 96x128 pixels"):
+        open_recording(folder)
+
+
+def test_a_frame_a_kilometre_away_is_left_out(tmp_path):
+    folder = write_seven_scenes(tmp_path / "k", SMALL)
+    pose = np.eye(4)
+    pose[0, 3] = 1e12
+    np.savetxt(folder / "pose" / "000005.txt", pose)
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == [0, 10, 15]
+    assert told(recording, "more than a kilometre")
