@@ -11,6 +11,7 @@ from r2c2r_core.segment.handles import GridHandle
 
 _WALL_UNIT_M = 1.15  # lower edge; worktops end at 0.95, and nothing hangs closer above them than this
 _TALL_M = 1.2
+_LONGEST = 6.0  # width over height of a drawer; the edges of worktops and tables are longer
 _DARK_GLASS = 0.45
 
 
@@ -41,6 +42,7 @@ def name_front(look: FrontLook) -> tuple[str, float]:
     lying = look.handle is not None and look.handle.width > 1.8 * look.handle.height
     upright = look.handle is not None and look.handle.height > 1.8 * look.handle.width
     aspect = look.width_m / look.height_m
+    usual *= _within(aspect, 0.0, _LONGEST, 1.0)
     if look.height_m < 0.45 and not upright and (aspect > 1.3 or (lying and aspect > 0.8)):
         return "drawer", usual
     machine = lying and 0.42 < look.width_m < 0.66 and look.height_m > 0.5
@@ -55,7 +57,7 @@ def name_thing(extent_m: np.ndarray, base_m: float | None) -> str:
     if base_m is not None and base_m < 0.15:
         if 0.6 < height < 1.25 and 0.3 < across < 0.8:
             return "chair"
-        return "bin" if 0.25 < height <= 0.75 and across < 0.5 else "object"
+        return "bin" if 0.25 < height <= 0.75 and float(extent_m[:2].min()) > 0.15 and across < 0.5 else "object"
     if across < 0.13 and 0.16 < height < 0.40:
         return "bottle"
     return "mug" if across < 0.14 and 0.05 < height <= 0.13 else "object"

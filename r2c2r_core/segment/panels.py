@@ -18,6 +18,8 @@ _CORNER_M = 0.06  # how exactly a side starts where a front ends
 _DEEPEST_M = 0.8  # of a carcass
 _ROW_M = 0.03  # how exactly the fronts of a row line up
 _MATE_WORTH = 0.5  # how much a sure front beside it says for a panel
+_SUREST = 0.99
+_LEAST_MATE = 0.1  # confidence below which a panel is no company
 _SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
 _NO_POINTS = np.zeros((0, 3))
 _EQUAL_DOORS_M = 0.006  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
@@ -108,14 +110,16 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
 def _beside(panel: Panel, others: list[Panel]) -> Panel:
     """The panel in the light of its run: fronts stand in rows and stacks, and small flat things stand alone."""
     slack = _ROW_M / panel.run.grid.cell_m
-    mates = [other for other in others if _aligned(panel.front.cell, other.front.cell, slack) and other.usual > 0.5]
+    mates = [
+        other for other in others if other.confidence > _LEAST_MATE and _aligned(panel.front.cell, other.front.cell, slack)
+    ]
     category = panel.category
     if category == "dishwasher" and not _odd_one_out(mates):
         category = "cabinet"
     if mates:
         best = max(other.confidence for other in mates)
         unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - _MATE_WORTH * best)
-        return replace(panel, category=category, confidence=panel.usual * (1 - unsure))
+        return replace(panel, category=category, confidence=min(panel.usual * (1 - unsure), _SUREST))
     alone = _ALONE_WORTH if _area(panel) < _SMALL_M2 else 1.0
     return replace(panel, category=category, confidence=alone * panel.confidence)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
 
-_LEAST_CONFIDENCE = 0.3
+_LEAST_CONFIDENCE, _LEAST_OF_BOXES, _LEAST_OF_THINGS = 0.3, 0.5, 0.4
 _LEAST_PLANE_M2, _LEAST_SIDE_M = 0.02, 0.09
 _VIEWS = 5  # frames looked at for the one that shows an object best
 _MOST_THINGS = 24
@@ -47,7 +47,7 @@ def propose_steps(session: "GeometricSession") -> Steps:
         panels += _boxes(session, plane)
         yield 0.5 * (position + 1) / len(planes), ()
     panels = _apart(without_sides([panel for panel in panels if panel.confidence > 0.5 * _LEAST_CONFIDENCE]))
-    wanted = [panel for panel in panels if panel.confidence >= _LEAST_CONFIDENCE]
+    wanted = [panel for panel in panels if panel.confidence >= _least(panel.category)]
     found: list[Proposal] = []
     shown: list[tuple[Proposal, Panel]] = []
     for position, panel in enumerate(wanted):
@@ -69,6 +69,10 @@ def is_taken(outline: Mask, masks: Iterable[Mask]) -> bool:
     """Whether one of the masks (of clicked objects, in the proposal's frame, at the outline's size) already covers it."""
     enough = _TAKEN_SHARE * np.count_nonzero(outline)
     return any(np.count_nonzero(outline & mask) > enough for mask in masks)
+
+
+def _least(category: str) -> float:
+    return _LEAST_OF_BOXES if category in _BOX_KINDS else _LEAST_CONFIDENCE
 
 
 def _ranked(found: list[Proposal]) -> tuple[Proposal, ...]:
@@ -183,10 +187,13 @@ def _present_clump(session: "GeometricSession", clump: Clump, others: list[Propo
         if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
             return None
         width, depth, height = box.dimensions_m
+        confidence = clump.confidence * _agreement(clump, box.dimensions_m)
+        if confidence < _LEAST_OF_THINGS:
+            continue
         return Proposal(
             kind="thing",
             category=category,
-            confidence=round(clump.confidence * _agreement(clump, box.dimensions_m), 3),
+            confidence=round(confidence, 3),
             click=click,
             outline=pack_mask(mask),
             size_m=(float(width), float(depth), float(height)),
@@ -200,7 +207,7 @@ def _agreement(clump: Clump, dimensions_m: np.ndarray) -> float:
     """0..1: how well what a click would give fits what stands there; the depth of a thing is seen worst."""
     seen = np.array([clump.extent_m[:2].max(), clump.extent_m[2]])
     given = np.array([dimensions_m[:2].max(), dimensions_m[2]])
-    return float(np.exp(-np.abs(np.log(given / seen)).mean()))
+    return float(np.exp(-np.abs(np.log(given / seen)).sum()))
 
 
 def _hits(mask: Mask, frame: Frame, others: list[Proposal]) -> bool:

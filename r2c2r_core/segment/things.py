@@ -131,13 +131,14 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     if len(heights) == 0:
         return None
     bins = np.floor((heights - heights.min()) / 0.005).astype(int)
-    profile = np.convolve(np.bincount(bins, areas), [1, 1, 1, 1, 1], mode="same")
+    # With fewer bins than the window, "same" would be as long as the window.
+    profile = np.convolve(np.bincount(bins, areas, minlength=5), [1, 1, 1, 1, 1], mode="same")
     enough = max(0.005, 0.15 * np.pi * (0.7 * config.radius_m) ** 2)
     peaks = [i for i in range(len(profile)) if profile[i] > enough and profile[i] == profile[max(0, i - 4) : i + 5].max()]
     if not peaks:
         return None
     top = peaks[-1]
-    near_peak = np.abs(heights - (heights.min() + (top + 0.5) * 0.005)) < 0.012
+    near_peak = np.abs(heights - (heights.min() + (top + 0.5) * 0.005)) < 0.013  # the five bins that made the peak
     return float(np.average(heights[near_peak], weights=areas[near_peak]))
 
 

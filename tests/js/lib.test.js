@@ -4,6 +4,7 @@ import { ago, bytes, counted, duration, jointValue } from "../../static/js/lib/f
 import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
+import { neighbour, surest } from "../../static/js/lib/proposals.js";
 
 const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
 
@@ -64,4 +65,20 @@ test("numbers read well", () => {
   assert.equal(counted(1, "object"), "1 object");
   assert.equal(jointValue("revolute", Math.PI / 2), "90°");
   assert.equal(jointValue("prismatic", 0.42), "42 cm");
+});
+
+test("proposals are walked round the end, past those about to go", () => {
+  const items = /** @type {any[]} */ (["a", "b", "c"].map((id, k) => ({ id, confidence: 0.9 - 0.3 * k })));
+  const step = (/** @type {string | null} */ current, /** @type {1 | -1} */ by, /** @type {string[]} */ ...gone) =>
+    neighbour(items, current, by, new Set(gone))?.id;
+  assert.equal(step(null, 1), "a");
+  assert.equal(step(null, -1), "c");
+  assert.equal(step("c", 1), "a");
+  assert.equal(step("a", -1), "c");
+  assert.equal(step("a", 1, "a", "b"), "c");
+  assert.equal(step("a", 1, "a", "b", "c"), undefined);
+  assert.deepEqual(
+    surest(items, 0.6).map((item) => item.id),
+    ["a", "b"],
+  );
 });

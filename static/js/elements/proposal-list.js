@@ -14,7 +14,6 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").Proposals} Proposals */
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 
-const KINDS = { front: "front", appliance: "appliance", thing: "free-standing" };
 const SOON_MS = 400;
 
 export class ProposalList extends LiveElement {
@@ -89,6 +88,11 @@ export class ProposalList extends LiveElement {
         label: `${item.category} ${percent(item)}`,
         current: item.id === this.#current,
       }));
+  }
+
+  /** What a person may do now, in one line; null when nothing is highlighted. */
+  get tip() {
+    return this.#chosen && `Y makes this ${this.#chosen.category} an object, X dismisses it, N goes on.`;
   }
 
   /** @param {1 | -1} step */
@@ -219,7 +223,7 @@ export class ProposalList extends LiveElement {
       "button",
       { type: "button", class: "pick", "aria-pressed": String(current), "aria-label": `Show the proposed ${name}` },
       h("strong", {}, item.category),
-      h("span", { class: "muted" }, `${percent(item)} · ${KINDS[item.kind]} · ${size(item)}`),
+      h("span", { class: "muted" }, `${percent(item)} · ${size(item)}`),
     );
     pick.addEventListener("click", () => this.#show(item));
     const yes = h("button", { type: "button", class: "quiet", "aria-label": `Confirm the ${name}` }, icon("check"));

@@ -4,6 +4,7 @@ import { toScreen } from "./view.js";
 
 const CURRENT = "#ffe14d";
 const OTHER = "#ffffff";
+const CHIP_PX = 20;
 const FONT = "600 12px system-ui, sans-serif";
 
 /**
@@ -50,17 +51,18 @@ function trace(context, view, shape) {
 }
 
 /**
- * The middle of the shape's box: inside for fronts and things alike.
+ * Just inside the upper edge of the shape's box, where it hides neither the handle nor the middle.
  * @param {import("./view.js").View} view
  * @param {number[][]} points
  */
 function chipPlace(view, points) {
   const xs = points.map(([x = 0]) => x);
   const ys = points.map(([, y = 0]) => y);
-  return toScreen(view, {
+  const at = toScreen(view, {
     x: (Math.min(...xs) + Math.max(...xs)) / 2,
-    y: (Math.min(...ys) + Math.max(...ys)) / 2,
+    y: Math.min(...ys),
   });
+  return { x: at.x, y: Math.max(at.y, 0) + CHIP_PX / 2 + 4 };
 }
 
 /**
@@ -76,7 +78,7 @@ function drawChip(context, at, label, colour) {
   const width = context.measureText(label).width + 14;
   context.fillStyle = "rgb(10 12 16 / 82%)";
   context.beginPath();
-  context.roundRect(at.x - width / 2, at.y - 11, width, 22, 6);
+  context.roundRect(at.x - width / 2, at.y - CHIP_PX / 2, width, CHIP_PX, 6);
   context.fill();
   context.fillStyle = colour;
   context.fillText(label, at.x, at.y + 0.5);

@@ -278,6 +278,7 @@ export class AnnotatePage extends LiveElement {
 
   #drawProposals() {
     this.#canvas.setOutlines(this.#frame ? this.#proposals.outlinesOn(this.#frame.index) : []);
+    this.#drawTip();
   }
 
   #drawMasks() {
@@ -448,17 +449,21 @@ export class AnnotatePage extends LiveElement {
           })),
       ),
     );
-    const name = this.#current === null ? null : this.#objects.get(this.#current)?.name;
-    if (this.#frames.length) {
-      this.#tip.hidden = objects.length > 2;
-      this.#tip.textContent =
-        name === null || name === undefined
-          ? "Click a drawer, a door or a thing. The first click starts a new object."
-          : `Not what you expected? Left click adds to ${name}, right click takes away. Enter starts the next object.`;
-    }
     this.#drawLanes();
     this.#drawMasks();
     this.#drawProposals();
+  }
+
+  #drawTip() {
+    if (!this.#frames.length) return;
+    const name = this.#current === null ? null : this.#objects.get(this.#current)?.name;
+    const proposed = this.#proposals.tip;
+    this.#tip.hidden = proposed === null && this.#objects.size > 2;
+    this.#tip.textContent =
+      proposed ??
+      (name === null || name === undefined
+        ? "Click a drawer, a door or a thing. The first click starts a new object."
+        : `Not what you expected? Left click adds to ${name}, right click takes away. Enter starts the next object.`);
   }
 
   #drawLanes() {

@@ -66,7 +66,7 @@ def test_the_work_is_told_and_proposals_grow(steps: list[tuple[float, tuple[Prop
 
 
 def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
-    for proposal in proposals:
+    for proposal in (proposal for proposal in proposals if proposal.kind == "front"):
         masks = {name: masks[proposal.click.frame] for name, masks in boxes[1].items()}
         own = name_of(proposal, boxes[1])
         for name, mask in masks.items():
