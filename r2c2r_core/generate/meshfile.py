@@ -1,15 +1,17 @@
 """Reading a mesh file (GLB, OBJ, PLY, STL) into plain parts with their colours."""
 
 import io
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Image, Points, TextureCoords
 from r2c2r_core.errors import OverrideError
-from r2c2r_core.geometry.meshes import sample_surface
+from r2c2r_core.geometry.meshes import closest_on_mesh
 from r2c2r_core.geometry.raster import sample_texture
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
@@ -27,6 +29,7 @@ class MeshPart(NamedTuple):
     uv: TextureCoords | None  # v = 0 is the bottom row
     texture: Image | None
     vertex_colours: Colours  # used where there is no texture
+    is_plain: bool = False  # no colour of any kind came with it
 
     @property
     def keeps_its_texture(self) -> bool:
@@ -55,6 +58,40 @@ def read_parts(path: Path) -> list[MeshPart]:
         ) from error
     _check_geometries(path.name, geometries)
     return parts_of(geometries)
+
+
+def missing_files(path: Path) -> tuple[str, ...]:
+    """Files that a mesh file names and that do not lie beside it: an OBJ's materials and pictures, a GLB's pictures."""
+    named: list[str] = []
+    if path.suffix.lower() == ".obj":
+        libraries = _named_in(path, ("mtllib",))
+        pictures = [name for library in libraries for name in _named_in(path.parent / library, ("map_Kd",))]
+        named = [*libraries, *pictures]
+    elif path.suffix.lower() == ".glb":
+        named = _glb_pictures(path)
+    return tuple(dict.fromkeys(name for name in named if not (path.parent / name).is_file()))
+
+
+def _named_in(path: Path, keywords: tuple[str, ...]) -> list[str]:
+    """The files behind the keywords of an OBJ or MTL file; options such as `-o 0 0 0` stand before the name."""
+    try:
+        with path.open(errors="replace") as lines:
+            words = [line.split() for line in lines if line.lstrip().startswith(keywords)]
+    except OSError:
+        return []
+    return [line[-1].replace("\\", "/") for line in words if len(line) > 1]
+
+
+def _glb_pictures(path: Path) -> list[str]:
+    """The pictures that a binary glTF keeps in files of their own."""
+    with path.open("rb") as handle:
+        head = handle.read(20)
+        chunk = handle.read(min(int.from_bytes(head[12:16], "little"), _MOST_BYTES))
+    try:
+        images = json.loads(chunk).get("images", [])
+        return [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]
+    except (ValueError, AttributeError, TypeError):
+        return []
 
 
 def parts_of_glb(content: bytes, label: str) -> list[MeshPart]:
@@ -91,19 +128,23 @@ def _check_geometries(label: str, geometries: Sequence[Any]) -> None:
         raise OverrideError(f"{label}: vertices that are not numbers", hint="export it again")
 
 
-def sample_colours(parts: list[MeshPart], count: int, rng: np.random.Generator) -> tuple[Points, Colours]:
-    """Points spread over all parts' surfaces, and the colour at each."""
-    points, colours = [], []
-    faces_total = sum(len(part.faces) for part in parts)
-    for part in parts:
-        share = max(int(count * len(part.faces) / faces_total), 500)
-        on_surface, face = sample_surface(part.vertices, part.faces, share, rng)
-        points.append(on_surface)
-        colours.append(_colours_at(part, on_surface, face))
-    return np.concatenate(points), np.concatenate(colours)
+def colours_at(parts: list[MeshPart], points: Points) -> Colours:
+    """The colour of the surface nearest to each point."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
+    nearest, face = closest_on_mesh(points, vertices, faces)
+    first_faces = np.cumsum([0, *(len(part.faces) for part in parts)])
+    owner = np.searchsorted(first_faces, face, side="right") - 1
+    colours = np.zeros((len(points), 3), np.uint8)
+    for k, part in enumerate(parts):
+        own = owner == k
+        if own.any():
+            colours[own] = _part_colours(part, nearest[own], face[own] - first_faces[k])
+    return colours
 
 
-def _colours_at(part: MeshPart, points: Points, face: np.ndarray) -> Colours:
+def _part_colours(part: MeshPart, points: Points, face: np.ndarray) -> Colours:
     corners = part.vertices[part.faces[face]]
     weights = _barycentric(points, corners)
     if part.uv is not None and part.texture is not None:
@@ -138,6 +179,7 @@ def _part(geometry: Any) -> MeshPart:
         uv=np.asarray(uv, dtype=np.float64) if has_picture else None,
         texture=texture if has_picture else None,
         vertex_colours=_vertex_colours(geometry, len(vertices)),
+        is_plain=not has_picture and _is_plain(geometry.visual),
     )
 
 
@@ -145,6 +187,16 @@ def _texture(geometry: Any) -> Image | None:
     material = getattr(geometry.visual, "material", None)
     picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     return None if picture is None else np.asarray(picture.convert("RGB"), dtype=np.uint8)
+
+
+def _is_plain(visual: Any) -> bool:
+    """Whether neither vertices, faces nor the material have a colour."""
+    from trimesh.visual.color import DEFAULT_COLOR
+
+    if visual.kind in ("vertex", "face"):
+        return False
+    main = getattr(getattr(visual, "material", None), "main_color", None)
+    return main is None or np.array_equal(np.asarray(main), DEFAULT_COLOR)
 
 
 def _vertex_colours(geometry: Any, count: int) -> Colours:

@@ -2,20 +2,25 @@
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.errors import OverrideError
 from r2c2r_core.generate.asset import unposed
 from r2c2r_core.generate.charts import unwrapped_atlas
-from r2c2r_core.generate.meshfile import MeshPart, sample_colours
+from r2c2r_core.generate.meshfile import MeshPart, colours_at
 from r2c2r_core.geometry.meshes import (
+    Surface,
+    closest_on_mesh,
+    compact,
     distances_to_mesh,
     is_manifold,
     is_watertight,
     join_vertices,
-    largest_component,
     simplify,
+    unite,
+    vertex_normals,
     volume,
 )
 from r2c2r_core.model.mesh import TexturedMesh
@@ -26,7 +31,8 @@ _REMESH_CELLS = 80  # along the longest side
 _SHELL_CELLS = 0.75  # half the thickness a leaking sheet is given
 _LEAST_FLATNESS = 1e-4  # shortest over longest side
 _TEXTURE_PX = 1024
-_COLOUR_SAMPLES = 200_000
+_LARGEST_PX = 2048
+_CRUMB = 0.01  # of the largest body's diagonal: what floats beside it and is smaller is no part of it
 
 
 class Mended(NamedTuple):
@@ -39,24 +45,57 @@ class Mended(NamedTuple):
 def mended(parts: list[MeshPart], label: str, rng: np.random.Generator) -> Mended:
     """The parts as one closed textured mesh; raises OverrideError, naming `label`, for what no repair can save.
 
-    A closed mesh with one texture keeps both. Anything else is closed, and its colours are carried over to a new texture.
+    Closed bodies with one texture keep both. Anything else is closed, and its colours are carried over to a new texture.
     """
-    vertices, faces = join_vertices(*_joined(parts))
+    vertices, faces = join_vertices(*_stacked([(part.vertices, part.faces) for part in parts]))
     _check_sane(label, vertices, faces)
-    notes: list[str] = []
-    if len(parts) == 1 and parts[0].keeps_its_texture and len(faces) <= _KEPT_FACES and _is_solid(vertices, faces):
-        mesh = _with_own_texture(parts[0], notes, rng)
-    else:
-        vertices, faces = _closed(label, vertices, faces, notes)
-        mesh = _recoloured(vertices, faces, parts, rng)
-    return Mended(mesh, tuple(notes))
+    notes = ["it has no colours: shown grey"] if all(part.is_plain for part in parts) else []
+    faces = _once_each(faces, notes)
+    bodies = _bodies(vertices, faces, notes)
+    if _keeps_its_skin(parts, bodies):
+        return Mended(_with_own_texture(parts[0], notes, rng), tuple(notes))
+    vertices, faces = _closed(label, bodies, notes)
+    return Mended(_recoloured(vertices, faces, parts, rng), tuple(notes))
 
 
-def _joined(parts: list[MeshPart]) -> tuple[Points, Faces]:
-    """All parts as one list of faces."""
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
+def _once_each(faces: Faces, notes: list[str]) -> Faces:
+    """The faces without those that repeat another one, whichever way round."""
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    if len(first) < len(faces):
+        notes.append(f"{len(faces) - len(first)} faces given twice were dropped")
+    return faces[np.sort(first)]
+
+
+def _bodies(vertices: Points, faces: Faces, notes: list[str]) -> list[Surface]:
+    """The pieces that hang together over edges with two faces, largest first, without crumbs."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(faces))
+    pieces = [compact(vertices, faces[labels == label]) for label in np.unique(labels)]
+    sizes = np.array([np.linalg.norm(np.ptp(piece[0], axis=0)) for piece in pieces])
+    kept = [pieces[k] for k in np.argsort(-sizes) if sizes[k] > _CRUMB * sizes.max()]
+    if len(kept) < len(pieces):
+        notes.append(f"{len(pieces) - len(kept)} crumbs smaller than {100 * _CRUMB:.0f} % of it were dropped")
+    return kept
+
+
+def _keeps_its_skin(parts: list[MeshPart], bodies: list[Surface]) -> bool:
+    """Whether nothing has to be changed but, perhaps, the side all faces look to: closed bodies that stand apart."""
+    count = len(parts[0].faces)
+    if len(parts) != 1 or not parts[0].keeps_its_texture or count > _KEPT_FACES:
+        return False
+    if sum(len(body[1]) for body in bodies) != count or not all(_is_solid(*body) for body in bodies):
+        return False
+    volumes = np.array([volume(*body) for body in bodies])
+    if not (np.all(volumes > 0) or np.all(volumes < 0)):
+        return False
+    together = volume(*unite([_outward(body) for body in bodies]))
+    return bool(abs(together - np.abs(volumes).sum()) < 1e-6 * together)
+
+
+def _outward(body: Surface) -> Surface:
+    return body if volume(*body) > 0 else (body[0], body[1][:, ::-1])
 
 
 def _check_sane(label: str, vertices: Points, faces: Faces) -> None:
@@ -77,35 +116,48 @@ def _with_own_texture(part: MeshPart, notes: list[str], rng: np.random.Generator
     """A closed part as it is, wound outwards."""
     assert part.uv is not None
     assert part.texture is not None
-    faces = part.faces
+    faces, texture = part.faces, part.texture
     if volume(part.vertices, faces) < 0:
         faces = faces[:, ::-1]
         notes.append("its faces pointed inwards and were turned round")
-    unique, inverse = np.unique(part.vertices, axis=0, return_inverse=True)
-    return unposed(unique, inverse.reshape(-1), faces, part.uv, part.texture, rng)
+    if max(texture.shape[:2]) > _LARGEST_PX:
+        scale = _LARGEST_PX / max(texture.shape[:2])
+        texture = np.asarray(cv2.resize(texture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        notes.append(f"its texture was reduced to {texture.shape[1]} x {texture.shape[0]} pixels")
+    used, faces = np.unique(faces, return_inverse=True)  # a vertex that no face uses would count for the mesh's size
+    unique, source = np.unique(part.vertices[used], axis=0, return_inverse=True)
+    return unposed(unique, source.reshape(-1), faces.reshape(-1, 3), part.uv[used], texture, rng)
 
 
-def _closed(label: str, vertices: Points, faces: Faces, notes: list[str]) -> tuple[Points, Faces]:
-    """A closed, outward mesh within the face limit; notes what was done."""
-    size = float(np.ptp(vertices, axis=0).max())
-    if not _is_solid(vertices, faces):
-        patched = _patched(vertices, faces)
-        if patched is not None:
-            vertices, faces = patched
-            notes.append("it was not closed: small holes were filled and its faces turned the same way")
-        else:
-            vertices, faces = _remeshed(label, vertices, faces)
-            notes.append(
-                f"it was not a closed body: remeshed, details finer than {100 / _REMESH_CELLS:.1f} % of its size are lost"
-            )
-    if volume(vertices, faces) < 0:
-        faces = faces[:, ::-1]
-        notes.append("its faces pointed inwards and were turned round")
+def _closed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
+    """One closed, outward surface within the face limit; notes what was done."""
+    vertices, faces = _solid_union(bodies, notes) or _remeshed(label, bodies, notes)
     if len(faces) > _KEPT_FACES:
-        count = len(faces)
+        count, size = len(faces), float(np.ptp(vertices, axis=0).max())
         vertices, faces = simplify(vertices, faces, 1e-4 * size, _REDUCED_FACES)
         notes.append(f"simplified from {count} to {len(faces)} triangles")
     return vertices, faces
+
+
+def _solid_union(bodies: list[Surface], notes: list[str]) -> Surface | None:
+    """The outside of all bodies together; None when one of them cannot be closed by filling small holes."""
+    solids, patched = [], 0
+    for body in bodies:
+        mended_body = body if _is_solid(*body) else _patched(*body)
+        if mended_body is None:
+            return None
+        patched += mended_body is not body
+        solids.append(mended_body)
+    inward = sum(volume(*body) < 0 for body in solids)
+    if patched:
+        notes.append("it was not closed: small holes were filled and its faces turned the same way")
+    if inward == len(solids):
+        notes.append("its faces pointed inwards and were turned round")
+    if len(solids) == 1:
+        return _outward(solids[0])
+    union = unite([_outward(body) for body in solids])
+    notes.append(f"its {len(solids)} bodies were united; what lay inside another is gone")
+    return union if _is_solid(*union) else None
 
 
 def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
@@ -121,11 +173,12 @@ def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
     return fixed if _is_solid(*fixed) else None
 
 
-def _remeshed(label: str, vertices: Points, faces: Faces) -> tuple[Points, Faces]:
+def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     """The outer boundary on a grid: everything that air from outside cannot reach is solid; sheets get a thickness."""
     from scipy import ndimage
     from skimage.measure import marching_cubes
 
+    vertices, faces = _stacked(bodies)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     cell = float((high - low).max()) / _REMESH_CELLS
     counts = np.ceil((high - low) / cell).astype(int) + 6
@@ -137,20 +190,39 @@ def _remeshed(label: str, vertices: Points, faces: Faces) -> tuple[Points, Faces
     inside = (labels != labels[0, 0, 0]) & (labels > 0)
     field = np.where(inside, -1.0, distance - _SHELL_CELLS)
     points, cubes, _, _ = marching_cubes(ndimage.gaussian_filter(field, 0.6), 0.0)
-    closed, cubes = largest_component(start + points.astype(np.float64) * cell, cubes.astype(np.int64))
-    closed, cubes = join_vertices(closed, cubes if volume(closed, cubes) > 0 else cubes[:, ::-1])
-    if not _is_solid(closed, cubes):
+    closed, cubes = join_vertices(points.astype(np.float64), cubes.astype(np.int64))
+    if volume(closed, cubes) < 0:
+        cubes = cubes[:, ::-1]
+    tight = _tightened(start + closed * cell, cubes, inside, start, cell, (vertices, faces))
+    if not _is_solid(tight, cubes):
         raise OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
-    return simplify(closed, cubes, 0.1 * cell, _REDUCED_FACES)
+    notes.append(f"it was not a closed body: remeshed, details finer than {100 / _REMESH_CELLS:.1f} % of its size are lost")
+    return simplify(tight, cubes, 0.1 * cell, _REDUCED_FACES)
+
+
+def _tightened(vertices: Points, faces: Faces, inside: np.ndarray, start: np.ndarray, cell: float, original: Surface) -> Points:
+    """The grid's surface moved onto the original one, but for sheets: without their thickness they would have no volume."""
+    inward = vertices - 2.0 * cell * vertex_normals(vertices, faces)
+    index = np.clip(np.round((inward - start) / cell).astype(int), 0, np.array(inside.shape) - 1)
+    thick = inside[tuple(index.T)]
+    nearest, _ = closest_on_mesh(vertices, *original)
+    near = np.linalg.norm(nearest - vertices, axis=1) < 1.5 * cell
+    moved = np.where((thick & near)[:, None], nearest, vertices)
+    return moved if _is_solid(moved, faces) else vertices
+
+
+def _stacked(bodies: list[Surface]) -> Surface:
+    """All bodies as one list of faces."""
+    starts = np.cumsum([0, *(len(body[0]) for body in bodies)])
+    faces = [body[1] + start for body, start in zip(bodies, starts, strict=False)]
+    return np.concatenate([body[0] for body in bodies]), np.concatenate(faces)
 
 
 def _recoloured(vertices: Points, faces: Faces, parts: list[MeshPart], rng: np.random.Generator) -> TexturedMesh:
     """A new texture for a changed surface: each texel takes the nearest colour of the original."""
-    from scipy.spatial import cKDTree
-
     atlas = unwrapped_atlas(vertices, faces, _TEXTURE_PX)
-    points, colours = sample_colours(parts, _COLOUR_SAMPLES, rng)
+    colours = colours_at(parts, atlas.points)
     texture = np.zeros((*atlas.size, 3), np.uint8)
     texture[:] = np.median(colours, axis=0).astype(np.uint8)
-    texture.reshape(-1, 3)[atlas.texel] = colours[cKDTree(points).query(atlas.points)[1]]
+    texture.reshape(-1, 3)[atlas.texel] = colours
     return unposed(vertices, atlas.source, atlas.faces, atlas.uv, texture, rng)

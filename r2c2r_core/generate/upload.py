@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from r2c2r_core.generate.asset import shape_metrics
-from r2c2r_core.generate.meshfile import read_parts
+from r2c2r_core.generate.meshfile import missing_files, read_parts
 from r2c2r_core.generate.repair import mended
 from r2c2r_core.geometry.meshes import is_watertight, join_vertices
 from r2c2r_core.model.mesh import MeshAsset
@@ -20,6 +20,7 @@ def read_upload(path: Path, object_name: str, candidate_id: str) -> MeshAsset:
     parts = read_parts(path)
     rng = np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode())])
     mesh, notes = mended(parts, path.name, rng)
+    absent = [f"{name} was not given with it" for name in missing_files(path)]
     return MeshAsset(
         object_name=object_name,
         candidate_id=candidate_id,
@@ -30,5 +31,5 @@ def read_upload(path: Path, object_name: str, candidate_id: str) -> MeshAsset:
         frames=(),
         metrics=shape_metrics(*join_vertices(mesh.vertices, mesh.faces)),
         parameters={"file_faces": float(sum(len(part.faces) for part in parts))},
-        warnings=tuple(f"{path.name}: {note}" for note in notes),
+        warnings=tuple(f"{path.name}: {note}" for note in (*absent, *notes)),
     )

@@ -166,14 +166,20 @@ def distances_to_mesh(points: AnyPoints, vertices: Points, faces: Faces) -> np.n
     """Unsigned distance (n,) of each point to the nearest face."""
     import open3d as o3d
 
-    scene = o3d.t.geometry.RaycastingScene()
-    tensor = o3d.core.Tensor
-    scene.add_triangles(
-        tensor.from_numpy(np.ascontiguousarray(vertices, dtype=np.float32)),
-        tensor.from_numpy(np.ascontiguousarray(faces, dtype=np.uint32)),
+    found = _raycasting(vertices, faces).compute_distance(
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(points, dtype=np.float32))
     )
-    found = scene.compute_distance(tensor.from_numpy(np.ascontiguousarray(points, dtype=np.float32)))
     return np.asarray(found.numpy(), dtype=np.float64)
+
+
+def closest_on_mesh(points: AnyPoints, vertices: Points, faces: Faces) -> tuple[AnyPoints, np.ndarray]:
+    """The nearest point of the surface to each point, and the face it lies on."""
+    import open3d as o3d
+
+    found = _raycasting(vertices, faces).compute_closest_points(
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(points, dtype=np.float32))
+    )
+    return np.asarray(found["points"].numpy(), dtype=np.float64), np.asarray(found["primitive_ids"].numpy(), dtype=np.int64)
 
 
 def oriented_extents(vertices: Points) -> Vector3:
@@ -189,6 +195,17 @@ def oriented_extents(vertices: Points) -> Vector3:
     outermost = np.unique(np.argmax(centred @ (_SPREAD / directions).T, axis=0))
     _, extents = oriented_bounds(centred[outermost])
     return np.sort(np.asarray(extents, dtype=np.float64))[::-1]
+
+
+def _raycasting(vertices: Points, faces: Faces) -> Any:
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(vertices, dtype=np.float32)),
+        o3d.core.Tensor.from_numpy(np.ascontiguousarray(faces, dtype=np.uint32)),
+    )
+    return scene
 
 
 def _face_crosses(vertices: Points, faces: Faces) -> AnyPoints:

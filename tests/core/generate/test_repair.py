@@ -1,0 +1,156 @@
+"""What is wrong with meshes that people and models give, what is done about it, and that it is said."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from r2c2r_core.generate.meshfile import missing_files, parts_of
+from r2c2r_core.generate.repair import mended
+from r2c2r_core.generate.upload import read_upload
+from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, oriented_extents, volume
+from tests.core.generate.stub import textured_box
+
+
+def repaired(*geometries):
+    """The mended mesh, joined at its seams, in units of its longest side; and the notes."""
+    mesh, notes = mended(parts_of(geometries), "mesh", np.random.default_rng(0))
+    vertices, faces = join_vertices(mesh.vertices, mesh.faces)
+    assert is_watertight(vertices, faces)
+    assert is_manifold(vertices, faces)
+    assert volume(vertices, faces) > 0
+    return vertices, faces, " | ".join(notes)
+
+
+def filled(vertices, faces):
+    """Volume in units of the longest side cubed."""
+    return volume(vertices, faces) / oriented_extents(vertices)[0] ** 3
+
+
+def moved(mesh, *offset):
+    mesh.apply_translation(offset)
+    return mesh
+
+
+def test_bodies_that_stand_apart_are_all_kept():
+    vertices, faces, notes = repaired(
+        trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.box((0.2, 0.5, 0.5)), 1.0, 0, 0)
+    )
+    assert "2 bodies were united" in notes
+    assert filled(vertices, faces) * 1.6**3 == pytest.approx(0.25 + 0.05, rel=1e-3)
+
+
+def test_what_lies_inside_another_body_is_gone():
+    """TRELLIS leaves closed shells inside; volume and extents must be those of the outside (method.md row 16)."""
+    shell = trimesh.creation.box((0.8, 0.6, 0.6))
+    shell.invert()
+    vertices, faces, notes = repaired(trimesh.util.concatenate([trimesh.creation.box((1.0, 0.8, 0.8)), shell]))
+    assert "what lay inside another is gone" in notes
+    assert filled(vertices, faces) == pytest.approx(0.64, rel=1e-3)
+
+
+def test_overlapping_bodies_count_once():
+    vertices, faces, _ = repaired(
+        trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.box((0.2, 0.2, 0.2)), 0, 0.25, 0)
+    )
+    assert filled(vertices, faces) == pytest.approx(0.25 + 0.2 * 0.2 * 0.1, rel=1e-3)
+
+
+def test_two_boxes_that_share_an_edge_become_a_solid():
+    _, _, notes = repaired(trimesh.creation.box((1, 1, 1)), moved(trimesh.creation.box((1, 1, 1)), 1, 1, 0))
+    assert "2 bodies were united" in notes
+
+
+def test_crumbs_do_not_count_for_the_size():
+    vertices, _, notes = repaired(
+        trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.icosphere(radius=0.003, subdivisions=1), 3, 0, 0)
+    )
+    assert "1 crumbs" in notes
+    extents = oriented_extents(vertices)
+    assert extents / extents[0] == pytest.approx([1, 0.5, 0.5], rel=1e-3)
+
+
+def test_a_vertex_that_no_face_uses_does_not_count_for_the_size():
+    box = textured_box((1.0, 0.5, 0.5))
+    loose = trimesh.Trimesh(np.vstack([box.vertices, [[9.0, 0, 0]]]), box.faces, process=False)
+    loose.visual = trimesh.visual.TextureVisuals(uv=np.vstack([box.visual.uv, [[0.5, 0.5]]]), material=box.visual.material)
+    vertices, _, notes = repaired(loose)
+    assert notes == ""
+    assert np.ptp(vertices, axis=0).max() == pytest.approx(1.0)
+    extents = oriented_extents(vertices)
+    assert extents / extents[0] == pytest.approx([1, 0.5, 0.5], rel=1e-3)
+
+
+def test_one_inverted_body_among_others_is_turned():
+    lid = moved(trimesh.creation.box((1, 1, 0.1)), 0, 0, 1)
+    lid.invert()
+    vertices, faces, _ = repaired(trimesh.creation.box((1, 1, 1)), lid)
+    assert filled(vertices, faces) * 1.55**3 == pytest.approx(1.1, rel=1e-3)
+
+
+def test_faces_given_twice_and_faces_without_area_do_no_harm():
+    box = trimesh.creation.box((1.0, 0.6, 0.4))
+    faces = np.vstack([box.faces, box.faces[:3], [[0, 0, 1]]])
+    vertices, faces, notes = repaired(trimesh.Trimesh(box.vertices, faces, process=False))
+    assert len(faces) == 12
+    assert "3 faces given twice" in notes
+    extents = oriented_extents(vertices)
+    assert extents / extents[0] == pytest.approx([1, 0.6, 0.4], rel=1e-3)
+
+
+def test_a_remeshed_body_keeps_its_proportions():
+    """A third of a side is gone, its walls stay: the surface is put back where it was, not a cell further out."""
+    box = trimesh.creation.box((1.0, 0.3, 0.3)).subdivide().subdivide().subdivide()
+    pinned = trimesh.creation.box((0.9, 0.2, 0.02))  # a shelf that pierces the side: edges with four faces after joining
+    hole = (box.triangles_center[:, 0] > 0.3) & (box.face_normals[:, 2] > 0.9) & (box.triangles_center[:, 1] > 0)
+    box.update_faces(~hole)
+    vertices, _, notes = repaired(trimesh.util.concatenate([box, pinned]))
+    extents = oriented_extents(vertices)
+    assert extents / extents[0] == pytest.approx([1, 0.3, 0.3], abs=0.015), notes
+
+
+def test_colours_are_carried_over_exactly():
+    red, blue = trimesh.creation.box((1, 0.5, 0.5)), moved(trimesh.creation.box((1, 0.5, 0.5)), 0.9, 0, 0)
+    red.visual.vertex_colors, blue.visual.vertex_colors = [200, 20, 20, 255], [20, 20, 200, 255]
+    mesh, _ = mended(parts_of([red, blue]), "mesh", np.random.default_rng(0))
+    seen = {tuple(colour) for colour in mesh.texture.reshape(-1, 3)}
+    assert {(200, 20, 20), (20, 20, 200)} <= seen
+
+
+def test_a_mesh_without_colours_says_so():
+    assert "no colours: shown grey" in repaired(trimesh.creation.box((1, 1, 1)))[2]
+    painted = trimesh.creation.box((1, 1, 1))
+    painted.visual.vertex_colors = [10, 200, 10, 255]
+    assert "no colours" not in repaired(painted)[2]
+
+
+def test_a_very_large_texture_is_reduced_and_says_so():
+    box = textured_box()
+    box.visual.material.baseColorTexture = Image.fromarray(np.zeros((2100, 4200, 3), np.uint8))
+    mesh, notes = mended(parts_of([box]), "mesh", np.random.default_rng(0))
+    assert mesh.texture.shape == (1024, 2048, 3)
+    assert "reduced to 2048 x 1024" in notes[0]
+
+
+def test_files_that_were_not_given_are_named(tmp_path):
+    obj = tmp_path / "chair.obj"
+    corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    quads = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    obj.write_text(f"mtllib chair.mtl\n{corners}\nusemtl wood\n{quads}")
+    assert missing_files(obj) == ("chair.mtl",)
+    (tmp_path / "chair.mtl").write_text("newmtl wood\nmap_Kd -s 1 1 1 wood grain.png\n".replace("wood grain", "wood_grain"))
+    assert missing_files(obj) == ("wood_grain.png",)
+    asset = read_upload(obj, "chair_1", "upload0")
+    assert any("wood_grain.png was not given" in warning for warning in asset.warnings)
+    assert asset.watertight
+
+
+def test_a_glb_with_its_picture_elsewhere_is_named(tmp_path):
+    document = json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "skin%201.png"}, {"uri": "data:image/png;base64,"}]})
+    chunk = document.encode() + b" " * (-len(document) % 4)
+    path = tmp_path / "a.glb"
+    path.write_bytes(struct.pack("<4sIIII", b"glTF", 2, 20 + len(chunk), len(chunk), 0x4E4F534A) + chunk)
+    assert missing_files(path) == ("skin 1.png",)
