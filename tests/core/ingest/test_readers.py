@@ -1,6 +1,6 @@
 """Every format is read to the same room: poses, cameras, depth and colour, in our conventions."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import lzfse
 import numpy as np
@@ -208,3 +208,27 @@ def test_more_frames_than_poses_is_an_error(tmp_path):
     rows = arkit_rows(ROOM.poses())[:6]
     with pytest.raises(CaptureError, match="12 frames up to number 11, but 6 poses"):
         open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, poses=rows))
+
+
+@pytest.mark.parametrize(("depth_size", "raw"), [((480, 640), False), ((720, 960), True), ((192, 256), False)])
+def test_face_id_and_lidar_depth_sizes_are_inferred_where_the_app_does_not_say(depth_size, raw, tmp_path):
+    room = replace(ROOM, count=1, rgb_size=(720, 960), depth_size=depth_size, focal=690.0)
+    missing = {"dw": None, "dh": None, "frameTimestamps": None, "initPose": None, "cameraType": None}
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", room, raw=raw, conf=None, **missing))
+    frame = recording.frames[0]
+    depth = recording.depth_of(frame)
+    assert (frame.depth_camera.width, frame.depth_camera.height, depth.confidence) == (*depth_size, None)
+    assert np.abs(depth.metres - room.depth(room.poses()[0], room.depth_camera)).max() < 1e-6
+
+
+def test_calibration_follows_images_larger_than_the_metadata_says(tmp_path):
+    half = ROOM.camera.resized(48, 64)
+    matrix = [half.fx, 0, 0, 0, half.fy, 0, half.cx - 0.5, half.cy - 0.5, 1]
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, w=48, h=64, K=matrix))
+    assert recording.frames[3].rgb_camera == ROOM.camera
+
+
+def test_too_few_cameras_per_frame_fall_back_to_the_common_one(tmp_path):
+    for rows in ([], [[90.0, 91.0, 48.0, 62.0]]):
+        recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, perFrameIntrinsicCoeffs=rows))
+        assert recording.frames[7].rgb_camera == ROOM.camera

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.doctor import examine
+from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
 FUSION = {"finest_voxel_m": 0.012, "coarsest_voxel_m": 0.012, "depth_max_m": 4.0, "smallest_part_m2": 0.004}
@@ -92,3 +93,44 @@ def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
     walls = [p for p in capture.room.walls if abs(p.normal[2]) < 0.02]
     assert capture.room.up_source == "file"
     assert walls == list(capture.room.walls)
+
+
+def test_redwoods_five_frames_agree_within_8_mm(real, tmp_path):
+    capture = read_capture(real("open3d-rgbd-5frames-synthetic"), tmp_path / "store", IngestConfig(finest_voxel_m=0.02))
+    assert capture.format == "Redwood / Open3D"
+    assert examine(capture).figures.pair_error_mm < 8
+
+
+def test_the_kitchen_laid_out_as_3dmatch_is_the_same_kitchen(real, tmp_path):
+    source, sequence = real("kitchen-7scenes-redkitchen-seq01"), tmp_path / "scene" / "seq-01"
+    sequence.mkdir(parents=True)
+    for number in range(100, 130, 5):
+        for folder, ending, target in (
+            ("color", "jpg", "color.jpg"),
+            ("depth", "png", "depth.png"),
+            ("pose", "txt", "pose.txt"),
+        ):
+            shutil.copy(source / folder / f"{number:06d}.{ending}", sequence / f"frame-{number:06d}.{target}")
+    shutil.copy(source / "intrinsics_color.txt", tmp_path / "scene" / "camera-intrinsics.txt")
+    relaid, kitchen = open_recording(tmp_path / "scene"), open_recording(source)
+    assert relaid.format == "3DMatch / 7-Scenes sequence"
+    originals = {frame.index: frame for frame in kitchen.frames}
+    for frame in relaid.frames:
+        original = originals[frame.index]
+        assert frame.rgb_camera == original.rgb_camera
+        assert np.array_equal(frame.capture_from_camera.matrix, original.capture_from_camera.matrix)
+        assert np.array_equal(relaid.depth_of(frame).metres, kitchen.depth_of(original).metres)
+        assert relaid.colour_of(frame) == kitchen.colour_of(original)
+
+
+def test_the_raw_kitchen_without_calibration_is_read_as_7scenes(real, tmp_path):
+    source, sequence = real("kitchen-7scenes-redkitchen-seq01"), tmp_path / "seq-01"
+    sequence.mkdir()
+    for path in sorted((source / "depth_raw").glob("*.png"))[:4]:
+        shutil.copy(path, sequence / f"frame-{path.stem}.depth.png")
+        shutil.copy(source / "color" / f"{path.stem}.jpg", sequence / f"frame-{path.stem}.color.jpg")
+        shutil.copy(source / "pose_raw" / f"{path.stem}.txt", sequence / f"frame-{path.stem}.pose.txt")
+    recording = open_recording(sequence)
+    assert len(recording.frames) == 4
+    assert recording.frames[0].depth_camera.fx == float((source / "intrinsics_depth_raw.txt").read_text().split()[0])
+    assert any("not registered" in notice for notice in recording.notices)
