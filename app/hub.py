@@ -72,6 +72,11 @@ class Hub:
         with self._lock:
             self._listeners.discard(listener)
 
+    def watched(self, project: str) -> bool:
+        """Whether any tab looks at the project."""
+        with self._lock:
+            return any(listener.project == project for listener in self._listeners)
+
     @property
     def seq(self) -> int:
         """Number of the last message."""

@@ -24,6 +24,8 @@ from r2c2r_core.workspace import write_atomically
 _log = logging.getLogger(__name__)
 
 IDLE_LOOK_S = 5.0
+LEFT_S = 10.0
+"""A preparation that no tab looks at any more is stopped after this: longer than a page takes to load anew."""
 
 
 @dataclass(slots=True)
@@ -34,6 +36,7 @@ class _Task:
     path: Path
     prompt: dict[str, Any]
     state: schemas.SegmentState = "waiting"
+    asked: float = field(default_factory=time.monotonic)
     masks: MaskFile = field(default_factory=MaskFile)
 
 
@@ -49,6 +52,7 @@ class _Session:
     error: dict[str, Any] | None = None
     total: int = 0
     used: float = field(default_factory=time.monotonic)
+    watched: float | None = None  # when a tab last looked; None when none ever did
     tasks: dict[int, _Task] = field(default_factory=dict)
     proposals_path: Path | None = None  # where proposals go; None when they are there already
     proposals: list[dict[str, Any]] = field(default_factory=list)
@@ -153,9 +157,11 @@ class LiveSegmenters:
             except queue.Empty:
                 if self._idle(session):
                     session.worker.kill()
+                self._stop_if_left(session)
                 continue
             if line is None:
                 break
+            self._stop_if_left(session)
             try:
                 self._take(session, line)
             except OSError as error:  # a full disk must not end the process: the masks are shown, only not kept
@@ -186,6 +192,8 @@ class LiveSegmenters:
             done, total = len(task.masks.frames), session.total
         mask_store.append(task.path, entry)
         if first:
+            waited_ms = 1000 * (time.monotonic() - task.asked)
+            _log.info("%s: object %d: first mask after %.0f ms", session.project, number, waited_ms)
             self._tell_segment(session, number)
         shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
         self._hub.publish("mask", session.project, object=number, done=done, total=total, **shown)
@@ -199,6 +207,7 @@ class LiveSegmenters:
             if session.state == "ready":
                 for number in list(session.tasks):
                     if session.tasks[number].state == "waiting":
+                        session.tasks[number].asked = time.monotonic()
                         self._send(session, number)
                 if session.proposals_path is not None:
                     session.worker.say({"cmd": "propose"})
@@ -233,6 +242,20 @@ class LiveSegmenters:
             working = any(task.state in ("waiting", "running") for task in session.tasks.values())
             working = working or session.proposals_path is not None
             return session.state == "ready" and not working and time.monotonic() - session.used > self._settings.live_idle_s
+
+    def _stop_if_left(self, session: _Session) -> None:
+        """End a preparation whose tabs have all gone elsewhere; what it finished is found again by the next."""
+        now = time.monotonic()
+        if self._hub.watched(session.project):
+            session.watched = now
+            return
+        with self._lock:
+            wanted = session.watched is None or now - session.watched < LEFT_S or session.tasks
+            replaced = self._sessions.get(session.project) is not session
+            if wanted or replaced or session.state not in ("starting", "preparing"):
+                return
+            del self._sessions[session.project]
+        session.worker.kill()
 
     def _gone(self, session: _Session) -> None:
         with self._lock:

@@ -4,32 +4,38 @@
 Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · {"cmd": "propose"} · end of
 input stops it.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
-{"object", "key", "frame", "confidence", "mask"} (the clicked frame first) and {"object", "key", "end"}. The newest click
-goes first; the objects it interrupted go on afterwards. Proposals, {"proposals": [...], "fraction"}, wait until no click does.
+{"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
+differs) and {"object", "key", "end"}. The newest click goes first; the objects it interrupted go on afterwards. Proposals,
+{"proposals": [...], "fraction"}, wait until no click does.
 """
 
 import argparse
+import contextlib
 import json
 import queue
 import sys
 import threading
 import traceback
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from app.jobs.mask_wire import mask_bits
 from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
-from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.progress import Progress
 from r2c2r_core.segment.prompts import check_prompt, parse_prompts
+from r2c2r_core.segment.protocol import Glimpse, SegmentSession
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
 from r2c2r_core.workspace import Workspace
 
 Commands = queue.Queue[dict[str, Any] | None]
+
+_speaking = threading.Lock()
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -58,50 +64,96 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-class Desk:
-    """The objects being segmented, the one asked for last on top."""
+@dataclass(eq=False, slots=True)
+class _Followed:
+    """An object on its way through the frames."""
 
-    def __init__(self, session: Any, capture: Any, width: int) -> None:
+    key: str
+    masks: Iterator[Glimpse]
+    glimpsed: Glimpse | None  # already shown
+
+
+class Desk:
+    """The objects being segmented, the one asked for last on top.
+
+    One thread takes commands and answers clicks with a first look; another goes through the frames, and prepares what is
+    likely to be asked for next while nobody waits.
+    """
+
+    def __init__(self, session: SegmentSession, capture: Capture, width: int) -> None:
         self.session, self.capture, self.width = session, capture, width
         self.total = len(capture.frames)
-        self._open: dict[int, tuple[str, Iterator[tuple[int, PackedMask, float]]]] = {}
+        self._open: dict[int, _Followed] = {}
+        self._prefetching: Iterator[None] | None = session.prefetch()
         self._proposing: Iterator[tuple[float, tuple[Proposal, ...]]] | None = None
+        self._closed = False
+        self._changed = threading.Condition()  # guards what is above, and the order of messages about an object
 
     def answer(self, commands: Commands) -> None:
-        """Take commands when there are any, else compute one more mask."""
-        while True:
-            try:
-                command = commands.get(block=not self._open and self._proposing is None)
-            except queue.Empty:
-                self._step()
-                continue
-            if command is None:
-                return
-            self._take(command)
+        """Take commands until there are no more."""
+        worker = threading.Thread(target=self._work, name="frames")
+        worker.start()
+        while (waiting := _waiting(commands)) is not None:
+            for command in waiting:
+                self._take(command)
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        worker.join()
 
     def _take(self, command: dict[str, Any]) -> None:
         if command["cmd"] == "propose":
-            self._proposing = self._proposing or self.session.propose()
+            with self._changed:
+                self._proposing = self._proposing or self.session.propose()
+                self._changed.notify()
             return
         number = int(command["object"])
-        stopped = self._open.pop(number, None)
-        if command["cmd"] == "cancel":
-            if stopped is not None:
-                _say(object=number, key=stopped[0], end="cancelled")
-            return
-        key = str(command["key"])
-        try:
-            prompt = _prompt(command["prompt"])
-            check_prompt(self.capture, prompt)
-            self._open[number] = (key, iter(self.session.stream(prompt)))
-        except R2C2RError as error:
-            _fail(number, key, error)
+        with self._changed:
+            stopped = self._open.pop(number, None)
+            if stopped is not None and command["cmd"] == "cancel":
+                _say(object=number, key=stopped.key, end="cancelled")
+        if command["cmd"] == "segment":
+            self._follow(number, str(command["key"]), command["prompt"])
 
-    def _step(self) -> None:
-        if self._open:
-            self._segment_step()
-        else:
-            self._propose_step()
+    def _follow(self, number: int, key: str, document: dict[str, Any]) -> None:
+        """Show a first look, then let the frames be gone through."""
+        try:
+            prompt = _prompt(document)
+            check_prompt(self.capture, prompt)
+            glimpsed = self.session.glimpse(prompt)
+            masks = iter(self.session.stream(prompt))
+        except Exception as error:
+            _fail(number, key, _named(error))
+            return
+        with self._changed:
+            if glimpsed is not None:
+                self._show(number, key, glimpsed)
+            self._open[number] = _Followed(key, masks, glimpsed)
+            self._changed.notify()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._open or self._prefetching or self._proposing)
+                if self._closed:
+                    return
+                newest = next(reversed(self._open.items()), None)
+            if newest is not None:
+                self._segment_step(*newest)
+            elif self._prefetching is not None:
+                self._prefetch_step()
+            else:
+                self._propose_step()
+
+    def _prefetch_step(self) -> None:
+        assert self._prefetching is not None
+        try:
+            next(self._prefetching)
+        except StopIteration:
+            self._prefetching = None
+        except Exception:  # an unreadable image is told to whoever asks for it
+            traceback.print_exc()
+            self._prefetching = None
 
     def _propose_step(self) -> None:
         assert self._proposing is not None
@@ -116,31 +168,30 @@ class Desk:
         else:
             _say(proposals=[proposal_line(proposal, self.width) for proposal in found], fraction=round(fraction, 3))
 
-    def _segment_step(self) -> None:
-        number, (key, masks) = next(reversed(self._open.items()))
+    def _segment_step(self, number: int, followed: _Followed) -> None:
+        failure: R2C2RError | None = None
+        found: Glimpse | None = None
         try:
-            frame, packed, confidence = next(masks)
-        except StopIteration:
-            del self._open[number]
-            _say(object=number, key=key, end="done")
-        except R2C2RError as error:
-            del self._open[number]
-            _fail(number, key, error)
+            found = next(followed.masks, None)
         except Exception as error:  # one object must not take the others with it
-            traceback.print_exc()
-            del self._open[number]
-            _fail(number, key, R2C2RError(f"unexpected: {error}", hint="see the log of the live segmenter"))
-        else:
-            share = packed.area_px / max(packed.width * packed.height, 1)
-            mask = mask_bits(packed, self.width)
-            _say(
-                object=number,
-                key=key,
-                frame=int(frame),
-                confidence=round(float(confidence), 4),
-                area=round(share, 6),
-                mask=mask,
-            )
+            failure = _named(error)
+        with self._changed:
+            if self._open.get(number) is not followed:
+                return  # superseded or cancelled meanwhile
+            if found is None:
+                del self._open[number]
+            if failure is not None:
+                _fail(number, followed.key, failure)
+            elif found is None:
+                _say(object=number, key=followed.key, end="done")
+            elif found != followed.glimpsed:
+                self._show(number, followed.key, found)
+
+    def _show(self, number: int, key: str, found: Glimpse) -> None:
+        frame, packed, confidence = found
+        share = packed.area_px / max(packed.width * packed.height, 1)
+        mask = mask_bits(packed, self.width)
+        _say(object=number, key=key, frame=int(frame), confidence=round(float(confidence), 4), area=round(share, 6), mask=mask)
 
 
 def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
@@ -159,6 +210,25 @@ def _prompt(document: dict[str, Any]) -> ObjectPrompt:
     return parse_prompts({"version": 1, "objects": [document]}).objects[0]
 
 
+def _waiting(commands: Commands) -> list[dict[str, Any]] | None:
+    """The next commands, without those that a later one about the same object makes pointless; None at the end."""
+    waiting = [commands.get()]
+    with contextlib.suppress(queue.Empty):
+        while True:
+            waiting.append(commands.get_nowait())
+    if waiting[-1] is None:
+        return None
+    last = {command.get("object"): position for position, command in enumerate(waiting) if command}
+    return [command for position, command in enumerate(waiting) if command and last[command.get("object")] == position]
+
+
+def _named(error: Exception) -> R2C2RError:
+    if isinstance(error, R2C2RError):
+        return error
+    traceback.print_exception(error)
+    return R2C2RError(f"unexpected: {error}", hint="see the log of the live segmenter")
+
+
 def _fail(number: int, key: str, error: R2C2RError) -> None:
     _say(
         object=number, key=key, end="failed", error={"kind": type(error).__name__, "message": error.message, "hint": error.hint}
@@ -172,8 +242,10 @@ def _read_commands(commands: Commands) -> None:
 
 
 def _say(**message: object) -> None:
-    sys.stdout.write(json.dumps(message) + "\n")
-    sys.stdout.flush()
+    line = json.dumps(message) + "\n"
+    with _speaking:
+        sys.stdout.write(line)
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -99,6 +99,10 @@ class GeometricSession:
         mask, trust = found.mask(frame)
         return (frame.index, pack_mask(mask), trust) if np.count_nonzero(mask) >= self.config.least_area_px else None
 
+    def prefetch(self) -> Iterator[None]:
+        """Decode images, as many as stay in memory."""
+        return self.scene.prefetch()
+
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
         """The object in every frame that sees it; raises ObjectNotSeen when none does."""
         progress.at(0.0, f"{prompt.name}: finding it")

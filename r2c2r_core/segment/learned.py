@@ -94,6 +94,10 @@ class LearnedSession:
         """None: the model's own first mask comes first in `stream`, and the model is not for two threads."""
         return None
 
+    def prefetch(self) -> Iterator[None]:
+        """Decode images."""
+        return self.bench.prefetch()
+
     def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
         """Frame, mask and confidence as the model gives them: clicked frames first, then outwards both ways."""
         return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)

@@ -28,6 +28,9 @@ class SegmentSession(Protocol):
         None when `stream` brings its first mask as soon, or that frame does not show the object.
         """
 
+    def prefetch(self) -> Iterator[None]:
+        """Load what clicks will need, bit by bit, as far as memory allows; for while nobody waits."""
+
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
         """The object in every frame that sees it, and what was measured; raises ObjectNotSeen."""
 

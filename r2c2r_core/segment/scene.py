@@ -2,7 +2,7 @@
 
 import os
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -58,6 +58,16 @@ class Scene:
     def depth(self, frame_index: int) -> DepthMetres:
         """Sensor depth in metres, float32, 0 where the sensor has none."""
         return self._depth.get(frame_index, self._sensor_depth)
+
+    def prefetch(self) -> Iterator[None]:
+        """Load the images of one frame after another, as many as stay in memory."""
+        held = 0
+        for frame in self.frames:
+            held += self.rgb(frame.index).nbytes
+            if held > _IMAGE_CACHE_BYTES:
+                return
+            self.filled_depth(frame.index)
+            yield
 
     def surface_depth(self, frame_index: int, size: tuple[int, int]) -> DepthMetres:
         """Depth of the fused surface seen from a frame, at (width, height); 0 where the scan has nothing."""

@@ -119,6 +119,23 @@ def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], 
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] in ("ready", "off"))
 
 
+def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.jobs.live.LEFT_S", 0.3)
+    with start() as web:
+        project = web.sample()
+        slow = next(web.settings.data_dir.rglob("work")) / "prepare_slowly"
+        slow.touch()
+        with listening(web, project) as socket:
+            socket.receive_json()
+            web.post(f"/api/projects/{project}/live/open")
+            until(socket, type="live")
+            web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "preparing")
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "off")
+        slow.unlink()
+        web.post(f"/api/projects/{project}/live/open")
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
+
+
 def test_a_tab_that_was_away_gets_what_it_missed_or_is_told_to_fetch_anew(web: Running) -> None:
     project = web.sample()
     with listening(web, project) as socket:

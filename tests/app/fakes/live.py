@@ -63,6 +63,9 @@ def main() -> None:
     threading.Thread(target=read, daemon=True).start()
     Path(sys.argv[1], "live_options.txt").write_text(" ".join(sys.argv[2:]))
     say(state="preparing", fraction=0.5, text="halfway")
+    while Path(sys.argv[1], "prepare_slowly").exists():
+        say(state="preparing", fraction=0.6, text="slowly")
+        time.sleep(0.02)
     say(state="ready", total=3)
     while (command := commands.get()) is not None:
         if command["cmd"] == "propose":

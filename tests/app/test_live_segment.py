@@ -1,0 +1,136 @@
+"""The desk of the live segmenter: who is answered when. Its session is a fake whose pace the test sets."""
+
+import json
+import threading
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.jobs import live_segment
+from app.jobs.live_segment import Desk
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.masks import PackedMask, pack_mask
+from r2c2r_core.model.inputs import ObjectPrompt
+
+CAMERA = Intrinsics(fx=50.0, fy=50.0, cx=20.0, cy=15.0, width=40, height=30)
+CAPTURE: Any = SimpleNamespace(frames=tuple(SimpleNamespace(index=index, rgb_camera=CAMERA) for index in range(4)))
+
+
+def mask(size: int) -> PackedMask:
+    return pack_mask(np.arange(1200).reshape(30, 40) < size)
+
+
+class Session:
+    """Four frames; the area of an object's masks is the x of its last click. The gate holds its stream up."""
+
+    def __init__(self) -> None:
+        self.gate = threading.Event()
+        self.looked: list[float] = []
+        self.begun = threading.Event()
+
+    def glimpse(self, prompt: ObjectPrompt) -> tuple[int, PackedMask, float]:
+        self.looked.append(prompt.points[-1].x)
+        return prompt.points[-1].frame, mask(int(prompt.points[-1].x) - (prompt.category == "bottle")), 0.5
+
+    def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
+        self.begun.set()
+        assert self.gate.wait(10)
+        for frame in range(4):
+            yield frame, mask(int(prompt.points[-1].x)), 0.5
+
+    def prefetch(self) -> Iterator[None]:
+        return iter(())
+
+    def propose(self) -> Iterator[Any]:
+        return iter([(1.0, ())])
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    lines: list[dict[str, Any]] = []
+    monkeypatch.setattr(live_segment, "_say", lambda **message: lines.append(json.loads(json.dumps(message))))
+    return lines
+
+
+@pytest.fixture
+def desk(said: list[dict[str, Any]]) -> Iterator[SimpleNamespace]:
+    session, commands = Session(), live_segment.Commands()
+    at_work = threading.Thread(target=Desk(session, CAPTURE, 40).answer, args=(commands,))  # type: ignore[arg-type]
+
+    def end() -> None:
+        session.gate.set()
+        commands.put(None)
+        at_work.join(10)
+
+    yield SimpleNamespace(session=session, put=commands.put, start=at_work.start, end=end)
+    end()
+
+
+def click(number: int, x: float, category: str = "drawer") -> dict[str, Any]:
+    point = {"frame": 0, "x": x, "y": 5.0, "label": 1}
+    prompt = {"name": f"o{number}", "category": category, "points": [point]}
+    return {"cmd": "segment", "object": number, "key": f"{number}-{x:g}", "prompt": prompt}
+
+
+def until(condition: Any) -> None:
+    waited = threading.Event()
+    for _ in range(1000):
+        if condition():
+            return
+        waited.wait(0.01)
+    raise AssertionError("did not happen")
+
+
+def test_a_first_look_comes_first_and_again_only_when_the_mask_differs(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.session.gate.set()
+    desk.start()
+    desk.put(click(1, 20.0))
+    until(lambda: said and said[-1].get("end") == "done")
+    assert [line.get("frame") for line in said] == [0, 1, 2, 3, None]
+    said.clear()
+    desk.put(click(2, 20.0, "bottle"))
+    until(lambda: said and said[-1].get("end") == "done")
+    assert [line.get("frame") for line in said] == [0, 0, 1, 2, 3, None]
+
+
+def test_a_click_is_answered_while_another_objects_frames_are_at_work(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.start()
+    desk.put(click(1, 20.0))
+    assert desk.session.begun.wait(10)
+    desk.put(click(2, 10.0))
+    until(lambda: len(said) == 2)
+    assert (said[1]["object"], said[1]["frame"]) == (2, 0)
+
+
+def test_a_newer_click_ends_the_older_masks_at_once(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.start()
+    desk.put(click(1, 20.0))
+    assert desk.session.begun.wait(10)
+    desk.put(click(1, 10.0))
+    until(lambda: len(said) == 2)
+    desk.session.gate.set()
+    until(lambda: said[-1].get("end") == "done")
+    assert [line["key"] for line in said] == ["1-20"] + ["1-10"] * 5
+
+
+def test_clicks_that_a_later_one_replaces_are_not_looked_at(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.session.gate.set()
+    for x in (5.0, 6.0, 7.0):
+        desk.put(click(1, x))
+    desk.start()
+    until(lambda: said and said[-1].get("end") == "done")
+    assert desk.session.looked == [7.0]
+    assert {line["key"] for line in said} == {"1-7"}
+
+
+def test_a_cancelled_object_says_so_and_nothing_after(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.start()
+    desk.put(click(1, 20.0))
+    assert desk.session.begun.wait(10)
+    desk.put({"cmd": "cancel", "object": 1})
+    until(lambda: said[-1].get("end") == "cancelled")
+    desk.end()
+    assert said[-1].get("end") == "cancelled"
