@@ -1,5 +1,7 @@
 """What an image-to-3D model is shown: the object alone, as RGBA with the mask in alpha."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from jaxtyping import UInt8
@@ -25,15 +27,23 @@ def rgba_cutout(view: View, longest_px: int = LONGEST_PX) -> RGBA:
             f"frame {view.frame_index}: the mask is {len(columns)} x {len(rows)} px, {_LEAST_PX} needed on each side",
             hint="add a click on a frame that shows the object larger",
         )
-    rgba = np.dstack([view.rgb, view.mask.astype(np.uint8) * 255])
-    if view.mask.all():
+    small = bounded(view, longest_px)
+    rgba = np.dstack([small.rgb, small.mask.astype(np.uint8) * 255])
+    if small.mask.all():
         rgba = cv2.copyMakeBorder(rgba, *(_BORDER_PX,) * 4, cv2.BORDER_CONSTANT, value=(0, 0, 0, 0))
-    scale = longest_px / max(rgba.shape[:2])
-    if scale < 1:
-        size = (max(round(rgba.shape[1] * scale), 1), max(round(rgba.shape[0] * scale), 1))
-        rgba = cv2.resize(rgba, size, interpolation=cv2.INTER_AREA)
-        rgba[..., 3] = np.where(rgba[..., 3] > 127, 255, 0)
     return np.asarray(rgba, dtype=np.uint8)
+
+
+def bounded(view: View, longest_px: int = LONGEST_PX) -> View:
+    """The view with a picture of at most `longest_px`; its depth keeps its own resolution."""
+    height, width = view.mask.shape
+    scale = longest_px / max(height, width)
+    if scale >= 1:
+        return view
+    size = (max(round(width * scale), 1), max(round(height * scale), 1))
+    mask = cv2.resize(view.mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127
+    rgb = np.asarray(cv2.resize(view.rgb, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return replace(view, rgb=rgb, mask=np.asarray(mask), rgb_camera=view.rgb_camera.resized(*size))
 
 
 def usable_views(views: tuple[View, ...]) -> tuple[View, ...]:

@@ -45,6 +45,18 @@ GENERATORS = Registry(
             summary="TRELLIS in this process: several photos in, a textured mesh out; an NVIDIA GPU with 16 GB",
         ),
         Backend(
+            name="sam3d",
+            target="r2c2r_core.generate.sam3d:Sam3dObjects",
+            needs=("sam3d_objects", "torch", "hydra", "omegaconf"),
+            install="github.com/facebookresearch/sam-3d-objects in an environment of its own and serve it to 'remote'",
+            weights=Weights(
+                usual="facebook/sam-3d-objects", variable="R2C2R_SAM3D_WEIGHTS", gated=True, holds=("**/pipeline.yaml",)
+            ),
+            licence="SAM License (gated weights; commercial use allowed, military use not)",
+            licence_class="restricted",
+            summary="SAM 3D Objects: one photo and its measured points in, a mesh with its place out; a GPU with 32 GB",
+        ),
+        Backend(
             name="remote",
             target="r2c2r_core.generate.remote:Remote",
             licence="that of the generator served",

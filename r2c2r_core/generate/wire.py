@@ -28,7 +28,7 @@ import numpy as np
 from r2c2r_core.arrays import Image
 from r2c2r_core.codec import decode_noun, encode_noun
 from r2c2r_core.errors import InputError
-from r2c2r_core.generate.cutout import png_of
+from r2c2r_core.generate.cutout import bounded, png_of
 from r2c2r_core.generate.evidence import Evidence, View
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
@@ -36,7 +36,6 @@ from r2c2r_core.model.capture import Capture, Depth, Room, SceneSurface
 from r2c2r_core.model.track import MaskTrack
 
 VERSION = 1
-_LONGEST_PX = 1024
 
 
 class Wish(NamedTuple):
@@ -50,7 +49,7 @@ class Wish(NamedTuple):
 def encode_wish(wish: Wish) -> tuple[str, bytes]:
     """Content type and body."""
     evidence = wish.evidence
-    views = [_bounded(view) for view in evidence.pool]
+    views = [bounded(view) for view in evidence.pool]
     params = {
         "version": VERSION,
         "object": evidence.track.name,
@@ -115,18 +114,6 @@ def decode_form(content_type: str, body: bytes) -> dict[str, list[bytes]]:
         name = next((f.strip()[5:].strip('"') for f in names if f.strip().startswith("name=")), "")
         form.setdefault(name, []).append(content)
     return form
-
-
-def _bounded(view: View) -> View:
-    """The view with a picture of at most 1024 px: models look at 518."""
-    height, width = view.mask.shape
-    scale = _LONGEST_PX / max(height, width)
-    if scale >= 1:
-        return view
-    size = (max(round(width * scale), 1), max(round(height * scale), 1))
-    mask = cv2.resize(view.mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127
-    rgb = np.asarray(cv2.resize(view.rgb, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return replace(view, rgb=rgb, mask=np.asarray(mask), rgb_camera=view.rgb_camera.resized(*size))
 
 
 def _view_entry(view: View) -> dict[str, Any]:
