@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from r2c2r_core import __version__
-from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.errors import CaptureError, InputError, R2C2RError
 from r2c2r_core.terminal import certificate_text, show_progress, table
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU bill
@@ -106,7 +106,7 @@ def sample(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """The capture doctor."""
-    from r2c2r_core.ingest.doctor import examine
+    from r2c2r_core.ingest.doctor import draw_scan, examine, refusal_to_json
     from r2c2r_core.ingest.readers.table import open_recording
     from r2c2r_core.ingest.stage import IngestConfig, read_capture
     from r2c2r_core.overrides import read_overrides
@@ -115,10 +115,17 @@ def info(options: argparse.Namespace) -> int:
     overrides = read_overrides(options.overrides) if options.overrides else None
     with tempfile.TemporaryDirectory(prefix="r2c2r-info-") as store, show_progress() as progress:
         reading = progress.for_stage("ingest")
-        capture = read_capture(source, Path(store), IngestConfig(), overrides=overrides, progress=reading)
+        try:
+            capture = read_capture(source, Path(store), IngestConfig(), overrides=overrides, progress=reading)
+        except CaptureError as problem:
+            if options.json:
+                _write_json(options.json, refusal_to_json(problem))
+            raise
         report = examine(capture, open_recording(source))
     if options.json:
         _write_json(options.json, report.to_json())
+    if options.picture:
+        _write_picture(options.picture, draw_scan(capture))
     print(table(("figure", "value"), report.rows()))
     for line in (*report.reasons, *report.notices):
         print(f"- {line}")
@@ -250,6 +257,7 @@ def _parser() -> argparse.ArgumentParser:
     examined.add_argument("capture", type=Path)
     examined.add_argument("--overrides", type=Path, help="what a person said about the room: up, floor, manhattan_yaw, walls")
     examined.add_argument("--json", type=Path)
+    examined.add_argument("--picture", type=Path, metavar="FILE.png", help="the fused scan and the camera's path, drawn")
     ran = add("run", run)
     ran.add_argument("capture", type=Path)
     ran.add_argument("--prompts", type=Path, required=True)
@@ -311,6 +319,15 @@ def _write_json(path: Path, document: dict[str, Any]) -> None:
     from r2c2r_core.workspace import write_atomically
 
     write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())
+
+
+def _write_picture(path: Path, pictures: Any) -> None:
+    import cv2
+
+    from r2c2r_core.ingest.doctor import side_by_side
+    from r2c2r_core.workspace import write_atomically
+
+    write_atomically(path, cv2.imencode(".png", cv2.cvtColor(side_by_side(pictures), cv2.COLOR_RGB2BGR))[1].tobytes())
 
 
 def _write_masks(reconstruction: Any, folder: Path) -> None:

@@ -38,7 +38,11 @@ def fuse_depth(
     grid = block_grid(
         ("tsdf", "weight", "color"), (core.float32, core.float32, core.float32), ((1,), (1,), (3,)), voxel_m, 8, block_count
     )
+    nothing = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.uint8))
+    fused = 0
     for view in views:
+        if not ((view.depth_m > 0) & (view.depth_m < depth_max_m)).any():
+            continue  # Open3D raises on an image that touches no block
         depth = o3d.t.geometry.Image(np.ascontiguousarray(view.depth_m, dtype=np.float32))
         # Open3D truncates to the pixel it reads, so its pixel centres lie at i + 0.5 like ours
         intrinsic = core.Tensor(np.ascontiguousarray(view.camera.matrix), core.float64)
@@ -47,9 +51,12 @@ def fuse_depth(
         colour = view.colour if view.colour is not None else np.full((*view.depth_m.shape, 3), 160, np.uint8)
         image = o3d.t.geometry.Image(np.ascontiguousarray(colour, dtype=np.float32) / np.float32(255.0))
         grid.integrate(blocks, depth, image, intrinsic, intrinsic, extrinsic, 1.0, depth_max_m, 4.0)
+        fused += 1
+    if not fused:
+        return nothing
     mesh = grid.extract_triangle_mesh(min_weight)
     if mesh.is_empty() or "indices" not in mesh.triangle:
-        return Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.uint8))
+        return nothing
     colours = (mesh.vertex.colors.numpy() * 255).clip(0, 255).astype(np.uint8)
     vertices = mesh.vertex.positions.numpy().astype(np.float64)
     return _in_canonical_order(Surface(vertices, mesh.triangle.indices.numpy().astype(np.int64), colours))

@@ -3,7 +3,8 @@
 import numpy as np
 
 from r2c2r_core.ingest.doctor.hypotheses import Poses, find_convention, find_scale
-from r2c2r_core.ingest.doctor.measures import measure
+from r2c2r_core.ingest.doctor.light import grey_views
+from r2c2r_core.ingest.doctor.measures import measure, moments
 from r2c2r_core.ingest.doctor.pairs import far_pairs, neighbours, stack_views
 from r2c2r_core.ingest.doctor.registration import measure_registration
 from r2c2r_core.ingest.doctor.report import CaptureReport
@@ -24,16 +25,20 @@ def examine(capture: Capture, recording: Recording | None = None) -> CaptureRepo
     positions = np.unique(np.linspace(0, count - 1, min(_VIEWS, count)).round().astype(np.int64))
     views = stack_views(capture.frames, capture.images, list(positions), rng)
     near = neighbours(views)
-    convention, mended = find_convention(views, near, [(k, _later(capture, positions + k)) for k in (1, -1)])
+    as_recorded = views.posed(*_recorded_poses(capture, positions))
+    shifted = [(places, _recorded_poses(capture, positions + places)) for places in (1, -1)]
+    convention, mended = find_convention(as_recorded, near, shifted)
     scale = find_scale(mended, far_pairs(mended, _FAR_PAIRS))
-    spread = positions[:: max(1, len(positions) // _REGISTERED)]
+    spread = positions[:: -(-len(positions) // _REGISTERED)]
     registration = measure_registration([capture.frames[p] for p in spread], capture.images, rng)
-    figures = measure(capture, views, near, recording)
+    grey = grey_views(capture, views)
+    figures = measure(capture, views, near, grey, recording)
     remarks = judge(figures, convention, scale, registration)
     return CaptureReport(
         verdict=worst(remarks),
         remarks=remarks,
         figures=figures,
+        moments=moments(capture, views, near, grey),
         convention=convention,
         scale=scale,
         registration=registration,
@@ -41,7 +46,8 @@ def examine(capture: Capture, recording: Recording | None = None) -> CaptureRepo
     )
 
 
-def _later(capture: Capture, positions: np.ndarray) -> Poses:
-    """Poses of the frames at these positions; the first and the last stand in beyond the ends."""
-    poses = [capture.frames[p].world_from_camera for p in np.clip(positions, 0, len(capture.frames) - 1)]
+def _recorded_poses(capture: Capture, positions: np.ndarray) -> Poses:
+    """Poses of the frames at these positions in the recording's world; beyond its ends, those of the first and the last."""
+    within = np.clip(positions, 0, len(capture.frames) - 1)
+    poses = [capture.world_from_capture.inverse @ capture.frames[p].world_from_camera for p in within]
     return np.stack([p.rotation for p in poses]), np.stack([p.translation for p in poses])

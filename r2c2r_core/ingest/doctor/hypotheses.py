@@ -49,8 +49,11 @@ class _Change(NamedTuple):
 def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Poses]]) -> tuple[Finding | None, Views]:
     """The wrong convention that explains the disagreement of neighbouring frames, and the views as they should be.
 
+    The views' poses are in the recording's own world: levelled ones no longer tell what their quaternions were.
     `shifted`: poses of the frames so many places later, to tell images that belong to another frame's pose.
     """
+    if not len(pairs):
+        return None, views
     given = compare(views, pairs)
     best: tuple[float, Cause, str, Views] | None = None
     for cause, text, change in _conventions(shifted):
@@ -113,21 +116,18 @@ class _Try(NamedTuple):
 
 
 def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
-    flip = CAMERA_CV_FROM_GL
-    changes = [
-        _Change("camera_axes", "the camera axes are flipped (OpenGL taken for OpenCV, or the reverse)", _turned(flip)),
-        _Change("poses_inverted", _INVERTED, _inverted),
-        _Change("poses_inverted", _INVERTED, lambda poses: _turned(flip)(_inverted(poses))),
-        _Change("rotation_transposed", "the rotations of the poses are transposed", lambda p: (_transposed(p[0]), p[1])),
-    ]
-    for quarter, angle in ((1, 90), (2, 180), (3, 270)):
-        text = f"the images are turned by {angle} deg against their poses"
-        changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarter * np.pi / 2))))
-    for before in (np.eye(3), flip):
-        for order in ((1, 2, 3, 0), (3, 0, 1, 2)):
-            changes.append(
-                _Change("quaternion_order", "the quaternions are read in the wrong order", _reordered(order, before))
-            )
+    changes = []
+    for axes in _READER_AXES:
+        changes += [
+            _Change("poses_inverted", _INVERTED, _in_file(_inverted, axes)),
+            _Change("rotation_transposed", "the rotations of the poses are transposed", _in_file(_transposed, axes)),
+            *(_Change("quaternion_order", _ORDER, _in_file(_reordered(order), axes)) for order in _ORDERS),
+        ]
+    for axes in (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0])):  # the second: of images that stood upside down and were turned
+        changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
+    for quarters in (1, 2, 3):
+        text = f"the images are turned by {90 * quarters} deg against their poses"
+        changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))
     for places, poses in shifted:
         text = f"the images belong to the poses of the frames {abs(places)} {'later' if places > 0 else 'earlier'}"
         changes.append(_Change("frames_shifted", text, _replaced(poses)))
@@ -135,6 +135,23 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
 
 
 _INVERTED = "the poses are inverted (world to camera where camera to world is expected)"
+_FLIPPED = "the camera axes are flipped (OpenGL taken for OpenCV, or the reverse)"
+_ORDER = "the quaternions are read in the wrong order"
+_ORDERS = ((1, 2, 3, 0), (3, 0, 1, 2))  # w first for w last, and the reverse
+# What ingest multiplied the file's rotations by: the format's own flip of axes, and a turn that set the images upright
+_READER_AXES = tuple(
+    flip @ rotation_about_z(quarters * np.pi / 2) for quarters in range(4) for flip in (np.eye(3), CAMERA_CV_FROM_GL)
+)
+
+
+def _in_file(change: Callable[[Poses], Poses], axes: np.ndarray) -> Callable[[Poses], Poses]:
+    """A change to poses as the file has them, if `axes` is what ingest made of its cameras."""
+
+    def changed(poses: Poses) -> Poses:
+        rotation, translation = change((poses[0] @ axes.T, poses[1]))
+        return rotation @ axes, translation
+
+    return changed
 
 
 def _turned(camera_from_camera: np.ndarray) -> Callable[[Poses], Poses]:
@@ -146,22 +163,20 @@ def _replaced(by: Poses) -> Callable[[Poses], Poses]:
 
 
 def _inverted(poses: Poses) -> Poses:
-    rotation = _transposed(poses[0])
+    rotation = np.ascontiguousarray(np.swapaxes(poses[0], 1, 2))
     return rotation, -np.einsum("vij,vj->vi", rotation, poses[1])
 
 
-def _transposed(rotation: Rotations) -> Rotations:
-    return np.ascontiguousarray(np.swapaxes(rotation, 1, 2))
+def _transposed(poses: Poses) -> Poses:
+    return np.ascontiguousarray(np.swapaxes(poses[0], 1, 2)), poses[1]
 
 
-def _reordered(order: tuple[int, ...], camera_axes: np.ndarray) -> Callable[[Poses], Poses]:
-    """Quaternions with their numbers in another order; `camera_axes` undoes and redoes the reader's own flip."""
-
+def _reordered(order: tuple[int, ...]) -> Callable[[Poses], Poses]:
     def change(poses: Poses) -> Poses:
         from scipy.spatial.transform import Rotation
 
-        read = Rotation.from_matrix(poses[0] @ camera_axes).as_quat()
-        return Rotation.from_quat(read[:, order]).as_matrix() @ camera_axes, poses[1]
+        read = Rotation.from_matrix(poses[0]).as_quat()
+        return Rotation.from_quat(read[:, order]).as_matrix(), poses[1]
 
     return change
 

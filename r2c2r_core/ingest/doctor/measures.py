@@ -4,36 +4,36 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
-from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.doctor.coverage import cover
 from r2c2r_core.ingest.doctor.drift import misplaced_m, revisits
+from r2c2r_core.ingest.doctor.light import Greys, measure_light
 from r2c2r_core.ingest.doctor.pairs import Pairs, Views, angle_deg, compare
-from r2c2r_core.ingest.doctor.report import CaptureFigures
-from r2c2r_core.ingest.readers.protocol import Recording, UnreadableFrame
+from r2c2r_core.ingest.doctor.recorded import Recorded, measure_recorded, measure_timing, unreadable_share
+from r2c2r_core.ingest.doctor.report import CaptureFigures, Moment
+from r2c2r_core.ingest.readers.protocol import Recording
 from r2c2r_core.model.capture import Capture, Frame
 
-_STOPS = 0.5  # a change of brightness that shows in textures
 _LEVEL_M2 = 0.15  # a level surface smaller than this is a thing's top
 _CEILING_M = 1.9
 
 
-def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording | None) -> CaptureFigures:
-    """The figures of a recording; `pairs` are neighbours among `views`."""
+def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording: Recording | None) -> CaptureFigures:
+    """The figures of a recording; `pairs` are neighbours among `views`, `grey` their pictures."""
     frames, room = capture.frames, capture.room
     centres = np.array([f.world_from_camera.translation for f in frames])
     steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
     turns = [angle_deg(a.world_from_camera.rotation, b.world_from_camera.rotation) for a, b in pairwise(frames)]
-    timing = _timing(recording, frames)
+    timing = measure_timing(recording, frames)
+    recorded = measure_recorded(recording) if recording else Recorded(None, None)
     depth_known = views.depth_m > 0
     sharpness = np.array([f.sharpness for f in frames])
     jumps = _jumps(frames, steps)
     compared = compare(views, pairs)
     errors = compared.error_m[np.isfinite(compared.error_m)]
     again = misplaced_m(views, revisits(views, 24))
-    light = _light(capture, views, pairs)
+    light = measure_light(grey, views, pairs)
     heights = _heights(capture)
     seen = cover(capture.surface.vertices_world, views)
     return CaptureFigures(
@@ -41,6 +41,8 @@ def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording |
         first_frame=frames[0].index,
         last_frame=frames[-1].index,
         missing_share=timing.missing_share,
+        without_pose_share=timing.without_pose_share,
+        unreadable_share=unreadable_share(recording, len(frames)) if recording else 0.0,
         longest_gap_s=timing.longest_gap_s,
         rgb_size=(frames[0].rgb_camera.width, frames[0].rgb_camera.height),
         depth_size=(frames[0].depth_camera.width, frames[0].depth_camera.height),
@@ -49,7 +51,8 @@ def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording |
         path_m=float(steps.sum()),
         turned_deg=float(np.sum(turns)),
         depth_coverage=float(np.median(depth_known.mean(axis=(1, 2)))),
-        confidence_shares=_confidence(recording) if recording else None,
+        recorded_depth_m=recorded.median_m,
+        confidence_shares=recorded.confidence,
         median_depth_m=float(np.median(views.depth_m[depth_known])) if depth_known.any() else 0.0,
         blurred_share=float((sharpness < np.median(sharpness) / 3).mean()),
         overexposed_share=light.white,
@@ -72,7 +75,7 @@ def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording |
         walls=len(room.walls),
         walls_source=room.walls_source,
         wall_spread_mm=tuple(1000 * w.spread_m for w in room.walls if w.spread_m is not None),
-        camera_height_m=float(np.median(centres[:, 2])) if capture.room.floor_found else None,
+        camera_height_m=float(np.median(centres[:, 2])) if room.floor_found else None,
         level_heights_m=heights.level,
         room_height_m=heights.ceiling,
         seen_from_three=seen.from_three,
@@ -82,71 +85,21 @@ def measure(capture: Capture, views: Views, pairs: Pairs, recording: Recording |
     )
 
 
-class _Timing(NamedTuple):
-    missing_share: float
-    longest_gap_s: float | None
-    fps: float | None
-    duration_s: float | None
-
-
-def _timing(recording: Recording | None, frames: Sequence[Frame]) -> _Timing:
-    """Frame rate and gaps, of the recording itself where it is at hand: a long one is thinned on reading."""
-    every = recording.frames if recording else frames
-    numbers = np.array([f.index for f in every], dtype=np.float64)
-    times = np.array([f.timestamp_s for f in every if f.timestamp_s is not None])
-    gaps = np.diff(numbers)
-    expected = (numbers[-1] - numbers[0]) / np.median(gaps) + 1 if len(gaps) else 1.0
-    between = np.diff(times)
-    duration = float(times[-1] - times[0]) if len(times) > 1 else None
-    return _Timing(
-        missing_share=float(max(0.0, 1.0 - len(numbers) / expected)),
-        longest_gap_s=float(between.max()) if len(between) else None,
-        fps=(len(times) - 1) / duration if duration else None,
-        duration_s=duration,
-    )
-
-
-def _confidence(recording: Recording, frames: int = 12) -> tuple[float, float, float] | None:
-    """Shares of pixels of low, medium and high confidence."""
-    counts = np.zeros(3)
-    for frame in recording.frames[:: max(1, len(recording.frames) // frames)]:
-        try:
-            confidence = recording.depth_of(frame).confidence
-        except (UnreadableFrame, CaptureError):
-            continue
-        if confidence is not None:
-            counts += np.bincount(np.clip(confidence.ravel(), 0, 2), minlength=3)
-    if not counts.any():
-        return None
-    low, medium, high = counts / counts.sum()
-    return float(low), float(medium), float(high)
-
-
-class _Light(NamedTuple):
-    white: float
-    black: float
-    flicker: float
-
-
-def _light(capture: Capture, views: Views, pairs: Pairs) -> _Light:
-    """Exposure of the sampled frames, and how often neighbours show one surface in another brightness."""
-    size = (views.depth_m.shape[2], views.depth_m.shape[1])
-    rgb = [cv2.resize(capture.images.rgb(capture.frames[p].index), size, interpolation=cv2.INTER_AREA) for p in views.position]
-    grey = np.stack([cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in rgb])
-    if not len(pairs):
-        return _Light(float(np.median((grey > 250).mean(axis=(1, 2)))), float(np.median((grey < 5).mean(axis=(1, 2)))), 0.0)
-    compared = compare(views, pairs)
-    here = views.point_uv[pairs[:, 0]].astype(np.int64)
-    first = grey[pairs[:, 0, None], here[..., 1], here[..., 0]]
-    second = grey[pairs[:, 1, None], compared.row, compared.column]
-    fair = compared.agrees & (first > 20) & (first < 235) & (second > 20) & (second < 235)
-    # sRGB: light grows about as the 2.2th power of the value
-    stops = 2.2 * np.log2(np.maximum(second, 1) / np.maximum(first, 1).astype(np.float64))
-    steps = np.array([np.median(stops[k, fair[k]]) for k in range(len(pairs)) if fair[k].sum() >= 30])
-    return _Light(
-        white=float(np.median((grey > 250).mean(axis=(1, 2)))),
-        black=float(np.median((grey < 5).mean(axis=(1, 2)))),
-        flicker=float((np.abs(steps) > _STOPS).mean()) if len(steps) else 0.0,
+def moments(capture: Capture, views: Views, pairs: Pairs, grey: Greys) -> tuple[Moment, ...]:
+    """What the looked-at frames were like, in their order."""
+    errors: dict[int, float] = dict(zip(pairs[:, 0].tolist(), compare(views, pairs).error_m.tolist(), strict=True))
+    known = (views.depth_m > 0).mean(axis=(1, 2))
+    frames = [capture.frames[p] for p in views.position]
+    usual = max(float(np.median([f.sharpness for f in capture.frames])), 1e-9)
+    return tuple(
+        Moment(
+            frame_index=frame.index,
+            sharpness=round(float(frame.sharpness) / usual, 3),
+            depth_share=round(float(known[k]), 3),
+            brightness=round(float(grey[k].mean()) / 255, 3),
+            error_mm=round(1000 * error, 1) if np.isfinite(error := errors.get(k, np.nan)) else None,
+        )
+        for k, frame in enumerate(frames)
     )
 
 

@@ -127,9 +127,9 @@ def compare(
     depth = np.maximum(there[..., 2], _NEAR_M)
     seen_uv = there[..., :2] / depth[..., None] * focal[second, None] + views.centre[second, None]
     rows, columns = views.depth_m.shape[1:]
-    inside = (there[..., 2] > _NEAR_M) & (seen_uv >= 0).all(axis=2) & (seen_uv < (columns, rows)).all(axis=2)
-    column = np.where(inside, seen_uv[..., 0], 0).astype(np.int64)
-    row = np.where(inside, seen_uv[..., 1], 0).astype(np.int64)
+    u, v = seen_uv[..., 0], seen_uv[..., 1]
+    inside = (there[..., 2] > _NEAR_M) & (u >= 0) & (v >= 0) & (u < columns) & (v < rows)
+    column, row = np.where(inside, u, 0).astype(np.int64), np.where(inside, v, 0).astype(np.int64)
     measured = views.depth_m[second[:, None], row, column] * depth_scale
     if along_ray:
         off = (np.stack([column, row], axis=2) + 0.5 - views.centre[second, None]) / focal[second, None]
@@ -162,7 +162,10 @@ def neighbours(views: Views) -> Pairs:
 
 
 def far_pairs(views: Views, most: int) -> Pairs:
-    """Pairs with a wide baseline that see the same surface: what tells scale and focal length. By the given poses."""
+    """Pairs with a wide baseline that see the same surface: what tells scale and focal length. By the given poses.
+
+    Rather those near in time: over a long time drift looks like scale.
+    """
     every, overlap = overlaps(views)
     known = np.where(views.point_z > 0, views.point_z, np.nan)
     with warnings.catch_warnings():
@@ -170,7 +173,8 @@ def far_pairs(views: Views, most: int) -> Pairs:
         distance = np.nan_to_num(np.nanmedian(known, axis=1), nan=1.0)
     apart = np.linalg.norm(views.translation[every[:, 0]] - views.translation[every[:, 1]], axis=1)
     parallax = apart / np.maximum(distance[every[:, 0]], 0.3)
-    wanted = np.where((overlap > 0.2) & (parallax > 0.1), np.minimum(parallax, 0.8) * np.sqrt(overlap), 0.0)
+    soon = 1.0 / (1.0 + ((every[:, 1] - every[:, 0]) / (0.15 * len(views.position))) ** 2)
+    wanted = np.where((overlap > 0.2) & (parallax > 0.1), np.minimum(parallax, 0.8) * np.sqrt(overlap) * soon, 0.0)
     return spread(every, wanted, most)
 
 

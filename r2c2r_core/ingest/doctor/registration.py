@@ -19,7 +19,10 @@ from r2c2r_core.model.capture import Frame, FrameImages
 WIDTH = 640  # px across the colour image's longer side, at which distances are given
 _FAR_PX = 6.0  # an edge farther away than this says nothing
 _POINTS = 500  # a frame
-_LEAST_POINTS = 60
+_LEAST_POINTS, _LEAST_FRAMES = 60, 5
+_LIMIT_PX = 2.0  # the gap between two fronts is about as wide
+_LEAST_GAIN = 0.15  # of the edge distance; good recordings gain up to 0.12 by chance
+_FITS_PX = 3.0  # edges laid at random are 3.5 px and more from the next one
 _NEAREST_M, _FARTHEST_M = 0.3, 3.0
 
 
@@ -30,10 +33,17 @@ class Registration:
     edge_px: float  # mean distance of depth edges to image edges as calibrated, cut off at 6 px of 640
     edge_best_px: float  # and under the calibration that fits best
     off_px: float  # how far depth pixels move, on average, from the given calibration to the best, in px of 640
+    limit_px: float  # what is still as good as none: 2 px, or a pixel of the depth image where that is larger
     focal_factor: float  # best focal length over the given one
     shift_px: tuple[float, float]  # of the principal point
     shift_mm: tuple[float, float]  # of the colour camera, right and down
     focal_only: bool  # the focal length alone explains nearly all of it
+
+    @property
+    def wrong(self) -> bool:
+        """Whether depth clearly lies elsewhere than the calibration says, and the better one truly fits."""
+        gain = self.edge_px - self.edge_best_px
+        return self.off_px > self.limit_px and gain > _LEAST_GAIN * self.edge_px and self.edge_best_px < _FITS_PX
 
 
 class _Edges(NamedTuple):
@@ -48,21 +58,23 @@ class _Edges(NamedTuple):
 def measure_registration(frames: Sequence[Frame], images: FrameImages, rng: np.random.Generator) -> Registration | None:
     """How depth lies on colour over these frames; None when too few depth edges are seen."""
     edges = [e for f in frames if (e := _edges(f, images.rgb(f.index), images.depth(f.index).metres, rng)) is not None]
-    if len(edges) < 3:
+    if len(edges) < _LEAST_FRAMES:
         return None
     stack = _stacked(edges)
     best = _minimise(stack, _FULL)
-    focal = _minimise(stack, _FOCAL)
-    given, reached, by_focal = (float(_distances(stack, p[None]).mean()) for p in (_GIVEN, best, focal))
-    moved = np.linalg.norm(_projected(stack, best[None]) - _projected(stack, _GIVEN[None]), axis=-1)
+    given, reached = (float(_distances(stack, p[None]).mean()) for p in (_GIVEN, best))
+    off_px = float(np.linalg.norm(_projected(stack, best[None]) - _projected(stack, _GIVEN[None]), axis=-1).mean())
+    limit_px = max(_LIMIT_PX, WIDTH / max(frames[0].depth_camera.width, frames[0].depth_camera.height))
+    focal = _minimise(stack, _FOCAL) if off_px > limit_px else best
     return Registration(
         edge_px=given,
         edge_best_px=reached,
-        off_px=float(moved.mean()),
+        off_px=off_px,
+        limit_px=limit_px,
         focal_factor=float(best[0]),
         shift_px=(float(best[1] * WIDTH), float(best[2] * WIDTH)),
         shift_mm=(float(1000 * best[3]), float(1000 * best[4])),
-        focal_only=bool(given - by_focal > 0.8 * (given - reached)),
+        focal_only=bool(given - float(_distances(stack, focal[None]).mean()) > 0.8 * (given - reached)),
     )
 
 
@@ -103,8 +115,9 @@ def _distances(stack: _Stack, parameters: np.ndarray) -> np.ndarray:
     """Distance (k, n) of the edge points to image edges."""
     uv = _projected(stack, parameters)
     rows, columns = stack.distance_px.shape[1:]
-    inside = (uv >= 0).all(axis=-1) & (uv < (columns, rows)).all(axis=-1)
-    column, row = (np.where(inside, uv[..., axis], 0).astype(np.int64) for axis in (0, 1))
+    u, v = uv[..., 0], uv[..., 1]
+    inside = (u >= 0) & (v >= 0) & (u < columns) & (v < rows)
+    column, row = np.where(inside, u, 0).astype(np.int64), np.where(inside, v, 0).astype(np.int64)
     return np.where(inside, stack.distance_px[stack.frame, row, column], _FAR_PX)
 
 

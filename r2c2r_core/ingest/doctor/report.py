@@ -1,8 +1,9 @@
 """What the capture doctor says about a recording."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
+from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.doctor.hypotheses import Finding
 from r2c2r_core.ingest.doctor.registration import Registration
 
@@ -33,7 +34,9 @@ class CaptureFigures:
     frames: int
     first_frame: int
     last_frame: int
-    missing_share: float  # of the frames between the first and the last, by number
+    missing_share: float  # of the frames between the first and the last, by number: neither images nor pose
+    without_pose_share: float  # of the same: images, but no usable pose
+    unreadable_share: float  # of the frames with a pose: damaged images
     longest_gap_s: float | None
     rgb_size: tuple[int, int]  # width, height
     depth_size: tuple[int, int]
@@ -42,6 +45,7 @@ class CaptureFigures:
     path_m: float
     turned_deg: float
     depth_coverage: float  # share of pixels with usable depth in the median frame
+    recorded_depth_m: float | None  # median of the depth as recorded, before anything was rejected
     confidence_shares: tuple[float, float, float] | None  # low, medium, high; None: the format has no confidence
     median_depth_m: float
     blurred_share: float  # frames with less than a third of the median sharpness
@@ -75,12 +79,24 @@ class CaptureFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """One of the frames that were looked at."""
+
+    frame_index: int
+    sharpness: float  # over the median frame's
+    depth_share: float  # of its pixels have usable depth
+    brightness: float  # mean, 0 to 1
+    error_mm: float | None  # disagreement of its depth with a later neighbour's; None: too little overlap
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CaptureReport:
     """The doctor's report."""
 
     verdict: Verdict
     remarks: tuple[Remark, ...]  # worst first
     figures: CaptureFigures
+    moments: tuple[Moment, ...]
     convention: Finding | None  # another way to read the poses that fits better
     scale: Finding | None  # another scale of depth or focal length that fits better
     registration: Registration | None  # how depth lies on colour; None: too few edges in depth to tell
@@ -98,6 +114,14 @@ class CaptureReport:
     def to_json(self) -> dict[str, Any]:
         """The versioned document of `r2c2r info --json`."""
         return {"version": VERSION, **asdict(self), "reasons": list(self.reasons)}
+
+
+def refusal_to_json(problem: CaptureError) -> dict[str, Any]:
+    """The same document for a recording that cannot be read at all: a verdict and a reason, no figures."""
+    remark = Remark(verdict="unusable", cause="unreadable", text=problem.message, advice=problem.hint)
+    document = dict.fromkeys(field.name for field in fields(CaptureReport))
+    filled = {"verdict": "unusable", "remarks": [asdict(remark)], "reasons": [remark.line], "notices": [], "moments": []}
+    return {"version": VERSION, **document, **filled}
 
 
 def _plain(value: object) -> str:

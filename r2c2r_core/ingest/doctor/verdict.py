@@ -4,18 +4,20 @@ from r2c2r_core.ingest.doctor.hypotheses import Finding
 from r2c2r_core.ingest.doctor.registration import Registration
 from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Verdict
 
-_MOST_OFF_PX = 2.0  # of 640: a front's gap is about as wide
-_LEAST_GAIN = 0.15  # of the edge distance; good recordings gain up to 0.12 by chance
+_LEAST_DEPTH = 0.1  # of the median frame
 
 
 def judge(
     figures: CaptureFigures, convention: Finding | None, scale: Finding | None, registration: Registration | None
 ) -> tuple[Remark, ...]:
     """Remarks, worst first; among equals, the cause before its symptoms."""
+    depth, recording = _depth(figures), _recording(figures)
+    if figures.depth_coverage < _LEAST_DEPTH:  # all else follows from that
+        return (*depth, *recording)
     found = (
-        *_depth(figures),
+        *depth,
         *_conventions(figures, convention, scale, registration),
-        *_recording(figures),
+        *recording,
         *_tracking(figures, explained=convention is not None or scale is not None),
         *_pictures(figures),
         *_room(figures),
@@ -28,17 +30,14 @@ def worst(remarks: tuple[Remark, ...]) -> Verdict:
     return remarks[0].verdict if remarks else "good"
 
 
-def unregistered(registration: Registration | None) -> bool:
-    """Whether depth clearly lies elsewhere than the calibration says."""
-    if registration is None or registration.off_px <= _MOST_OFF_PX:
-        return False
-    return registration.edge_px - registration.edge_best_px > _LEAST_GAIN * registration.edge_px
-
-
 def _depth(figures: CaptureFigures) -> list[Remark]:
     shares = figures.confidence_shares
     low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > 0.5 else None
-    if figures.depth_coverage < 0.1:
+    if figures.depth_coverage < _LEAST_DEPTH:
+        recorded = figures.recorded_depth_m
+        if recorded is not None and not 0.1 < recorded < 10:
+            text = f"the recorded depth is {recorded:.4g} m in the median: another unit than the format's"
+            return [_remark("unusable", "depth_unit", text, "export it again, or correct the unit")]
         if low:
             advice = "film by more light and from 0.5 to 3 m, or check the confidence files"
             return [
@@ -65,7 +64,7 @@ def _conventions(
         remarks.append(
             _remark("unusable", convention.cause, f"{convention.text}: {gain}", "export again, or correct the poses")
         )
-    if unregistered(registration):
+    if registration is not None and registration.wrong:
         remarks.append(_unregistered(registration))
     if scale is not None:
         gain = f"views disagree by {scale.error_so_mm:.0f} mm then, {scale.error_given_mm:.0f} mm as it is"
@@ -75,8 +74,7 @@ def _conventions(
     return remarks
 
 
-def _unregistered(found: Registration | None) -> Remark:
-    assert found is not None, "asked only where it was measured"
+def _unregistered(found: Registration) -> Remark:
     if found.focal_only:
         text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
         gain = f": depth lies {found.off_px:.0f} px of 640 beside the picture"
@@ -88,17 +86,19 @@ def _unregistered(found: Registration | None) -> Remark:
 
 def _recording(figures: CaptureFigures) -> list[Remark]:
     remarks = []
+    gap = f", the longest gap is {figures.longest_gap_s:.1f} s" if figures.longest_gap_s else ""
+    for share, cause, text, advice in (
+        (figures.unreadable_share, "frames_unreadable", "{} of the frames are damaged", "copy the recording again"),
+        (figures.without_pose_share, "poses_lost", "{} of the frames have no usable pose", "film again, more slowly"),
+        (figures.missing_share, "dropped_frames", "{} of the frames were dropped" + gap, "close other apps and film again"),
+    ):
+        if share > 0.05:
+            remarks.append(_remark("usable with care", cause, text.format(f"{share:.0%}"), advice))
     if figures.frames < 5:
         remarks.append(_remark("unusable", "few_frames", f"only {figures.frames} frames", "film for at least ten seconds"))
     elif figures.frames < 20:
         remarks.append(
             _remark("usable with care", "few_frames", f"only {figures.frames} frames", "more views give better masks")
-        )
-    if figures.missing_share > 0.05:
-        gap = f", the longest gap is {figures.longest_gap_s:.1f} s" if figures.longest_gap_s else ""
-        text = f"{figures.missing_share:.0%} of the frames were dropped{gap}"
-        remarks.append(
-            _remark("usable with care", "dropped_frames", text, "close other apps and film again, or copy the recording again")
         )
     return remarks
 

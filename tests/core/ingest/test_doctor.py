@@ -1,24 +1,49 @@
 """The doctor calls a good recording good, and names what is wrong with a bad one."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
-from r2c2r_core.ingest.doctor import examine
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.ingest.doctor import CaptureReport, draw_scan, examine, refusal_to_json
+from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
-from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.capture import Capture, Depth, Frame
 
+from .corruptions import CORRUPTIONS, Corruption, corrupt_r3d
 from .tiny import TinyRoom, write_r3d
+
+# Large enough for edges in depth to be laid over edges in colour
+ROOM = TinyRoom(count=24, rgb_size=(240, 320), depth_size=(120, 160), focal=230.0)
+CONFIG = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
 
 
 @pytest.fixture(scope="module")
-def capture(tmp_path_factory) -> Capture:
-    folder = tmp_path_factory.mktemp("doctor")
-    room = TinyRoom(count=24)
-    config = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
-    return read_capture(write_r3d(folder / "scan.r3d", room), folder / "store", config)
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("doctor")
+
+
+@pytest.fixture(scope="module")
+def scan(folder):
+    return write_r3d(folder / "scan.r3d", ROOM)
+
+
+@pytest.fixture(scope="module")
+def capture(scan, folder) -> Capture:
+    return read_capture(scan, folder / "store", CONFIG)
+
+
+def named(name: str) -> Corruption:
+    return next(c for c in CORRUPTIONS if c.name == name)
+
+
+def corrupted(name: str, scan, tmp_path) -> CaptureReport:
+    bad = corrupt_r3d(named(name), scan, tmp_path / f"{name.replace('/', '')}.r3d")
+    return examine(read_capture(bad, tmp_path / "store", CONFIG), open_recording(bad))
 
 
 def with_frames(capture: Capture, change) -> Capture:
@@ -29,31 +54,101 @@ def posed(frame: Frame, pose: Rigid3) -> Frame:
     return replace(frame, world_from_camera=pose)
 
 
-def test_a_good_recording_is_good(capture):
-    report = examine(capture)
+class Darker:
+    """Every other six frames at a quarter of their light."""
+
+    def __init__(self, images) -> None:
+        self.images = images
+
+    def rgb(self, index: int) -> np.ndarray:
+        image = self.images.rgb(index)
+        return (image // 2).astype(np.uint8) if index // 6 % 2 else image
+
+    def depth(self, index: int) -> Depth:
+        return self.images.depth(index)
+
+
+def test_a_good_recording_is_good(capture, scan):
+    report = examine(capture, open_recording(scan))
     assert report.verdict == "good", report.reasons
     assert report.reasons == ()
-    assert report.figures.frames == 24
-    assert (
-        report.figures.pair_error_mm < 12
-    )  # a pixel of the tiny depth image is 4 cm wide, and the neighbour is looked up nearest
-    assert report.figures.depth_coverage > 0.9
-    assert report.figures.fps == pytest.approx(60)
+    assert report.convention is None
+    assert report.scale is None
+    figures = report.figures
+    assert figures.frames == 24
+    assert figures.pair_error_mm < 8  # a pixel of the depth image is 1.5 cm wide, and the neighbour is looked up nearest
+    assert figures.drift_mm < 8
+    assert figures.depth_coverage > 0.9
+    assert figures.confidence_shares == (0.0, 0.0, 1.0)
+    assert figures.missing_share == figures.without_pose_share == figures.unreadable_share == 0
+    assert figures.fps == pytest.approx(60)
+    assert figures.camera_height_m == pytest.approx(1.4, abs=0.04)  # the walk rises from 1.35 to 1.45 m
+    assert figures.level_heights_m == pytest.approx((0.8,), abs=0.02)  # the box
+    assert len(report.moments) == 24
+    assert all(0.9 < m.depth_share <= 1 for m in report.moments)
 
 
-def test_a_wrong_camera_convention_makes_it_unusable(capture):
-    def flip(_, frame):
-        pose = frame.world_from_camera
-        return posed(frame, Rigid3(pose.rotation @ CAMERA_CV_FROM_GL, pose.translation))
+@pytest.mark.parametrize(
+    "name",
+    [
+        "poses inverted",
+        "OpenGL taken for OpenCV",
+        "quaternions w first",
+        "depth x0.9",
+        "depth in mm",
+        "focal length x1.1",
+        "dropped frames",
+        "some NaN poses",
+        "some truncated LZFSE",
+        "zero confidence",
+    ],
+)
+def test_a_corrupted_recording_is_told_by_its_cause(name, scan, tmp_path):
+    report = corrupted(name, scan, tmp_path)
+    assert report.verdict != "good"
+    assert report.remarks[0].cause in named(name).causes, report.reasons
 
-    report = examine(with_frames(capture, flip))
-    assert report.verdict == "unusable"
-    assert report.remarks[0].cause == "camera_axes"
+
+@pytest.mark.parametrize("name", ["all poses NaN", "all LZFSE truncated"])
+def test_a_hopeless_recording_is_refused_in_one_line(name, scan, tmp_path):
+    with pytest.raises(CaptureError, match=named(name).refusal) as problem:
+        corrupted(name, scan, tmp_path)
+    document = refusal_to_json(problem.value)
+    assert document["verdict"] == "unusable"
+    assert document["remarks"][0]["cause"] == "unreadable"
+    assert document["figures"] is None
 
 
-def test_poses_the_other_way_round_make_it_unusable(capture):
-    report = examine(with_frames(capture, lambda _, f: posed(f, f.world_from_camera.inverse)))
-    assert report.verdict == "unusable"
+def test_a_wrong_scale_and_focal_length_are_measured(scan, tmp_path):
+    assert corrupted("depth x0.9", scan, tmp_path).scale.factor == pytest.approx(1 / 0.9, rel=0.02)
+    assert corrupted("focal length x1.1", scan, tmp_path).scale.factor == pytest.approx(1 / 1.1, rel=0.03)
+
+
+def test_images_turned_against_their_poses_and_shifted_frames_are_told(capture):
+    turned = examine(
+        with_frames(capture, lambda _, f: posed(f, f.world_from_camera @ Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))))
+    )
+    assert turned.remarks[0].cause == "image_rotated"
+
+
+def test_images_under_the_pose_of_the_next_frame_are_told(folder):
+    quick = TinyRoom(count=9)  # in so few frames each step is large
+    capture = read_capture(write_r3d(folder / "quick.r3d", quick), folder / "quick", CONFIG)
+    poses = [f.world_from_camera for f in capture.frames]
+    report = examine(with_frames(capture, lambda k, f: posed(f, poses[min(k + 1, 8)])))
+    assert report.remarks[0].cause == "frames_shifted", report.reasons
+
+
+def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
+    camera = capture.frames[0].rgb_camera
+    longer = replace(camera, fx=1.1 * camera.fx, fy=1.1 * camera.fy)
+    report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=longer)))
+    assert report.remarks[0].cause == "colour_focal_length"
+    assert report.registration.focal_factor == pytest.approx(1 / 1.1, rel=0.05)  # a depth pixel is 4 px of 640
+    beside = replace(camera, cx=camera.cx + 10.0)
+    report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=beside)))
+    assert report.remarks[0].cause == "unregistered"
+    assert report.registration.off_px == pytest.approx(20.0, abs=4.0)  # 10 of 320 px are 20 of 640
 
 
 def test_a_jump_of_the_tracking_is_told(capture):
@@ -67,15 +162,58 @@ def test_a_jump_of_the_tracking_is_told(capture):
     assert any(r.cause == "pose_jumps" for r in report.remarks)
 
 
+def test_drift_is_measured_where_the_same_surface_is_seen_again(capture):
+    def drift(k, frame):
+        share, pose = k / 23, frame.world_from_camera
+        turn = Rotation.from_rotvec([0, 0, np.radians(3.0) * share]).as_matrix()
+        return posed(frame, Rigid3(turn @ pose.rotation, pose.translation + np.array([0.02, 0.0, 0.15]) * share))
+
+    drifting = examine(with_frames(capture, drift))
+    assert drifting.figures.drift_mm > 40
+    assert any(r.cause == "drift" for r in drifting.remarks), drifting.reasons
+
+
 def test_few_frames_no_floor_and_a_guessed_up_are_told(capture):
     poor = replace(capture, frames=capture.frames[:3], room=replace(capture.room, floor_found=False, up_source="assumed"))
     report = examine(poor)
     assert report.verdict == "unusable"
-    assert "only 3 frames" in report.reasons[0]
-    assert any("floor" in r for r in report.reasons)
-    assert any("which way is up" in r for r in report.reasons)
+    assert report.remarks[0].cause == "few_frames"
+    assert {"no_floor", "up_unknown"} <= {r.cause for r in report.remarks}
+    assert examine(replace(capture, frames=capture.frames[:1])).verdict == "unusable"
 
 
-def test_blur_is_told(capture):
-    report = examine(with_frames(capture, lambda k, f: replace(f, sharpness=1.0 if k % 3 == 0 else 100.0)))
-    assert any("blurred" in r for r in report.reasons)
+def test_blur_and_flicker_are_told(capture):
+    blurred = examine(with_frames(capture, lambda k, f: replace(f, sharpness=1.0 if k % 3 == 0 else 100.0)))
+    assert any(r.cause == "blur" for r in blurred.remarks)
+    assert any(r.cause == "flicker" for r in examine(replace(capture, images=Darker(capture.images))).remarks)
+
+
+def test_a_floor_at_the_wrong_height_is_told(capture):
+    high = with_frames(
+        capture,
+        lambda _, f: posed(f, Rigid3(f.world_from_camera.rotation, f.world_from_camera.translation + np.array([0, 0, 2]))),
+    )
+    assert any(r.cause == "camera_height" for r in examine(high).remarks)
+
+
+def test_the_report_is_json(capture):
+    document = json.loads(json.dumps(examine(capture).to_json()))
+    assert document["version"] == 2
+    assert document["verdict"] == "good"
+    assert document["figures"]["frames"] == 24
+
+
+def test_the_pictures_show_the_surface_and_the_path(capture):
+    plan, view = draw_scan(capture, (240, 160))
+    for picture in (plan, view):
+        assert picture.shape == (160, 240, 4)
+        assert 0.1 < (picture[..., 3] > 0).mean() < 0.95
+        path = np.abs(picture[..., :3].astype(int) - (33, 102, 214)).sum(axis=2) < 30
+        assert path.any()
+    empty = replace(
+        capture,
+        surface=replace(
+            capture.surface, vertices_world=np.zeros((0, 3)), faces=np.zeros((0, 3), int), colours=np.zeros((0, 3), np.uint8)
+        ),
+    )
+    assert draw_scan(empty, (240, 160)).plan.shape == (160, 240, 4)

@@ -1,0 +1,83 @@
+"""What a recording holds and what it lacks: frame rate, gaps, lost poses, damaged frames, depth as recorded."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.readers.protocol import Recording, UnreadableFrame
+from r2c2r_core.model.capture import Frame
+
+
+class Timing(NamedTuple):
+    """When frames were taken, and which are not there."""
+
+    missing_share: float
+    without_pose_share: float
+    longest_gap_s: float | None
+    fps: float | None
+    duration_s: float | None
+
+
+def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timing:
+    """Frame rate and gaps, of the recording itself where it is at hand: a long one is thinned on reading."""
+    every = recording.frames if recording else frames
+    numbers = np.array([f.index for f in every])
+    times = np.array([f.timestamp_s for f in every if f.timestamp_s is not None])
+    step = int(np.median(np.diff(numbers))) if len(numbers) > 1 else 1
+    expected = np.arange(numbers[0], numbers[-1] + 1, step)
+    missing = np.setdiff1d(expected, numbers)
+    unposed = _still_there(recording, missing) if recording else 0
+    between = np.diff(times)
+    duration = float(times[-1] - times[0]) if len(times) > 1 else None
+    return Timing(
+        missing_share=(len(missing) - unposed) / len(expected),
+        without_pose_share=unposed / len(expected),
+        longest_gap_s=float(between.max()) if len(between) else None,
+        fps=(len(times) - 1) / duration if duration else None,
+        duration_s=duration,
+    )
+
+
+def _still_there(recording: Recording, numbers: np.ndarray) -> int:
+    """How many of these frames have their files and yet were not read: those without a usable pose."""
+    names, first = recording.files.names(), recording.frames[0]
+
+    def numbered(name: str, number: int) -> str:
+        return re.sub(r"\d+(?=\D*$)", lambda digits: f"{number:0{len(digits[0]) if digits[0][0] == '0' else 1}d}", name)
+
+    return sum(all(numbered(name, n) in names for name in (first.rgb_name, first.depth_name)) for n in numbers.tolist())
+
+
+def unreadable_share(recording: Recording, frames: int) -> float:
+    """Share of the frames that ingest could not read, of those it tried: a long recording is thinned evenly."""
+    posed = sum(f.capture_from_camera is not None for f in recording.frames)
+    tried = -(-posed // max(1, round(posed / frames)))
+    return max(0.0, 1.0 - frames / tried)
+
+
+class Recorded(NamedTuple):
+    """Depth as it was recorded."""
+
+    median_m: float | None
+    confidence: tuple[float, float, float] | None
+
+
+def measure_recorded(recording: Recording, frames: int = 12) -> Recorded:
+    """Depth as it was recorded, before anything was rejected: its median, and the shares of low, medium, high confidence."""
+    counts, medians = np.zeros(3), []
+    for frame in recording.frames[:: max(1, len(recording.frames) // frames)]:
+        try:
+            metres, confidence = recording.depth_of(frame)
+        except (UnreadableFrame, CaptureError):
+            continue
+        known = metres[np.isfinite(metres) & (metres > 0)]
+        if len(known):
+            medians.append(float(np.median(known)))
+        if confidence is not None:
+            counts += np.bincount(np.clip(confidence.ravel(), 0, 2), minlength=3)
+    low, medium, high = counts / max(counts.sum(), 1)
+    shares = (float(low), float(medium), float(high)) if counts.any() else None
+    return Recorded(float(np.median(medians)) if medians else None, shares)
