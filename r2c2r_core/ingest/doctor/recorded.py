@@ -52,8 +52,11 @@ def _still_there(recording: Recording, numbers: np.ndarray) -> int:
 
 
 def unreadable_share(recording: Recording, frames: int) -> float:
-    """Share of the frames that ingest could not read, of those it tried: a long recording is thinned evenly."""
-    posed = sum(f.capture_from_camera is not None for f in recording.frames)
+    """Share of the frames that ingest could not read, of those it tried: a long recording is thinned evenly.
+
+    Frames without a pose are tried only where the whole recording has none.
+    """
+    posed = sum(f.capture_from_camera is not None for f in recording.frames) or len(recording.frames)
     tried = -(-posed // max(1, round(posed / frames)))
     return max(0.0, 1.0 - frames / tried)
 

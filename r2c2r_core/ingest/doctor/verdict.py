@@ -121,7 +121,8 @@ def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
     if figures.drift_mm is not None and figures.drift_mm > 45 and not explained:
         text = f"the poses drift: what is filmed again lies {figures.drift_mm:.0f} mm from where it was"
         verdict = "unusable" if figures.drift_mm > 150 else "usable with care"
-        remarks.append(_remark(verdict, "drift", text, "film more slowly, turn less at once, and avoid blank walls"))
+        refined = "they were refined as far as the scan allows; " if figures.poses_source == "refined" else ""
+        remarks.append(_remark(verdict, "drift", text, f"{refined}film more slowly, turn less at once, and avoid blank walls"))
     return remarks
 
 
