@@ -17,6 +17,7 @@ from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 
 _CANDIDATES = 36  # lines tried a direction
+_COVERED = 1.2  # what depth saw of the plane weighs as much as all four edges: it belongs to the appliance
 _TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
 
 
@@ -62,7 +63,7 @@ def find_rectangle(run: Run, clicks: np.ndarray, size: ApplianceSize, refused: n
             usual = np.exp(
                 -0.5 * ((np.log(tall / size.height[1]) / size.spread) ** 2 + (np.log(width / size.width[1]) / size.spread) ** 2)
             )
-            score = edges + 0.3 * usual + 0.6 * _covered(support, left, right, top, bottom)
+            score = edges + 0.3 * usual + _COVERED * _covered(support, left, right, top, bottom)
             for column, row in refused:
                 score = score - 10.0 * ((left < column < right) & (top < row) & (row < bottom))
             i = int(np.argmax(score))

@@ -12,20 +12,23 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances import ApplianceSize, appliance_box, appliance_mask, find_rectangle, measure_depth
 from r2c2r_core.segment.categories import APPLIANCE_SIZES, CategoryHint, Kind
+from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.edges import as_lab, panel_edges
-from r2c2r_core.segment.fronts import Front, find_front, front_mask, front_panel, seen_sides, wall_behind
+from r2c2r_core.segment.fronts import Front, find_front, front_mask, front_panel, near_plane, nudged, seen_sides, wall_behind
 from r2c2r_core.segment.handles import find_handles
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import small_mask
 from r2c2r_core.segment.small import find_small, glimpse_small
+from r2c2r_core.segment.squaring import squared
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import Thing, find_thing, thing_mask
 
 if TYPE_CHECKING:
     from r2c2r_core.segment.geometric import Found
 
+_OFF_FRONT_M = 0.04  # behind its plane: a side or the top
 _SMALL_M = 0.25  # things below this radius are carved by silhouettes
 _PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
 
@@ -171,12 +174,9 @@ def _appliance(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negat
     run = bench.run_of(region, margin_m=_margin(region, hint.appliance))
     if run is None:
         return None
-    points = [point]
-    for click in clicks[1:]:
-        origin, ray = bench.scene.ray(click.frame, click.x, click.y)
-        met = region_along((region,), origin, ray, 10.0, 1.0)
-        points += [met[1]] if met else []
-    cell = find_rectangle(run, run.grid.cells_of(np.array(points)), hint.appliance, run.grid.cells_of(negatives))
+    on = run.grid.cells_of(np.array([point, *_on_plane(bench, region, clicks[1:])]))
+    off = run.grid.cells_of(near_plane(run, negatives))
+    cell = _rectangle(run, on, off, hint.appliance)
     if cell is None:
         return None
     lab, seen_colour = as_lab(run.mosaic)
@@ -185,22 +185,92 @@ def _appliance(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negat
     front = Front(run, cell, handle, hint.depth_m)
     wall = wall_behind(run, cell, room, hint.depth_m)
     depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
+    front = squared(replace(front, depth_m=depth), bench.scene)
+    front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
     warnings = () if seen else (f"its depth was not seen: {depth:.2f} m is usual for a {prompt.category}",)
-    return FoundAppliance(replace(front, depth_m=depth), bench.scene, warnings=warnings)
+    return FoundAppliance(front, bench.scene, warnings=warnings)
+
+
+def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize) -> Cell | None:
+    """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
+    cell = find_rectangle(run, on[:1], size, off[:0])
+    if cell is None:
+        return find_rectangle(run, on, size, off)
+    missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
+    wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
+    if not missed and not wrong:
+        return cell
+    return find_rectangle(run, np.array([on[0], *missed]), size, np.array(wrong).reshape(-1, 2)) or cell
+
+
+def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
+    """The rectangle with its borders moved to the clicks beside them."""
+    for label, clicks in ((1, on), (0, off)):
+        for column, row in clicks:
+            cell = nudged(cell, column, row, label, cell_m) or cell
+    return cell
+
+
+def _on_plane(bench: Workbench, region: PlaneRegion, clicks: list[PromptPoint]) -> list[Vector3]:
+    """Where clicks meet the front's plane; those whose depth shows a side or the top say nothing about the front."""
+    points = []
+    for click in clicks:
+        seen = bench.scene.pick(click.frame, click.x, click.y)
+        has_depth = bench.scene.has_depth(click.frame, click.x, click.y)
+        if has_depth and seen is not None and _behind(region, seen) > _OFF_FRONT_M:
+            continue
+        origin, ray = bench.scene.ray(click.frame, click.x, click.y)
+        met = region_along((region,), origin, ray, 10.0, 1.0)
+        points += [met[1]] if met else []
+    return points
 
 
 def _plane_of(bench: Workbench, click: PromptPoint, hint: CategoryHint) -> tuple[PlaneRegion, Vector3] | None:
+    """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
     scene = bench.scene
     origin, ray = scene.ray(click.frame, click.x, click.y)
     point = scene.pick(click.frame, click.x, click.y)
     if scene.has_depth(click.frame, click.x, click.y) and point is not None:
         region = region_at(bench.planes, point)
+        front = _front_before(bench, point, hint)
+        if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
+            return front, _support_near(front, point)
         if region is not None:
             return region, point
     farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
     assert hint.appliance is not None
     small = tuple(plane for plane in bench.planes if plane.width_m < 2.5 * hint.appliance.width[2])
     return region_along(small, origin, ray, farthest, hint.appliance.width[2])
+
+
+def _front_before(bench: Workbench, point: Vector3, hint: CategoryHint) -> PlaneRegion | None:
+    """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
+    assert hint.appliance is not None
+    planes = [
+        plane
+        for plane in bench.planes
+        if plane.width_m < 1.3 * hint.appliance.width[2]
+        and _OFF_FRONT_M < _behind(plane, point) < hint.appliance.depth + 0.1
+        and plane.supports(point[None], 0.12)[0]
+    ]
+    return max(planes, key=lambda plane: _faced(bench.scene, plane, point), default=None)
+
+
+def _behind(plane: PlaneRegion, point: Vector3) -> float:
+    return -float((point - plane.world_from_plane.translation) @ plane.outward)
+
+
+def _faced(scene: Scene, plane: PlaneRegion, point: Vector3) -> float:
+    """How squarely the recording looks at a plane: the mean cosine over the cameras."""
+    towards = np.stack([frame.world_from_camera.translation for frame in scene.frames]) - point
+    return float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).mean())
+
+
+def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
+    """A point of what was seen of a plane, near to another point."""
+    seen = plane.points
+    order = np.argsort(np.linalg.norm(seen - point, axis=1))
+    return np.asarray(seen[order[: max(1, round(0.06**2 / plane.cell_m**2))]].mean(axis=0))
 
 
 def _margin(region: PlaneRegion, size: ApplianceSize) -> float:

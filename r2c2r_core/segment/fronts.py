@@ -38,7 +38,7 @@ class Front:
 
 def find_front(run: Run, positives: Points, negatives: Points, *, pair: bool) -> Front | None:
     """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels."""
-    on, off = run.grid.cells_of(_near_plane(run, positives)), run.grid.cells_of(_near_plane(run, negatives))
+    on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
     first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
     if first is None:
         return None
@@ -152,27 +152,39 @@ def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
     return score
 
 
-def _near_plane(run: Run, clicks: Points) -> Points:
+def near_plane(run: Run, clicks: Points) -> Points:
     """The clicks that lie on the panels' plane: others are on sides, or on things in front, and say nothing about panels."""
     away = run.grid.world_from_plane.inverse.apply(clicks)[:, 1]
     return clicks[np.abs(away) < _OFF_PLANE_M]
 
 
-def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[Cell]]:
-    """The cell made to hold a click, and the panels it took in.
+def nudged(cell: Cell, column: float, row: float, label: int, cell_m: float) -> Cell | None:
+    """The cell with its border moved to a click beside it, or left where that is within pose error; None for other clicks."""
+    if (label == 1) == cell.contains(column, row):
+        return cell
+    edges = np.array([cell.left, cell.top, cell.right, cell.bottom])
+    beyond = np.array([cell.left - column, cell.top - row, column - cell.right, row - cell.bottom])
+    moved = np.flatnonzero(beyond > 0) if label == 1 else np.array([int(np.argmax(beyond))])
+    off = np.abs(beyond[moved]).max() * cell_m
+    if off > _BORDER_M:
+        return None
+    if off > _STEADY_M:
+        edges[moved] = np.array([column, row, column, row])[moved]
+    return Cell(*edges.tolist())
 
-    Next to its border the click corrects the border; farther off it means the panel there, unless the two make no rectangle.
+
+def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[Cell]]:
+    """The cell made to hold a click, and the panels it took in: a click well off it means the panel there.
+
+    Where that makes no rectangle with it, or no panel is there, the border goes to the click.
     """
-    reached = joined([cell, Cell(column, row, column, row)])
-    outside = max(reached.width - cell.width, reached.height - cell.height) * run.grid.cell_m
-    if outside < _STEADY_M:
-        return cell, []
+    corrected = nudged(cell, column, row, 1, run.grid.cell_m)
+    if corrected is not None:
+        return corrected, []
     other = run.cell_at(column, row)
-    if outside < _BORDER_M or other is None:
-        return reached, []
-    both = joined([cell, other])
-    if _area(both) > _HULL_SHARE * (_area(cell) + _area(other)):
-        return reached, []
+    both = joined([cell, other]) if other is not None else cell
+    if other is None or _area(both) > _HULL_SHARE * (_area(cell) + _area(other)):
+        return joined([cell, Cell(column, row, column, row)]), []
     return both, [other]
 
 
@@ -182,17 +194,8 @@ def _area(cell: Cell) -> float:
 
 def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
     """The cell without a click: its border drawn in where the click is beside it, else cut along the clearest line."""
-    if not cell.contains(column, row):
-        return cell
-    room = (column - cell.left, row - cell.top, cell.right - column, cell.bottom - row)
-    nearest = int(np.argmin(room))
-    if room[nearest] * run.grid.cell_m < _STEADY_M:
-        return cell
-    if room[nearest] * run.grid.cell_m < _BORDER_M:
-        edges = [cell.left, cell.top, cell.right, cell.bottom]
-        edges[nearest] = (column, row)[nearest % 2]
-        return Cell(*edges)
-    return _cut_off(cell, column, row, run, kept)
+    corrected = nudged(cell, column, row, 0, run.grid.cell_m)
+    return corrected if corrected is not None else _cut_off(cell, column, row, run, kept)
 
 
 def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:

@@ -51,11 +51,20 @@ def build_graph(vertices: Points, faces: Faces, colours: Colours, size_m: float)
 
 
 def cut(
-    graph: VoxelGraph, positive: list[int], negative: list[int], radius_m: float, background: np.ndarray
+    graph: VoxelGraph,
+    positive: list[int],
+    negative: list[int],
+    radius_m: float,
+    background: np.ndarray,
+    *,
+    gap_m: float = 0.0,
+    upright: bool = False,
 ) -> tuple[np.ndarray, float]:
     """Voxels joined to the positive ones, and the cut's cost per square root of area (lower is a cleaner cut).
 
     `background` marks voxels of structure (floor, worktop, walls); farther than about `radius_m` a voxel is unlikely.
+    Things that are `upright` (chairs) reach as far down as they do: only plan distance counts. Parts up to `gap_m` apart
+    count as joined: scans lose dark and thin pieces.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
@@ -63,9 +72,9 @@ def cut(
     count = len(graph.positions)
     a, b = graph.edges.T
     capacity = _capacities(graph)
-    centre = graph.positions[positive].mean(axis=0)
-    distance = np.min([np.linalg.norm(graph.positions - graph.positions[p], axis=1) for p in positive], axis=0)
-    distance = np.minimum(distance, np.linalg.norm(graph.positions - centre, axis=1))
+    positions = graph.positions[:, :2] if upright else graph.positions
+    seeds = [*positions[positive], positions[positive].mean(axis=0)]
+    distance = np.min([np.linalg.norm(positions - seed, axis=1) for seed in seeds], axis=0)
     prior = np.exp(-((distance / radius_m) ** 2))
     weight = graph.area_m2 * 1e4 * 0.25
     source, sink = weight * prior * 0.35, weight * (1 - prior) * 0.5
@@ -84,17 +93,22 @@ def cut(
     residual.eliminate_zeros()
     inside = np.zeros(count + 2, bool)
     inside[breadth_first_order(residual, count, return_predecessors=False)] = True
-    chosen = connected_to(graph, inside[:count], positive)
+    chosen = connected_to(graph, inside[:count], positive, gap_m)
     crossing = capacity[chosen[a] != chosen[b]].sum()
     return chosen, float(crossing / np.sqrt(max(graph.area_m2[chosen].sum() * 1e4, 1e-6)))
 
 
-def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int]) -> np.ndarray:
-    """The voxels of `inside` that touch a seed through others of it."""
+def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0) -> np.ndarray:
+    """The voxels of `inside` that touch a seed through others of it, or lie within `gap_m` of such."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
 
     a, b = graph.edges.T
+    if gap_m > 0:
+        members = np.flatnonzero(inside)
+        near = cKDTree(graph.positions[members]).query_pairs(gap_m, output_type="ndarray")
+        a, b = np.concatenate([a, members[near[:, 0]]]), np.concatenate([b, members[near[:, 1]]])
     both = inside[a] & inside[b]
     count = len(inside)
     links = coo_matrix((np.ones(int(both.sum())), (a[both], b[both])), shape=(count, count))

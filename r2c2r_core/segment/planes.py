@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.capture import SceneSurface
 
@@ -37,6 +37,14 @@ class PlaneRegion:
     def outward(self) -> Vector3:
         """Unit normal, towards the room."""
         return -self.world_from_plane.rotation[:, 1]
+
+    @property
+    def points(self) -> Points:
+        """World points (n, 3) of the cells that were seen."""
+        row, column = np.nonzero(self.support)
+        x = (column + 0.5) * self.cell_m - self.width_m / 2
+        z = self.height_m / 2 - (row + 0.5) * self.cell_m
+        return self.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
 
     def supports(self, points_world: Points, reach_m: float) -> np.ndarray:
         """Which points (n, 3) lie within `reach_m` of the seen part, measured in the plane."""
@@ -123,23 +131,26 @@ def region_along(
     return (best[1], best[2]) if best else None
 
 
-def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
-    vertices, faces = surface.vertices_world, surface.faces
+def face_normals(vertices: Points, faces: Faces) -> tuple[Points, Points, np.ndarray]:
+    """Centres, unit normals averaged over two rings (those of a 1 cm TSDF are noisy) and areas of triangles."""
     corners = vertices[faces]
     raw = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    smooth = np.zeros_like(vertices)
-    for _ in range(2):  # two rings of averaging: face normals of a 1 cm TSDF are noisy
+    areas = 0.5 * np.linalg.norm(raw, axis=1)
+    for _ in range(2):
+        smooth = np.zeros_like(vertices)
         for k in range(3):
             for axis in range(3):
                 smooth[:, axis] += np.bincount(faces[:, k], raw[:, axis], len(vertices))
         raw = smooth[faces].sum(axis=1)
-        smooth = np.zeros_like(vertices)
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    normals = raw / np.maximum(np.linalg.norm(raw, axis=1, keepdims=True), 1e-12)
+    return corners.mean(axis=1), raw / np.maximum(np.linalg.norm(raw, axis=1, keepdims=True), 1e-12), areas
+
+
+def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
+    centres, normals, areas = face_normals(surface.vertices_world, surface.faces)
     vertical = np.abs(normals[:, 2]) < 0.3
     flat = normals[vertical] * [1, 1, 0]
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
-    return corners.mean(axis=1)[vertical], flat, areas[vertical]
+    return centres[vertical], flat, areas[vertical]
 
 
 def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
@@ -228,7 +239,7 @@ def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
     """Drop regions that a larger one already covers (neighbouring yaw peaks find the same run)."""
     kept: list[PlaneRegion] = []
     for region in regions:
-        points = _support_points(region)
+        points = region.points
         twin = False
         for other in kept:
             if other.outward @ region.outward < np.cos(np.radians(25)):
@@ -239,13 +250,6 @@ def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
         if not twin:
             kept.append(region)
     return kept
-
-
-def _support_points(region: PlaneRegion) -> Points:
-    row, column = np.nonzero(region.support)
-    x = (column + 0.5) * region.cell_m - region.width_m / 2
-    z = region.height_m / 2 - (row + 0.5) * region.cell_m
-    return region.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
 
 
 def _disk(radius: float) -> np.ndarray:

@@ -6,15 +6,18 @@ import numpy as np
 from r2c2r_core.arrays import Mask, Pixels, Points, Vector3
 from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.occlusion import colour_gradient, flood
+from r2c2r_core.segment.occlusion import colour_gradient
+from r2c2r_core.segment.pixels import ColourModel, cut_pixels, learn_colours
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import Thing
 
+_ATTACHED_M, _ATTACHED_ODDS = 0.035, 3.2  # handles and caps that hulls lack: depth and colour together may add them
+_ON_SUPPORT_M = 0.008  # above it: lower points are the support's
 _POSE_ERROR_M = 0.04  # of the height of a support between frames, at most
 
 
 def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None) -> tuple[Mask, float]:
-    """The visible pixels of a small thing, its border on the colour edge nearest to its hull's outline."""
+    """The visible pixels of a small thing: where its hull, this frame's depth and its colours say, cut along colour edges."""
     camera = frame.rgb_camera
     empty = np.zeros((camera.height, camera.width), bool)
     view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
@@ -25,13 +28,37 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
     if share < 0.08:
         return empty, 0.0
     rgb = scene.rgb(frame.index)[area]
-    gradient = colour_gradient(rgb)
-    shift = _best_shift(hull, gradient, reach_px=round(thing.pose_error_m * scale))
-    hull = _moved(hull, shift)
-    band_m = band_m or (0.006 if len(thing.faces) else 0.010)  # a mere cylinder says little about the outline
-    mask = _snapped(hull, hidden | _behind(thing, scene, frame, area), gradient, max(1.5, band_m * scale))
-    empty[area] = mask & ~hidden
+    odds = seen_odds(thing, scene, frame, area)
+    hull = _moved(hull, _best_shift(hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale)))
+    odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), _ATTACHED_M * scale)
+    odds[hidden] = -9.0
+    empty[area] = _held_by(cut_pixels(rgb, odds), hull) & ~hidden
     return empty, share
+
+
+def seen_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
+    """Log-odds of each pixel of a crop by what the frame itself shows there: depth above the support, and colour."""
+    odds = _depth_odds(thing, scene, frame, area)
+    if thing.colours is not None:
+        odds = odds + thing.colours.odds(cv2.cvtColor(scene.rgb(frame.index)[area], cv2.COLOR_RGB2LAB))
+    return odds
+
+
+def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) -> ColourModel | None:
+    """Colours on the thing against those around it, from where views are sure."""
+    samples = []
+    for frame in views:
+        view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.04)
+        mask, share = small_mask(thing, scene, frame, band_m)
+        if view is None or share < 0.8 or not mask.any():
+            continue
+        _, hidden, area, scale = view
+        lab = cv2.cvtColor(scene.rgb(frame.index)[area], cv2.COLOR_RGB2LAB)
+        odds = _depth_odds(thing, scene, frame, area)
+        inner = cv2.erode(mask[area].astype(np.uint8), _round(0.25 * band_m * scale)) > 0
+        outer = cv2.dilate(mask[area].astype(np.uint8), _round(0.5 * band_m * scale)) > 0
+        samples.append((lab, inner & (odds > -0.5), ~outer & ~hidden & (odds < 0.5)))
+    return learn_colours(samples) if samples else None
 
 
 def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
@@ -68,8 +95,8 @@ def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
         view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
         if view is not None:
             hull, _, area, scale = view
-            gradient = colour_gradient(scene.rgb(frame.index)[area])
-            shifts.append(float(np.hypot(*_best_shift(hull, gradient, round(thing.pose_error_m * scale)))) / scale)
+            gradient, odds = colour_gradient(scene.rgb(frame.index)[area]), seen_odds(thing, scene, frame, area)
+            shifts.append(float(np.hypot(*_best_shift(hull, odds, gradient, round(thing.pose_error_m * scale)))) / scale)
     return float(np.median(shifts)) if shifts else 0.0
 
 
@@ -108,12 +135,6 @@ def occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice
     return _at_colour((depth > 0) & (depth < nearest - 0.03 - 0.01 * nearest), frame, area)
 
 
-def _behind(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> Mask:
-    """Colour pixels of an area where the sensor saw something clearly farther than the thing."""
-    farthest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].max())
-    return _at_colour(scene.depth(frame.index) > farthest + 0.02 + 0.01 * farthest, frame, area)
-
-
 def _at_colour(flags: Mask, frame: Frame, area: tuple[slice, slice] | None) -> Mask:
     """Flags of depth pixels at the colour pixels that they lie under."""
     width, height = frame.rgb_camera.width, frame.rgb_camera.height
@@ -121,6 +142,63 @@ def _at_colour(flags: Mask, frame: Frame, area: tuple[slice, slice] | None) -> M
     row = np.arange(rows.start, rows.stop) * flags.shape[0] // height
     column = np.arange(columns.start, columns.stop) * flags.shape[1] // width
     return flags[row[:, None], column]
+
+
+def _depth_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
+    """Log-odds by depth: above the support and about where the thing stands, or else on the support, behind, or unknown (0)."""
+    camera, depth = frame.depth_camera, scene.depth(frame.index)
+    rows = _depth_index(area[0], frame.rgb_camera.height, camera.height)
+    columns = _depth_index(area[1], frame.rgb_camera.width, camera.width)
+    first_row, first_column = int(rows[0]), int(columns[0])
+    patch = depth[first_row : rows[-1] + 1, first_column : columns[-1] + 1]
+    v, u = np.mgrid[first_row : first_row + patch.shape[0], first_column : first_column + patch.shape[1]] + 0.5
+    seen = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)], axis=-1) * patch[..., None]
+    points = frame.world_from_camera.apply(seen.reshape(-1, 3).astype(np.float64)).reshape(seen.shape)
+    low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+    slack = 0.015 + 0.5 * thing.pose_error_m
+    near = ((points[..., :2] > low[:2] - slack) & (points[..., :2] < high[:2] + slack)).all(axis=-1)
+    near &= (points[..., 2] > low[2] - slack) & (points[..., 2] < high[2] + slack)
+    verdict = np.where(near, 1.0, -1.0)
+    if thing.support_z_m is not None:
+        offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
+        standing = ((points[..., :2] > low[:2]) & (points[..., :2] < high[:2])).all(axis=-1)
+        on_support = points[..., 2] < thing.support_z_m + offset + _ON_SUPPORT_M
+        verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # the foot of it is as low
+    coarse = max(frame.rgb_camera.width / camera.width, 1.0)
+    odds = np.where(patch > 0, verdict, 0.0) * (2.0 / np.sqrt(coarse))
+    at = np.ix_(rows - first_row, columns - first_column)
+    return np.asarray(cv2.blur(odds[at].astype(np.float32), (2 * round(coarse) + 1,) * 2))
+
+
+def _depth_index(span: slice, colour_size: int, depth_size: int) -> np.ndarray:
+    """The depth row or column of each colour one."""
+    return ((np.arange(span.start, span.stop) + 0.5) * depth_size / colour_size).astype(int)
+
+
+def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
+    """Log-odds by the hull: little near its outline, and not everything where a handle may be (`attached_px` around it)."""
+    outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
+    inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    deep = min(band_px, 0.5 * float(inside.max()))
+    steps = np.where(hull, (inside - 0.5) / max(deep, 0.5), (0.5 - outside) / band_px)
+    odds = np.clip(steps * (1 + steps**2 / 4), -_ATTACHED_ODDS, 9)
+    odds[outside > attached_px] = -9
+    return np.asarray(odds)
+
+
+def _held_by(mask: Mask, hull: Mask) -> Mask:
+    """The parts of a mask that lie mostly on the hull."""
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    total = np.bincount(labels.ravel(), minlength=count)
+    within = np.bincount(labels[hull], minlength=count)
+    kept = within > 0.3 * np.maximum(total, 1)
+    kept[0] = False
+    return np.asarray(kept[labels])
+
+
+def _round(radius_px: float) -> np.ndarray:
+    size = 2 * max(1, round(radius_px)) + 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
 
 
 def _splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
@@ -136,8 +214,8 @@ def _splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarr
     return np.asarray(cv2.morphologyEx(canvas, cv2.MORPH_CLOSE, element)[pad:-pad, pad:-pad])
 
 
-def _best_shift(hull: Mask, gradient: np.ndarray, reach_px: int) -> tuple[int, int]:
-    """The small move of the outline that lies on the strongest edges: pose error, nought where poses are right."""
+def _best_shift(hull: Mask, odds: np.ndarray, gradient: np.ndarray, reach_px: int) -> tuple[int, int]:
+    """The small move of the hull onto likely pixels and strong edges: pose error, nought where poses are right."""
     contours, _ = cv2.findContours(hull.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = np.concatenate(contours)[:, 0]
     outline = outline[:: max(1, len(outline) // 160)]
@@ -148,26 +226,21 @@ def _best_shift(hull: Mask, gradient: np.ndarray, reach_px: int) -> tuple[int, i
     x, y = outline[:, 0] + dx[:, None], outline[:, 1] + dy[:, None]
     inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
     strength = np.where(inside, limited[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], 0).sum(axis=1)
-    value = strength / np.maximum(inside.sum(axis=1), 1) * (1 - 0.35 * np.hypot(dx, dy) / max(reach_px, 1))
-    value[inside.sum(axis=1) < 0.5 * len(outline)] = -1
+    value = strength / np.maximum(inside.sum(axis=1), 1) / float(limited.max())
+    value += _overlap(hull, odds, reach_px)[dy + reach_px, dx + reach_px] - 0.3 * np.hypot(dx, dy) / max(reach_px, 1)
+    value[inside.sum(axis=1) < 0.5 * len(outline)] = -np.inf
     best = int(np.argmax(value))
-    return (int(dx[best]), int(dy[best])) if value[best] > -1 else (0, 0)
+    return (int(dx[best]), int(dy[best])) if np.isfinite(value[best]) else (0, 0)
+
+
+def _overlap(hull: Mask, odds: np.ndarray, reach_px: int) -> np.ndarray:
+    """Mean odds inside the hull less those around it, for every move (dy, dx) up to `reach_px`, from index `reach_px`."""
+    ring = (cv2.dilate(hull.astype(np.uint8), _round(0.15 * np.sqrt(hull.sum()))) > 0) & ~hull
+    template = hull / max(hull.sum(), 1) - ring / max(ring.sum(), 1)
+    padded = np.pad(odds.astype(np.float32), reach_px)
+    return np.asarray(cv2.matchTemplate(padded, template.astype(np.float32), cv2.TM_CCORR))
 
 
 def _moved(hull: Mask, shift: tuple[int, int]) -> Mask:
     move = np.array([[1, 0, shift[0]], [0, 1, shift[1]]], np.float32)
     return np.asarray(cv2.warpAffine(hull.astype(np.uint8), move, (hull.shape[1], hull.shape[0]), flags=cv2.INTER_NEAREST) > 0)
-
-
-def _snapped(hull: Mask, off: Mask, gradient: np.ndarray, band_px: float) -> Mask:
-    """The hull with its border moved, within the band, onto the strongest edge."""
-    outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
-    inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
-    deep = min(band_px, 0.6 * float(inside.max()))
-    markers = np.zeros(hull.shape, np.int32)
-    markers[outside > band_px] = 2
-    markers[inside > deep] = 1
-    markers[off & (outside > 0.25 * band_px)] = 2
-    if not (markers == 1).any() or not (markers == 2).any():
-        return hull
-    return np.asarray(flood(gradient, markers) == 1)

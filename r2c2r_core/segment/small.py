@@ -1,5 +1,7 @@
 """Engine C, small things: space carved by depth, then by colour silhouettes of many frames, which forgives coarse depth."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
@@ -7,9 +9,9 @@ from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.silhouettes import occluders, raised, small_mask, support_offset, usual_shift
+from r2c2r_core.segment.silhouettes import colours_of, occluders, raised, small_mask, support_offset, usual_shift
 from r2c2r_core.segment.things import Thing, ThingConfig, support_height
-from r2c2r_core.segment.upright import upright_shape
+from r2c2r_core.segment.upright import WANDERS_M, upright_shape
 from r2c2r_core.segment.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 
 _FRAMES = 18
@@ -20,6 +22,7 @@ _NEAR_SUPPORT_M = 0.05  # more than a frame's height may be off
 _OFF_SUPPORT_M, _OFF_WALL_M = 0.012, 0.03  # nearer points are the structure's
 _DEPTH_SLACK_M = 0.022  # what coarse depth of a curved thing is off by
 _SEEN_THROUGH = 0.12  # share of the views that may err before a voxel counts as empty
+_SEEN_SHARE, _AGREED_SHARE = 0.05, 0.35  # of the views, that must hit a cell: where poses agree, and where each smears it
 _INSIDE = 0.85  # share of silhouettes that must hold a voxel
 
 
@@ -33,29 +36,30 @@ def find_small(
     if len(views) < 2:
         return None
     spread = _pose_spread(scene, views, support, positives.mean(axis=0))
-    if spread > _POSES_AGREE_M:
-        return upright_shape(scene, positives, views, config, support)  # frames disagree by more than fusing bears
+    if spread > _POSES_AGREE_M:  # by more than fusing bears
+        return _loose(scene, positives, views, config, voxels, support, structure)
     solid = _depth_hull(scene, views, voxels, positives, negatives, support, structure)
     if solid is None:
         return None
-    voxels, solid = cropped(voxels, solid)
-    room = with_headroom(solid, voxels)
-    thing = mesh_of(solid.astype(np.float32), 0.5, voxels, support)
+    fine, solid = cropped(voxels, solid)
+    room = with_headroom(solid, fine)
+    thing = mesh_of(solid.astype(np.float32), 0.5, fine, support)
     if thing is None:
         return None
     for band_m in (0.012, 0.007):  # the first silhouettes start from coarse depth, the next from the first
-        share = np.where(room, _silhouette_share(thing, voxels, scene, views, band_m), 0)
-        inside = part_at(share > _INSIDE, voxels, positives, negatives, reach_m=0.03)
-        better = mesh_of(np.where(grown(inside), share, 0), _INSIDE, voxels, support) if inside is not None else None
+        thing = replace(thing, colours=colours_of(thing, scene, views, band_m))
+        share = np.where(room, _silhouette_share(thing, fine, scene, views, band_m), 0)
+        inside = part_at(share > _INSIDE, fine, positives, negatives, reach_m=0.03)
+        better = mesh_of(np.where(grown(inside), share, 0), _INSIDE, fine, support) if inside is not None else None
         if better is None:
             break
-        thing = better
+        thing = replace(better, colours=thing.colours)
     if (
         spread + usual_shift(thing, scene, views) > _POSES_AGREE_M
         or _too_wide(thing, config)
         or _lost(thing, scene, views, positives)
     ):
-        return upright_shape(scene, positives, views, config, support)
+        return _loose(scene, positives, views, config, voxels, support, structure)
     return thing
 
 
@@ -82,11 +86,45 @@ def _depth_hull(
     structure: tuple[PlaneRegion, ...],
 ) -> np.ndarray | None:
     """The solid that depth leaves at the clicks; None where it shows nothing that stands apart."""
-    front = _seen_points(scene, views, voxels, positives, support, structure)
+    front = _seen_points(scene, views, voxels, positives, support, structure, _SEEN_SHARE)
     if len(front) < 12:
         return None
     solid = _carve(voxels, scene, views, support) & _as_deep_as_wide(voxels, front, views)
     return part_at(solid, voxels, positives, negatives, reach_m=0.03)
+
+
+def _loose(
+    scene: Scene,
+    positives: Points,
+    views: list[Frame],
+    config: ThingConfig,
+    voxels: Voxels,
+    support: float | None,
+    structure: tuple[PlaneRegion, ...],
+) -> Thing | None:
+    """A rough shape where frames disagree about poses: a cylinder for round things, else what depth saw, filled below."""
+    front = _seen_points(scene, views, voxels, positives, support, structure, _AGREED_SHARE)
+    if config.round or len(front) < 12:
+        return upright_shape(scene, positives, views, config, support)
+    at = np.floor((front - voxels.origin) / voxels.size_m).astype(int).clip(0, np.array(voxels.shape) - 1)
+    solid = np.zeros(voxels.shape, bool)
+    solid[at[:, 0], at[:, 1], at[:, 2]] = True
+    solid = np.maximum.accumulate(solid[:, :, ::-1], axis=2)[:, :, ::-1] if support is not None else solid
+    thing = mesh_of(_closed(solid).astype(np.float32), 0.5, voxels, support)
+    if thing is None:
+        return None
+    thing = replace(thing, pose_error_m=WANDERS_M, border_m=0.012)
+    for _ in range(2):
+        thing = replace(thing, colours=colours_of(thing, scene, views, 0.015))
+    return thing
+
+
+def _closed(solid: np.ndarray) -> np.ndarray:
+    """Voxels with gaps of a depth cell filled, level by level."""
+    from scipy import ndimage
+
+    padded = np.pad(solid, ((4, 4), (4, 4), (0, 0)))
+    return np.asarray(ndimage.binary_closing(padded, structure=np.ones((3, 3, 1)), iterations=3)[4:-4, 4:-4])
 
 
 def _too_wide(thing: Thing, config: ThingConfig) -> bool:
@@ -176,8 +214,9 @@ def _seen_points(
     positives: Points,
     support: float | None,
     structure: tuple[PlaneRegion, ...],
+    share: float,
 ) -> Points:
-    """Depth points of the thing: connected to the clicks, off its support and off walls."""
+    """Depth points of the thing, each in a `share` of the views: connected to the clicks, off its support and off walls."""
     from scipy import ndimage
 
     cell = max(voxels.size_m, 0.008)
@@ -198,7 +237,7 @@ def _seen_points(
             points, at = points[off], at[off]
         once = np.unique(at @ [shape[1] * shape[2], shape[2], 1])
         hits.ravel()[once] += 1
-    solid = hits >= max(2, 0.05 * len(views))
+    solid = hits >= max(2, share * len(views))
     labels, _ = ndimage.label(solid, structure=np.ones((3, 3, 3)))
     grid = Voxels(voxels.origin, cell, tuple(shape.tolist()))
     chosen = {label for point in positives if (label := label_near(labels, grid, point, 0.035))}

@@ -8,12 +8,18 @@ from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.mincut import VoxelGraph, build_graph, connected_to, cut
+from r2c2r_core.segment.mincut import VoxelGraph, build_graph, cut
 from r2c2r_core.segment.occlusion import refine_border
+from r2c2r_core.segment.pixels import ColourModel
 from r2c2r_core.segment.scene import Scene
 
 _SUPPORT_REACH_M = 0.35
+_BIN_M = 0.005  # of heights
+_SECTORS = 16
+_AROUND = 0.4  # share of the directions in which a support goes on: walls and edges bound it, neighbours stand on it
 _CLEARANCE_M = 0.012
+_SEEN_THROUGH_M = 0.10
+_FURNITURE_GAP_M = 0.08  # legs and seats are lost in part
 _LEVEL_COS = 0.92
 
 
@@ -36,6 +42,8 @@ class Thing:
     support_z_m: float | None
     spacing_m: float = 0.01  # between neighbouring vertices
     pose_error_m: float = 0.02  # how far a frame may show it from where it stands
+    border_m: float = 0.006  # how far its outline may be off
+    colours: ColourModel | None = None  # learned from where frames are sure
 
     @property
     def points(self) -> Points:
@@ -65,8 +73,9 @@ def find_thing(
         return None
     refused = [graph.nearest(point) for point in negatives]
     refused = [voxel for voxel in refused if voxel not in seeds]
-    chosen, _ = cut(graph, seeds, refused, config.radius_m, _structure(graph, seeds))
-    chosen = connected_to(graph, chosen, seeds)
+    gap_m = _FURNITURE_GAP_M if config.on_floor else 0.0
+    structure = _structure(graph, seeds)
+    chosen, _ = cut(graph, seeds, refused, config.radius_m, structure, gap_m=gap_m, upright=config.on_floor)
     return _extract(vertices, faces, chosen[graph.voxel_of_face], support)
 
 
@@ -87,7 +96,9 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
 
     depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
     hidden = projected & (depth > 0) & (depth < model - 0.05 - 0.015 * model)
-    shown = projected & ~hidden
+    sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
+    through = sensor > model + _SEEN_THROUGH_M + 0.02 * model  # between slats, which the surface closes
+    shown = projected & ~hidden & ~through
     shown = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     share = float(shown.sum() / projected.sum())
     mask = cv2.resize(shown, size, interpolation=cv2.INTER_LINEAR) > 0
@@ -112,34 +123,52 @@ def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
 
 
 def support_height(scene: Scene, positives: Points, config: ThingConfig) -> float | None:
-    """World height of what the thing stands on: the floor, or the nearest level surface below that reaches beyond it."""
+    """World height of what the thing stands on: the floor, or the highest level surface below that lies around it.
+
+    Around: in enough directions, farther off than the thing reaches. Where there is none, the highest large level one below.
+    """
     if config.on_floor:
         return 0.0 if scene.capture.room.floor_found else None
-    vertices, faces = scene.capture.surface.vertices_world, scene.capture.surface.faces
     lowest = positives[np.argmin(positives[:, 2])]
-    reach = _SUPPORT_REACH_M + config.radius_m
-    near = scene.parts.faces_near(lowest, reach, any_height=True)
-    corners = vertices[faces[near[scene.parts.upward[near] > _LEVEL_COS]]]
-    corners = corners[(np.linalg.norm(corners[..., :2] - lowest[:2], axis=2) < reach).all(axis=1)]
-    if len(corners) == 0:
+    centres, areas = _level_faces(scene, lowest, _SUPPORT_REACH_M + 1.5 * config.radius_m)
+    below = centres[:, 2] < lowest[2] - 0.004
+    centres, areas = centres[below], areas[below]
+    if len(centres) == 0:
         return None
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1) / 2
-    heights = corners[..., 2].mean(axis=1)
-    below = heights < lowest[2] - 0.004
-    heights, areas = heights[below], area[below]
-    if len(heights) == 0:
-        return None
-    bins = np.floor((heights - heights.min()) / 0.005).astype(int)
-    # With fewer bins than the window, "same" would be as long as the window.
-    profile = np.convolve(np.bincount(bins, areas, minlength=5), [1, 1, 1, 1, 1], mode="same")
+    away = centres[:, :2] - lowest[:2]
+    distance = np.hypot(away[:, 0], away[:, 1])
+    height_bin = np.floor((centres[:, 2] - centres[:, 2].min()) / _BIN_M).astype(int)
+    sector = np.floor((np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) % 1.0) * _SECTORS).astype(int) % _SECTORS
+    ring = distance > config.radius_m
+    spread = np.zeros((height_bin.max() + 1, _SECTORS))
+    np.add.at(spread, (height_bin[ring], sector[ring]), areas[ring])
+    around = (_over_bins(spread) > 5e-4).mean(axis=1)
+    near = distance < _SUPPORT_REACH_M + config.radius_m
+    profile = _over_bins(np.bincount(height_bin[near], areas[near], len(spread))[:, None])[:, 0]
     enough = max(0.005, 0.15 * np.pi * (0.7 * config.radius_m) ** 2)
     peaks = [i for i in range(len(profile)) if profile[i] > enough and profile[i] == profile[max(0, i - 4) : i + 5].max()]
     if not peaks:
         return None
-    top = peaks[-1]
-    near_peak = np.abs(heights - (heights.min() + (top + 0.5) * 0.005)) < 0.013  # the five bins that made the peak
-    return float(np.average(heights[near_peak], weights=areas[near_peak]))
+    reaching = [i for i in peaks if around[i] >= _AROUND]
+    top = (reaching or peaks)[-1]
+    chosen = near & (np.abs(height_bin - top) <= 2)
+    return float(np.average(centres[chosen, 2], weights=areas[chosen]))
+
+
+def _level_faces(scene: Scene, point: Vector3, reach_m: float) -> tuple[Points, np.ndarray]:
+    """Centres and areas of the surface's level faces around a point, in plan."""
+    surface = scene.capture.surface
+    near = scene.parts.faces_near(point, reach_m, any_height=True)
+    corners = surface.vertices_world[surface.faces[near[scene.parts.upward[near] > _LEVEL_COS]]]
+    corners = corners[(np.linalg.norm(corners[..., :2] - point[:2], axis=2) < reach_m).all(axis=1)]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return corners.mean(axis=1), np.linalg.norm(cross, axis=1) / 2
+
+
+def _over_bins(profile: np.ndarray) -> np.ndarray:
+    """Sums over five neighbouring bins of the first axis."""
+    padded = np.pad(profile, ((2, 2), (0, 0)))
+    return np.asarray(sum(padded[k : k + len(profile)] for k in range(5)))
 
 
 def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:

@@ -1,14 +1,16 @@
 """A cylinder for a small upright thing, where the frames disagree too much about poses to carve it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.silhouettes import hull_view, small_mask
+from r2c2r_core.segment.silhouettes import colours_of, hull_view, small_mask
 from r2c2r_core.segment.things import Thing, ThingConfig
 
-_WANDERS_M = 0.05  # how far small things were seen to wander between frames of such recordings
+WANDERS_M = 0.05  # how far small things were seen to wander between frames of such recordings
 
 
 def upright_shape(
@@ -30,6 +32,7 @@ def upright_shape(
         width, height = float(np.clip(across, 0.6 * width, 1.5 * width)), float(np.clip(tall, 0.6 * height, 1.5 * height))
         centre = centre + np.array([east, north, 0.0])  # the click was beside its middle
         thing = _cylinder(centre, base, width, height, support)
+        thing = replace(thing, colours=colours_of(thing, scene, views, 0.012))
     return thing
 
 
@@ -47,13 +50,13 @@ def _cylinder(centre: Vector3, base: float, width: float, height: float, support
     polar = np.array(side + lids)
     vertices = np.stack([polar[:, 0] * np.cos(polar[:, 1]), polar[:, 0] * np.sin(polar[:, 1]), polar[:, 2]], axis=1)
     placed = vertices + np.array([centre[0], centre[1], base])
-    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=_WANDERS_M)
+    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=WANDERS_M, border_m=0.010)
 
 
 def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
     """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
     mask, share = small_mask(thing, scene, frame, 0.015)
-    view = hull_view(thing, scene, frame, pad_m=_WANDERS_M + 0.03)
+    view = hull_view(thing, scene, frame, pad_m=WANDERS_M + 0.03)
     if share < 0.9 or view is None or not mask.any():
         return None
     hull, _, area, scale = view
