@@ -17,7 +17,7 @@ from r2c2r_core.errors import BackendUnavailable
 
 CANVAS_PX = 256  # side of the square a crop is scaled to; a multiple of 8. The stage's own views have 200 px
 KEYPOINTS = 512  # an image; 2000 of them cost a pair 5 s on two cores, and match a 200 px view no better
-SHORTLIST = 8  # images of many that go through the network
+SHORTLIST = 5  # images of many that go through the network: as many as a photo votes with (voting.py)
 _DETECTED = 4  # times as many are asked of the detector, for those beside the object are dropped
 _MARGIN = 0.08  # of the object's box, kept around it: a descriptor looks at some 8 px on each side
 _LEAST = 4  # keypoints in each image

@@ -242,7 +242,12 @@ export class ReviewPage extends LiveElement {
           candidate.id === group.chosen ? h("span", { class: "chip good" }, "★ used") : "",
         ),
         h("div", { class: "muted" }, [iou, depth, counted(candidate.faces, "face")].filter(Boolean).join(" · ")),
-        h("div", { class: "muted" }, candidate.watertight ? "watertight" : "not watertight"),
+        h(
+          "div",
+          { class: "muted" },
+          `${candidate.watertight ? "watertight" : "not watertight"} · ${candidate.generator}`,
+        ),
+        ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
         accept,
         reject,
       ),

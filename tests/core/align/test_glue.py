@@ -8,8 +8,11 @@ transformers = pytest.importorskip("transformers")
 
 import r2c2r_core.align.glue as glue  # noqa: E402  # after the skips
 from r2c2r_core.align.lightglue import LightGlueMatcher  # noqa: E402
+from r2c2r_core.align.observe import observe  # noqa: E402
+from r2c2r_core.align.stage import AlignConfig, _match  # noqa: E402
 from r2c2r_core.align.superglue import SuperGlueMatcher  # noqa: E402
 from r2c2r_core.errors import BackendUnavailable  # noqa: E402
+from r2c2r_core.geometry.meshes import distances_to_mesh  # noqa: E402
 
 torch.set_num_threads(1)
 DETECTOR = transformers.SuperPointConfig(
@@ -139,3 +142,18 @@ def test_a_folder_without_such_weights_is_one_line(tmp_path, name):
     with pytest.raises(BackendUnavailable, match=str(tmp_path)) as refusal:
         MATCHERS[name](weights=tmp_path)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_photo_is_matched_against_rendered_views_and_lifted_to_points(folders, bench):
+    """The stage's own path: keypoints of photo and renders, pairs, points on the mesh and in the world."""
+    mesh, capture, track = bench.free_box(textured=True)
+    asset, _ = bench.as_candidate(mesh, 0)
+    config = AlignConfig(match_views=8, match_photos=2)
+    observation = observe(capture, track, view_count=3, size_px=96, point_count=300)
+    lifted = _match(capture, track, asset.mesh, observation, SuperGlueMatcher(weights=folders["superglue"]), config)
+    assert len(lifted) == 2
+    points = np.concatenate([photo.points_mesh for photo in lifted])
+    assert len(points) > 0
+    assert distances_to_mesh(points, asset.mesh.vertices, asset.mesh.faces).max() < 0.02  # of a unit mesh
+    world = np.concatenate([photo.points_world for photo in lifted])
+    assert np.linalg.norm(world - observation.centre_world, axis=1).max() < 1.5 * observation.size_m
