@@ -23,7 +23,7 @@ def frame_image(context: Ctx, request: Request, project: str, frame: FrameNumber
 
 @router.get("/depth/{frame}.png", operation_id="depthImage")
 def depth_image(context: Ctx, request: Request, project: str, frame: FrameNumber, v: str = "") -> Response:
-    """A frame's depth in colours, near to far; unknown is transparent."""
+    """A frame's depth in colours, near to far; what was not measured is faint."""
     return send(request, media.depth(context, project, frame), "image/png", immutable=bool(v))
 
 

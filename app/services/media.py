@@ -17,7 +17,8 @@ from app.services.context import Context
 from app.services.reviews import candidate_mesh, generate_key
 
 WIDTHS = (160, 320, 480, 960, 1920)
-DEPTH_STEP_M = 0.00025  # of the stored depth (r2c2r_core.ingest.store)
+_DEPTH_WIDTH = 640  # pixels of a depth picture
+_FILLED_OPACITY = 70  # of pixels without a measurement
 
 _LOCKS = [threading.Lock() for _ in range(16)]
 
@@ -35,13 +36,13 @@ def frame(context: Context, project_id: str, index: int, width: int | None) -> P
 
 
 def depth(context: Context, project_id: str, index: int) -> Path:
-    """A frame's depth in colours."""
+    """A frame's depth in colours, at the size of its preview; what was not measured is filled in faintly."""
     files = _files(context, project_id)
-    _stored_frame(files, index)
+    colour, _ = _stored_frame(files, index)
     stored = files.work / "capture" / "depth" / f"{index:06d}.png"
     if not stored.is_file():
         raise NotFound(f"frame {index} has no depth image")
-    return _kept(files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored))
+    return _kept(files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored, _shrink(colour, _DEPTH_WIDTH)))
 
 
 def thumbnail(context: Context, project_id: str) -> Path:
@@ -123,16 +124,22 @@ def _reduced_width(stored: Path, factor: int) -> int:
         return opened.width // factor
 
 
-def _colour_depth(stored: Path) -> bytes:
+def _colour_depth(stored: Path, preview: bytes) -> bytes:
+    from r2c2r_core.ingest.depth import decode_depth, fill_for_display
+    from r2c2r_core.ingest.upsample import upsample_depth
+
     raw = cv2.imread(str(stored), cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise NotFound(f"{stored.name} is not readable")
-    metres = raw.astype(np.float32) * DEPTH_STEP_M
-    valid = raw > 0
+    guide = cv2.cvtColor(cv2.imdecode(np.frombuffer(preview, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    metres = upsample_depth(decode_depth(raw), guide)
+    valid = metres > 0
     near, far = np.percentile(metres[valid], (2, 98)) if valid.any() else (0.0, 1.0)
-    share = np.clip((metres - near) / max(far - near, 1e-3), 0, 1)
+    shown = fill_for_display(metres) if valid.any() else metres
+    share = np.clip((shown - near) / max(far - near, 1e-3), 0, 1)
     colours = cv2.applyColorMap((255 - share * 255).astype(np.uint8), cv2.COLORMAP_TURBO)
-    return cv2.imencode(".png", np.dstack([colours, valid.astype(np.uint8) * 255]))[1].tobytes()
+    opacity = np.where(valid, 255, _FILLED_OPACITY if valid.any() else 0).astype(np.uint8)
+    return cv2.imencode(".png", np.dstack([colours, opacity]))[1].tobytes()
 
 
 def _glb(files: ProjectFiles, name: str, candidate: str) -> bytes:

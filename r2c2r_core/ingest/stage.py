@@ -10,6 +10,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.depth import usable_depth
+from r2c2r_core.ingest.flying import drop_flying
 from r2c2r_core.ingest.gravity import level_room
 from r2c2r_core.ingest.odometry import estimate_poses
 from r2c2r_core.ingest.planes import sample_surface
@@ -54,6 +55,8 @@ def read_capture(
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
     images = StoredImages(store)
     settled = _settle_poses(frames, raw, images, config, progress.part(0.5, 0.65))
+    if drop_flying(settled.frames, images, store, progress.part(0.65, 0.75)):
+        images = StoredImages(store)  # without what it has read already
     surface, voxel_m = fuse_frames(
         settled.frames,
         images,
@@ -62,7 +65,7 @@ def read_capture(
         coarsest_voxel_m=config.coarsest_voxel_m,
         depth_max_m=config.fused_far_m,
         smallest_part_m2=config.smallest_part_m2,
-        progress=progress.part(0.65, 0.9),
+        progress=progress.part(0.75, 0.9),
     )
     progress.at(0.9, "levelling")
     rng = np.random.default_rng(config.seed)

@@ -1,0 +1,119 @@
+"""Flying pixels that several frames agree on: nothing else stands where they hang, and others look right through them."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Mask
+from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.ingest.store import write_depth
+from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.progress import SILENT, Progress
+
+_JUDGES = 6
+_LONGEST_AWAY, _KEPT = 60, 40  # frames
+_LEAST_APART_M, _MOST_APART_M, _MOST_TURN_DEG = 0.04, 0.5, 35.0  # nearer ones repeat the mistake, farther ones see other edges
+_LEAST_THROUGH = 4  # two or three also fall for the wobbling outline of a handle as a phone sees it
+_EDGE_PX = 3  # flying pixels lie at steps
+_STEP = 0.04  # of the depth: what counts as one
+
+
+class Depths(NamedTuple):
+    """A frame's depth, and the least and greatest known depth around each pixel."""
+
+    metres: DepthMetres
+    least: DepthMetres  # +inf where nothing is known
+    greatest: DepthMetres  # -inf where nothing is known
+    all_known: Mask
+
+
+def drop_flying(frames: Sequence[Frame], images: FrameImages, store: Path, progress: Progress = SILENT) -> int:
+    """Clear such pixels in the stored depth; how many there were. All frames are judged as they were before."""
+    depths = lru_cache(maxsize=_KEPT)(lambda position: read_depths(frames[position], images))
+    dropped: list[np.ndarray] = []
+    for position, frame in enumerate(frames):
+        progress.at(position / len(frames), f"comparing frame {position + 1}/{len(frames)}")
+        judges = [(frames[k], depths(k)) for k in judges_of(frames, position)]
+        dropped.append(np.flatnonzero(flying_in_others(frame, depths(position), judges)))
+    for frame, pixels in zip(frames, dropped, strict=True):
+        if len(pixels):
+            cleared = images.depth(frame.index).metres.copy()
+            cleared.ravel()[pixels] = 0
+            write_depth(store, frame.index, cleared)
+    return sum(len(pixels) for pixels in dropped)
+
+
+def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame, Depths]]) -> Mask:
+    """Pixels beside a step that at least four judges see through and none sees there itself."""
+    flying = np.zeros(depths.metres.shape, dtype=bool)
+    rows, columns = np.nonzero(_beside_steps(depths))
+    if not len(rows) or not judges:
+        return flying
+    uv = np.stack([columns, rows], axis=1) + 0.5
+    points = frame.world_from_camera.apply(unproject(uv, depths.metres[rows, columns].astype(np.float64), frame.depth_camera))
+    through, support = np.zeros(len(rows), np.int64), np.zeros(len(rows), np.int64)
+    for judge, seen in judges:
+        there = judge.world_from_camera.inverse.apply(points)
+        place = project(there, judge.depth_camera)
+        z = there[:, 2]
+        with np.errstate(invalid="ignore"):
+            inside = (
+                (z > 0.05)
+                & (place >= 0).all(axis=1)
+                & (place < [judge.depth_camera.width, judge.depth_camera.height]).all(axis=1)
+            )
+        column, row = (np.where(inside, place[:, k], 0).astype(np.int64) for k in (0, 1))
+        tolerance = 0.015 + 0.006 * z**2
+        least, greatest = seen.least[row, column], seen.greatest[row, column]
+        through += inside & seen.all_known[row, column] & (least > z + 2.0 * tolerance)
+        support += (
+            inside
+            & (least < z + tolerance)
+            & (greatest > z - tolerance)
+            & (np.abs(seen.metres[row, column] - z) < 1.5 * tolerance)
+        )
+    wrong = (through >= _LEAST_THROUGH) & (support == 0)
+    flying[rows[wrong], columns[wrong]] = True
+    return flying
+
+
+def read_depths(frame: Frame, images: FrameImages) -> Depths:
+    """The frame's depth, ready to be asked."""
+    metres = images.depth(frame.index).metres
+    known = metres > 0
+    window = np.ones((3, 3), np.uint8)
+    least = cv2.erode(np.where(known, metres, np.float32(np.inf)), window)
+    greatest = cv2.dilate(np.where(known, metres, np.float32(-np.inf)), window)
+    return Depths(metres, least, greatest, cv2.erode(known.astype(np.uint8), window) > 0)
+
+
+def judges_of(frames: Sequence[Frame], position: int) -> list[int]:
+    """Positions of the frames that see what this one sees from a little aside; those near in time first."""
+    me = frames[position].world_from_camera
+    found: list[int] = []
+    for away in range(1, _LONGEST_AWAY):
+        for other in (position - away, position + away):
+            if not 0 <= other < len(frames):
+                continue
+            pose = frames[other].world_from_camera
+            apart = float(np.linalg.norm(pose.translation - me.translation))
+            cosine = float(pose.rotation[:, 2] @ me.rotation[:, 2])
+            new = all(
+                np.linalg.norm(pose.translation - frames[k].world_from_camera.translation) > _LEAST_APART_M for k in found
+            )
+            if _LEAST_APART_M < apart < _MOST_APART_M and cosine > np.cos(np.radians(_MOST_TURN_DEG)) and new:
+                found.append(other)
+        if len(found) >= _JUDGES:
+            break
+    return found[:_JUDGES]
+
+
+def _beside_steps(depths: Depths) -> Mask:
+    known = depths.metres > 0
+    step = known & ((depths.greatest > depths.least + 0.02 + _STEP * depths.metres) | ~depths.all_known)
+    size = 2 * _EDGE_PX - 1
+    return known & (cv2.dilate(step.astype(np.uint8), np.ones((size, size), np.uint8)) > 0)
