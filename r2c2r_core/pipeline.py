@@ -165,7 +165,7 @@ def make_candidates(
         return ledger.each(
             "generate",
             objects,
-            lambda name: (generator, config, request.seed, _uploads(request.overrides, name), excuse.get(name)),
+            lambda name: (generator, config, request.seed, *map(file_key, _uploads(request.overrides, name)), excuse.get(name)),
             lambda name, track, p: _marked(
                 generate_candidates(
                     capture,

@@ -33,6 +33,7 @@ class Backend:
     needs: tuple[str, ...] = ()  # modules that must be importable
     install: str = ""  # how to get them where no extra and no plain name does
     weights: Weights | None = None
+    server: str = ""  # variable of the environment that names its server, where it works elsewhere
     licence: str = "Apache-2.0 (this project)"
     licence_class: LicenceClass = "open"
     summary: str = ""
@@ -65,6 +66,9 @@ class Registry:
             self.require(name, weights)
         except BackendUnavailable as error:
             return False, f"{error.message.partition(': ')[2]}: {error.hint}"
+        server = self.get(name).server
+        if server and not os.environ.get(server):
+            return False, f"no server named: set {server}"
         return True, "ready"
 
     def require(self, name: str, weights: str = "") -> Path | None:

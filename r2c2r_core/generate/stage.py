@@ -59,6 +59,7 @@ GENERATORS = Registry(
         Backend(
             name="remote",
             target="r2c2r_core.generate.remote:Remote",
+            server="R2C2R_GENERATOR_URL",
             licence="that of the generator served",
             summary="a generator on another machine: serve_worker.py, or TRELLIS as NVIDIA NIM",
         ),

@@ -78,6 +78,20 @@ def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
     assert "remote made no mesh" in asset.warnings[0]
 
 
+def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    path = tmp_path / "mine.glb"
+    overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(path))})
+    keys = []
+    with answering(lambda *request: nim_answer(box_glb())) as (address, _):
+        for sides in ((0.4, 0.3, 0.2), (0.4, 0.3, 0.2), (0.4, 0.3, 0.1)):
+            path.write_bytes(box_glb(sides))
+            ledger = Ledger(Workspace(tmp_path / "work"), SILENT)
+            found = make_candidates(request_for(address, overrides), ledger, capture, {"bad_1": tracks["bad_1"]})
+            keys.append(found["bad_1"].key)
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles, tmp_path, monkeypatch):
     monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
     capture, tracks = two_bottles

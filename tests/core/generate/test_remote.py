@@ -14,6 +14,7 @@ from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed
 from r2c2r_core.generate import exchange
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.remote import Remote
+from r2c2r_core.generate.stage import GENERATORS, GenerateConfig
 from r2c2r_core.geometry.meshes import is_watertight, oriented_extents
 from r2c2r_core.progress import Progress
 from tests.core.generate.stub import QUICK, answering, box_glb, said
@@ -146,3 +147,11 @@ def test_an_address_without_a_protocol_is_refused_before_any_work(url):
     with pytest.raises(BackendUnavailable, match="v1/mesh") as refusal:
         Remote(url=url)
     assert "\n" not in str(refusal.value)
+
+
+def test_without_a_server_it_is_not_offered_as_ready(monkeypatch):
+    monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
+    assert GENERATORS.available("remote") == (False, "no server named: set R2C2R_GENERATOR_URL")
+    monkeypatch.setenv("R2C2R_GENERATOR_URL", "http://gpu:9000/v1/mesh")
+    assert GENERATORS.available("remote") == (True, "ready")
+    assert GenerateConfig().url == "http://gpu:9000/v1/mesh"

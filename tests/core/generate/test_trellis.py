@@ -11,7 +11,9 @@ import pytest
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed
 from r2c2r_core.generate import trellis
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.geometry.meshes import is_watertight
+from r2c2r_core.registry import find_weights
 from tests.core.generate.stub import textured_box
 
 WEIGHTS = Path("weights")
@@ -160,3 +162,12 @@ def test_absent_package_and_absent_weights_are_one_line_each(package, monkeypatc
     monkeypatch.setitem(sys.modules, "trellis.pipelines", None)
     with pytest.raises(BackendUnavailable, match="TRELLIS package cannot be imported"):
         trellis.Trellis(weights=Path("other"))
+
+
+def test_a_folder_is_recognised_as_trellis_s_weights_by_what_it_holds(tmp_path):
+    wanted = GENERATORS.get("trellis").weights
+    assert find_weights(str(tmp_path), wanted.holds) is None
+    (tmp_path / "pipeline.json").write_text("{}")
+    (tmp_path / "ckpts").mkdir()
+    (tmp_path / "ckpts" / "slat.safetensors").write_bytes(b"")
+    assert find_weights(str(tmp_path), wanted.holds) == tmp_path
