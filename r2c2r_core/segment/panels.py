@@ -22,7 +22,7 @@ _SUREST = 0.99
 _LEAST_MATE = 0.1  # confidence below which a panel is no company
 _SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
 _NO_POINTS = np.zeros((0, 3))
-_EQUAL_DOORS_M = 0.006  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
+_EQUAL_DOORS_M = 0.012  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,11 +149,11 @@ def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
     return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room) else 1.0))
 
 
-def is_on_wall(run: Run, room: Room) -> bool:
+def is_on_wall(run: Run, room: Room, shallowest_m: float = _SHALLOWEST_M) -> bool:
     """Whether a run is a wall, or too near one that faces the same way to have a carcass behind it."""
     middle = run.region.world_from_plane.translation
     return any(
-        wall.normal @ run.grid.outward > 0.95 and abs(float(wall.normal @ middle - wall.offset_m)) < _SHALLOWEST_M
+        wall.normal @ run.grid.outward > 0.95 and abs(float(wall.normal @ middle - wall.offset_m)) < shallowest_m
         for wall in room.walls
     )
 
@@ -165,18 +165,23 @@ def _middle(run: Run, cell: Cell) -> Points:
 def _mate(run: Run, cell: Cell) -> Cell | None:
     """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
     slack = 0.02 / run.grid.cell_m
-    for other, handle in zip(run.cells, run.handles, strict=True):
-        own = run.handles[run.cells.index(cell)]
-        if own is None or handle is None or abs(other.left - cell.right) > slack:
+    for other in run.cells:
+        beside = abs(other.left - cell.right) < slack
+        if not beside or abs(other.top - cell.top) > slack or abs(other.bottom - cell.bottom) > slack:
             continue
-        level = abs(other.top - cell.top) < slack and abs(other.bottom - cell.bottom) < slack
-        equal = abs(other.width - cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
-        at_seam = (own.left + own.right) / 2 > cell.left + 0.7 * cell.width and (
-            handle.left + handle.right
-        ) / 2 < other.left + 0.3 * other.width
-        if level and equal and at_seam:
+        left, right = (find_front(run, _middle(run, door), _NO_POINTS, pair=False) for door in (cell, other))
+        if left is None or right is None or left.handle is None or right.handle is None:
+            continue
+        equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
+        if equal and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
             return other
     return None
+
+
+def _handle_at(front: Front) -> float:
+    """Where across a front its handle is, 0 at the left edge and 1 at the right."""
+    assert front.handle is not None
+    return ((front.handle.left + front.handle.right) / 2 - front.cell.left) / front.cell.width
 
 
 def _dark_share(run: Run, area: tuple[slice, slice]) -> float:

@@ -31,6 +31,7 @@ _LEAST_CONFIDENCE, _LEAST_OF_BOXES, _LEAST_OF_THINGS = 0.3, 0.5, 0.4
 _LEAST_PLANE_M2, _LEAST_SIDE_M = 0.02, 0.09
 _VIEWS = 5  # frames looked at for the one that shows an object best
 _MOST_THINGS = 24
+_SHALLOWEST_BOX_M = 0.25  # microwaves are 0.3 m deep and more; what stands on a shelf is not
 _SAME_PLANE_M = 0.12
 _BOX_SLACK_M = 0.03
 _TAKEN_SHARE = 0.4
@@ -129,7 +130,7 @@ def _boxes(session: "GeometricSession", plane: PlaneRegion) -> list[Panel]:
     else:
         return []
     found = _confirmed(session, category, _click_on(session.scene, middle, plane.outward))
-    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room):
+    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, _SHALLOWEST_BOX_M):
         return []
     size = hint_for(category).appliance
     assert size is not None

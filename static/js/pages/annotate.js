@@ -331,8 +331,8 @@ export class AnnotatePage extends LiveElement {
         );
         this.#current = object.id;
         remember({ object: object.id });
-        this.#store(object);
-      } else this.#store(await addPoint(this.project, this.#current, point, !hold));
+        this.#keep(object);
+      } else this.#keep(await addPoint(this.project, this.#current, point, !hold));
     });
   }
 
@@ -343,7 +343,7 @@ export class AnnotatePage extends LiveElement {
    */
   #change(id, act) {
     const owner = [...this.#objects.values()].find((object) => object.points.some((point) => point.id === id));
-    if (owner) this.#save(async () => this.#store(await act(owner.id)));
+    if (owner) this.#save(async () => this.#keep(await act(owner.id)));
   }
 
   /** @param {() => Promise<unknown>} act */
@@ -366,14 +366,14 @@ export class AnnotatePage extends LiveElement {
    */
   #patch(id, patch) {
     if (patch.category) this.#category.value = patch.category;
-    this.#save(async () => this.#store(await changeObject(this.project, id, patch)));
+    this.#save(async () => this.#keep(await changeObject(this.project, id, patch)));
   }
 
   /** @param {number} id */
   #delete(id) {
     const name = this.#objects.get(id)?.name ?? "object";
     this.#save(async () => {
-      this.#store(await deleteObject(this.project, id));
+      this.#keep(await deleteObject(this.project, id));
       say(`Deleted ${name}; undo brings it back`);
     });
   }
@@ -382,11 +382,21 @@ export class AnnotatePage extends LiveElement {
   #undoRedo(which) {
     this.#save(async () => {
       const { object, text, frame } = await undoRedo(this.project, which, null, "prompts");
-      this.#store(object);
+      this.#keep(object);
       say(
         `${which === "undo" ? "Undone" : "Redone"}: ${text}${frame !== null && frame !== this.#frame?.index ? ` (frame ${frame})` : ""}`,
       );
     });
+  }
+
+  /**
+   * An answer to a change. What the live connection said of the same change may be newer: masks can be done before it comes.
+   * @param {SceneObject} object
+   */
+  #keep(object) {
+    const held = this.#objects.get(object.id);
+    if (held && held.version >= object.version) this.#draw();
+    else this.#store(object);
   }
 
   /** @param {SceneObject} object */
@@ -401,7 +411,7 @@ export class AnnotatePage extends LiveElement {
 
   /** @param {SceneObject[]} objects confirmed just now: the next click starts a new object */
   #adopt(objects) {
-    for (const object of objects) this.#objects.set(object.id, object);
+    for (const object of objects) this.#keep(object);
     this.#select(null);
     this.#saved.textContent = `saved ${new Date().toLocaleTimeString()}`;
   }
