@@ -23,6 +23,7 @@ _LEAST_MATE = 0.1  # confidence below which a panel is no company
 _SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
 _NO_POINTS = np.zeros((0, 3))
 _EQUAL_DOORS_M = 0.012  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
+_WIDEST_CABINET_M = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,7 +174,8 @@ def _mate(run: Run, cell: Cell) -> Cell | None:
         if left is None or right is None or left.handle is None or right.handle is None:
             continue
         equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
-        if equal and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
+        one_cabinet = (left.cell.width + right.cell.width) * run.grid.cell_m < _WIDEST_CABINET_M
+        if equal and one_cabinet and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
             return other
     return None
 
