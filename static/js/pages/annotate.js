@@ -468,7 +468,7 @@ export class AnnotatePage extends LiveElement {
     if (!this.#frames.length) return;
     const name = this.#current === null ? null : this.#objects.get(this.#current)?.name;
     const proposed = this.#proposals.tip;
-    this.#tip.hidden = proposed === null && this.#objects.size > 2;
+    this.#tip.hidden = this.#objects.size > 2;
     this.#tip.textContent =
       proposed ??
       (name === null || name === undefined
