@@ -62,7 +62,8 @@ def find_thing(
     support = support_height(scene, positives, config)
     keep = np.ones(len(faces), bool)
     if support is not None:
-        keep = vertices[faces].mean(axis=1)[:, 2] > support + _CLEARANCE_M
+        height = vertices[:, 2]
+        keep = (height[faces[:, 0]] + height[faces[:, 1]] + height[faces[:, 2]]) / 3 > support + _CLEARANCE_M
     if keep.sum() < 10:
         return None
     faces = faces[keep]
@@ -177,8 +178,8 @@ def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
     for axis in ("level", "upright"):
         flat = np.abs(graph.normals[:, 2]) > 0.93 if axis == "level" else np.abs(graph.normals[:, 2]) < 0.25
         a, b = graph.edges.T
-        parallel = (graph.normals[a] * graph.normals[b]).sum(axis=1) > 0.94
-        step = np.abs(((graph.positions[b] - graph.positions[a]) * graph.normals[a]).sum(axis=1)) < 0.35 * graph.size_m
+        parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > 0.94
+        step = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a])) < 0.35 * graph.size_m
         link = flat[a] & flat[b] & parallel & step
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -204,8 +205,9 @@ def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: flo
     else:
         fine = fuse_depth(_views_of(scene, centre, reach), voxel_m, depth_max_m=4.0, block_count=32_000)
         vertices, faces, colours = fine.vertices, fine.faces, fine.colours
-    near = (np.linalg.norm(vertices[faces] - centre, axis=2) < reach).all(axis=1)
-    used, renumbered = _renumbered(faces[near], len(vertices))
+    used, around = _renumbered(faces, len(vertices))
+    near = np.linalg.norm(vertices[used] - centre, axis=1) < reach
+    used, renumbered = _renumbered(faces[near[around[:, 0]] & near[around[:, 1]] & near[around[:, 2]]], len(vertices))
     return vertices[used], renumbered, colours[used]
 
 
