@@ -72,10 +72,14 @@ def ask(
     patience = endpoint.patience
     wait = patience.first_wait_s
     for attempt in range(patience.tries):
-        last = attempt == patience.tries - 1
+        last, asked_at = attempt == patience.tries - 1, time.monotonic()
         try:
             status, content, retry_after = _once(endpoint, method, path, body, content_type, progress)
         except (OSError, http.client.HTTPException) as error:
+            if isinstance(error, TimeoutError) and time.monotonic() - asked_at > patience.connect_s:
+                raise BackendUnavailable(
+                    f"generator at {endpoint.where} gave no answer in {patience.answer_s:.0f} s", hint="see its log"
+                ) from error
             if last or isinstance(error, ssl.SSLError):
                 raise BackendUnavailable(
                     f"generator at {endpoint.where} cannot be reached ({_reason(error)})",

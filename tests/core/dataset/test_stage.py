@@ -16,8 +16,10 @@ from r2c2r_core.evaluate.dataset import evaluate_dataset, is_dataset
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z
+from r2c2r_core.ingest.store import write_depth, write_rgb
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import MatchedPoints, Placement
+from r2c2r_core.workspace import Workspace
 from tests.core.generate import scenes
 
 SIDES = np.array([0.46, 0.34, 0.28])  # of the microwave in the scene, whose handle the mesh lacks
@@ -243,6 +245,33 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(scene, stored, tm
     with pytest.raises(OSError, match="absent"):
         written(scene, broken, tmp_path / "other")
     assert sorted(p.name for p in tmp_path.iterdir() if "other" in p.name) == []
+
+
+def test_the_commands_write_a_work_folder_s_dataset_and_read_it_back(scene, tmp_path, truth, capsys):
+    capture, track = scene
+    work = Workspace(tmp_path / "work")
+    for folder in ("rgb", "depth"):
+        (work.frames / folder).mkdir(parents=True)
+    for frame in capture.frames:
+        jpeg = cv2.imencode(".jpg", capture.images.rgb(frame.index)[..., ::-1])[1].tobytes()
+        write_rgb(work.frames, frame.index, jpeg)
+        write_depth(work.frames, frame.index, capture.images.depth(frame.index).metres)
+    candidates = CandidateSet(
+        object_name=track.name, candidates=(asset(),), chosen_id="c0", chosen_by="consensus", reason="", ranking=("c0",)
+    )
+    nouns = {"ingest/scene": capture, f"segment/{track.name}": track}
+    nouns |= {f"generate/{track.name}": candidates, f"align/{track.name}": placement()}
+    for place, noun in nouns.items():
+        work.save(*place.split("/"), noun, {"key": "", "seconds": 0.0})
+    assert cli.main(["dataset", str(work.root), "-o", str(tmp_path / "set")]) == 0
+    assert "1 objects, 1 of them placed" in capsys.readouterr().out
+    depth = cv2.imread(str(tmp_path / "set/depth/000003.png"), cv2.IMREAD_UNCHANGED)
+    assert depth.dtype == np.uint16
+    assert np.abs(depth * 0.25e-3 - capture.images.depth(3).metres).max() < 0.13e-3  # half a step
+    assert cli.main(["evaluate", str(tmp_path / "set"), "--truth", str(truth), "--json", str(tmp_path / "e.json")]) == 0
+    said = json.loads((tmp_path / "e.json").read_text())
+    assert said["scene"]["objects_found"]["value"] == 1.0
+    assert said["scene"]["mask_iou"]["value"] == pytest.approx(1.0)
 
 
 def test_the_command_names_a_folder_that_is_no_work_folder(tmp_path, capsys):

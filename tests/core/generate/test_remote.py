@@ -13,6 +13,7 @@ from PIL import Image
 from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed
 from r2c2r_core.generate import exchange
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.exchange import Patience
 from r2c2r_core.generate.remote import Remote
 from r2c2r_core.generate.stage import GENERATORS, GenerateConfig
 from r2c2r_core.geometry.meshes import is_watertight, oriented_extents
@@ -131,6 +132,21 @@ def test_a_person_can_stop_a_request_that_hangs(evidence):
         waited = time.monotonic() - started
         released.set()
     assert waited < 5
+
+
+def test_a_server_that_hangs_is_asked_once(evidence):
+    released = threading.Event()
+
+    def hang(*request):
+        released.wait(10)
+        return said(200, {})
+
+    impatient = Patience(connect_s=0.2, answer_s=0.5, tries=3, first_wait_s=0.05)
+    with answering(hang) as (address, asked):
+        with pytest.raises(BackendUnavailable, match="gave no answer in"):
+            Remote(url=f"{address}/v1/infer", patience=impatient).make(evidence, "c0", 0)
+        released.set()
+    assert len(asked) == 1
 
 
 def test_the_token_travels_in_the_header_and_never_in_the_address(evidence, monkeypatch):
