@@ -14,6 +14,7 @@ from r2c2r_core.segment.scene import Scene
 _FRAMES = 48  # that vote: more change nothing and cost 30 ms each
 _LEAST_VOTES = 2
 _NEAR_M, _NEAR_SHARE = 0.03, 0.015  # of the distance: a point this far behind what a frame measured is hidden there
+_BEHIND_M, _BEHIND_SHARE = 0.06, 0.03  # as much as a handle and an error of pose together
 _SMALL_PART = 0.1  # of the largest: parts an occluder cuts off stay, crumbs go
 
 
@@ -29,6 +30,12 @@ class Body:
         """Whether there is enough of it to say anything."""
         return len(self.faces) >= 8
 
+    @property
+    def area_m2(self) -> float:
+        """Of its surface."""
+        corners = self.vertices[self.faces]
+        return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
+
 
 def agreed_body(scene: Scene, masks: Mapping[int, PackedMask]) -> Body:
     """The faces that more than half of the frames that see them put inside the mask, without crumbs."""
@@ -42,14 +49,17 @@ def agreed_body(scene: Scene, masks: Mapping[int, PackedMask]) -> Body:
 
 
 def vote(scene: Scene, masks: Mapping[int, PackedMask], points_world: Points) -> tuple[np.ndarray, np.ndarray]:
-    """For each point, in how many of the voting frames the mask covers it, and in how many it is in view."""
+    """For each point, in how many of the voting frames the mask covers it, and in how many it is in view.
+
+    A point the sensor sees through is in the air, whatever is masked behind it: the side of a box beside its front.
+    """
     inside, seen = np.zeros(len(points_world), np.int32), np.zeros(len(points_world), np.int32)
     for index in voting_frames(masks, _FRAMES):
         frame = scene.frame(index)
-        uv, shown = in_view(scene, frame, points_world)
+        uv, shown, through = in_view(scene, frame, points_world)
         covered, _ = sample_nearest(unpack_mask(masks[index]), uv)
         seen += shown
-        inside += shown & covered
+        inside += shown & covered & ~through
     return inside, seen
 
 
@@ -59,8 +69,8 @@ def voting_frames(masks: Mapping[int, PackedMask], most: int) -> list[int]:
     return [known[round(k)] for k in np.linspace(0, len(known) - 1, min(most, len(known)))]
 
 
-def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarray, Mask]:
-    """Pixels (n, 2) of world points in a frame's colour image, and which of them the frame sees (nothing in front)."""
+def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarray, Mask, Mask]:
+    """Pixels (n, 2) of world points in a colour image, which have nothing in front, and which the sensor sees through."""
     local = frame.world_from_camera.inverse.apply(points_world)
     depth = local[:, 2]
     ahead = depth > 0.1
@@ -69,7 +79,9 @@ def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarra
     scale = np.array([measured.shape[1] / frame.rgb_camera.width, measured.shape[0] / frame.rgb_camera.height])
     known, within = sample_nearest(measured, uv * scale)
     hidden = (known > 0) & (known < depth - _NEAR_M - _NEAR_SHARE * depth)
-    return uv, ahead & within & ~hidden
+    sensed, _ = sample_nearest(scene.depth(frame.index), uv * scale)  # only the sensor: holes in glass show what is behind
+    through = sensed > depth + _BEHIND_M + _BEHIND_SHARE * depth
+    return uv, ahead & within & ~hidden, through
 
 
 def _without_crumbs(vertices: Points, faces: Faces) -> Faces:

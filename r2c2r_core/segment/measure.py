@@ -19,17 +19,24 @@ from r2c2r_core.segment.edges import as_lab, panel_edges
 from r2c2r_core.segment.finders import Workbench
 from r2c2r_core.segment.fronts import Front, front_panel, wall_behind
 from r2c2r_core.segment.handles import find_handles
-from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import support_height
 
 _GRID_STEP_M = 0.01  # of the votes on a plane
+_COVERED = 0.6  # of the votes: what some views add at one side stays out
 _ON_PLANE_M = 0.03
-_LEAST_ON_PLANE = 0.25  # of a front's surface that must lie on one plane
+_LEAST_ON_PLANE = 0.08  # of a body's surface that a clicked plane must hold
+_MAINLY_ON_PLANE = 0.25  # and one that nobody clicked
+_LEAST_OF_PLANE = 0.3  # of a plane that must be the body, for a click without depth to mean it: not the wall behind
+_FARTHEST_M, _GLASS_M = 10.0, 1.0  # along a click's ray; from where it meets a plane to what depth saw of it
 _SAME_PANEL = 0.8  # overlap from which the voted rectangle is the panel the lines cut, whose edges are finer
 _POINT_FRAMES = 20
+_WIDEST_FRAMES = 7
+_GRID_PAD_M = 0.06  # the plane's grid reaches a little further than this anyway
+_MOST_BEYOND_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +54,7 @@ def measure(bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMa
     hint = hint_for(prompt.category)
     if hint.kind == "thing":
         return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint))
-    front = _front(bench, masks, body, hint)
+    front = _front(bench, prompt, masks, body, hint)
     if front is None:
         said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
         return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint), warnings=said)
@@ -60,12 +67,14 @@ def measure(bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMa
     return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
 
 
-def _front(bench: Workbench, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint) -> Front | None:
-    region = _plane_under(bench.planes, body)
-    run = bench.run_of(region) if region is not None else None
+def _front(
+    bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint
+) -> Front | None:
+    region = _front_plane(bench, prompt, body)
+    run = bench.run_of(region, _beyond(region, bench.scene, masks)) if region is not None else None
     if run is None:
         return None
-    voted = _voted_rectangle(run, bench.scene, masks)
+    voted = _voted_rectangle(run, bench.scene, masks, body)
     if voted is None:
         return None
     cell = _as_cut(run, voted)
@@ -75,34 +84,90 @@ def _front(bench: Workbench, masks: Mapping[int, PackedMask], body: Body, hint: 
     return Front(run, cell, handle, hint.depth_m)
 
 
-def _plane_under(planes: tuple[PlaneRegion, ...], body: Body) -> PlaneRegion | None:
-    """The plane that holds most of the body's surface."""
-    if not body.exists:
-        return None
-    shares = []
-    for plane in planes:
-        off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
-        shares.append(float(((off < _ON_PLANE_M) & plane.supports(body.vertices, 0.02)).mean()))
-    best = int(np.argmax(shares)) if shares else 0
-    return planes[best] if shares and shares[best] > _LEAST_ON_PLANE else None
+def _front_plane(bench: Workbench, prompt: ObjectPrompt, body: Body) -> PlaneRegion | None:
+    """The clicked plane among those the body lies on (where glass returns no depth, its side may be larger), or the largest."""
+    shares = [(plane, _share_on(plane, body)) for plane in bench.planes] if body.exists else []
+    on_body = tuple(plane for plane, share in shares if share > _LEAST_ON_PLANE)
+    mostly_body = tuple(plane for plane, share in shares if share * body.area_m2 > _LEAST_OF_PLANE * plane.area_m2)
+    for click in prompt.points:
+        if click.label != 1:
+            continue
+        point = bench.scene.pick(click.frame, click.x, click.y)
+        if point is not None and bench.scene.has_depth(click.frame, click.x, click.y):
+            clicked = region_at(on_body, point)
+        else:
+            met = region_along(mostly_body, *bench.scene.ray(click.frame, click.x, click.y), _FARTHEST_M, _GLASS_M)
+            clicked = met[0] if met is not None else None
+        if clicked is not None:
+            return clicked
+    plane, share = max(shares, key=lambda entry: entry[1], default=(None, 0.0))
+    return plane if share > _MAINLY_ON_PLANE else None
 
 
-def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask]) -> Cell | None:
-    """The rectangle of a run's plane (grid cells) that most masks cover."""
+def _share_on(plane: PlaneRegion, body: Body) -> float:
+    """The share of a body's surface that lies on a plane."""
+    off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
+    return float(((off < _ON_PLANE_M) & plane.supports(body.vertices, 0.02)).mean())
+
+
+def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) -> float:
+    """How far the masks reach beyond what depth saw of the plane, metres: glass and gloss return nothing."""
+    largest = sorted(masks, key=lambda index: -masks[index].area_px)[:_WIDEST_FRAMES]
+    reaches = []
+    for index in largest:
+        mask, frame = masks[index], scene.frame(index)
+        columns = np.array([0, mask.box_width, mask.box_width, 0]) + mask.left
+        rows = np.array([0, 0, mask.box_height, mask.box_height]) + mask.top
+        camera = frame.rgb_camera
+        rays = np.stack([(columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy, np.ones(4)], axis=1)
+        inward = region.world_from_plane.inverse.rotation @ frame.world_from_camera.rotation
+        eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation[None])[0]
+        rays = rays @ inward.T
+        if (rays[:, 1] < 0.15).any():  # seen too flatly to say where a ray meets it
+            continue
+        met = eye - rays * (eye[1] / rays[:, 1])[:, None]
+        over = np.abs(met[:, [0, 2]]) - [region.width_m / 2, region.height_m / 2]
+        reaches.append(float(over.max()))
+    reach = float(np.quantile(reaches, 0.25)) if reaches else 0.0  # seen from the side, the mask holds the side too
+    return round(min(reach + 0.05, _MOST_BEYOND_M), 2) if reach > _GRID_PAD_M else 0.0
+
+
+def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Cell | None:
+    """The rectangle of a run's plane (grid cells) that most masks cover, where the body is."""
     step = max(1, round(_GRID_STEP_M / run.grid.cell_m))
     columns, rows = np.arange(step / 2, run.grid.columns, step), np.arange(step / 2, run.grid.rows, step)
     at = np.stack([grid.ravel() for grid in np.meshgrid(columns, rows)], axis=1)
-    inside, seen = vote(scene, masks, run.grid.points_at(at))
-    covered = ((seen > 0) & (inside > 0.5 * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
+    inside, seen = vote(scene, _frontal(masks, run.region, scene), run.grid.points_at(at))
+    covered = ((seen > 0) & (inside > _COVERED * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
     if count <= 1:
         return None
-    largest = labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    across, down = largest.sum(axis=0), largest.sum(axis=1)
+    part = labels == _part_of(labels, stats, body, run, step)
+    across, down = part.sum(axis=0), part.sum(axis=1)
     wide, tall = np.flatnonzero(across > 0.5 * across.max()), np.flatnonzero(down > 0.5 * down.max())
     if len(wide) < 3 or len(tall) < 3:
         return None
     return Cell(*(float(step * edge) for edge in (wide[0], tall[0], wide[-1] + 1, tall[-1] + 1)))
+
+
+def _frontal(masks: Mapping[int, PackedMask], region: PlaneRegion, scene: Scene) -> dict[int, PackedMask]:
+    """The half of the masks seen most from the front: seen from the side, a box's mask holds its side too."""
+
+    def facing(index: int) -> float:
+        towards = scene.frame(index).world_from_camera.translation - region.world_from_plane.translation
+        return float(towards @ region.outward / np.linalg.norm(towards))
+
+    return {index: masks[index] for index in sorted(masks, key=facing)[len(masks) // 2 :]}
+
+
+def _part_of(labels: np.ndarray, stats: np.ndarray, body: Body, run: Run, step: int) -> int:
+    """The label that most of the body's surface on the plane falls into, else the largest."""
+    on_plane = body.vertices[np.abs(run.grid.world_from_plane.inverse.apply(body.vertices)[:, 1]) < _ON_PLANE_M]
+    column, row = (run.grid.cells_of(on_plane) / step).astype(int).T
+    inside = (column >= 0) & (row >= 0) & (column < labels.shape[1]) & (row < labels.shape[0])
+    held = np.bincount(labels[row[inside], column[inside]], minlength=len(stats))
+    held[0] = 0
+    return int(np.argmax(held)) if held.any() else 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
 
 
 def _as_cut(run: Run, voted: Cell) -> Cell:
