@@ -13,6 +13,7 @@ from r2c2r_core.arrays import DepthMetres, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, sample_nearest, unproject
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.views import MaskView, choose_views, stands_open
 from r2c2r_core.model.capture import Capture, Depth, Frame
 from r2c2r_core.model.track import MaskTrack
 
@@ -47,13 +48,16 @@ class Observation:
 
 def observe(capture: Capture, track: MaskTrack, *, view_count: int, size_px: int, point_count: int) -> Observation:
     """Choose frames that see the object from different sides, and gather their pixels and points."""
-    frames = choose_frames(capture, track, view_count)
+    found = {
+        frame: masked_points(frame, capture.images.depth(frame.index), unpack_mask(track.masks[frame.index]))
+        for frame in choose_frames(capture, track, view_count)
+    }
+    frames = _in_one_state(found, track)
     points, towards, noise = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
     for frame in frames:
-        found = masked_points(frame, capture.images.depth(frame.index), unpack_mask(track.masks[frame.index]))
-        points.append(frame.world_from_camera.apply(found))
+        points.append(frame.world_from_camera.apply(found[frame]))
         towards.append(_unit(frame.world_from_camera.translation - points[-1]))
-        noise.append(depth_noise(found[:, 2]))
+        noise.append(depth_noise(found[frame][:, 2]))
     all_points, all_towards, all_noise = np.concatenate(points), np.concatenate(towards), np.concatenate(noise)
     keep = main_body(all_points)
     all_points, all_towards, all_noise = all_points[keep], all_towards[keep], all_noise[keep]
@@ -95,27 +99,36 @@ def depth_noise(depth_m: np.ndarray) -> np.ndarray:
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:
     """Up to `count` frames with large, whole, sharp masks, spread over the directions the object is seen from."""
     known = [f for f in capture.frames if f.index in track.masks]
-    area = np.array([track.masks[f.index].area_px for f in known], dtype=np.float64)
-    usable = area >= max(48.0, 0.08 * area.max(initial=0.0))
-    known = [f for f, ok in zip(known, usable, strict=True) if ok]
+    largest = max((track.masks[f.index].area_px for f in known), default=0)
+    known = [f for f in known if track.masks[f.index].area_px >= max(48.0, 0.08 * largest)]
     if not known:
         return ()
-    area = area[usable]
-    sharpness = np.array([f.sharpness for f in known])
-    rank = np.argsort(np.argsort(sharpness, kind="stable"), kind="stable") / max(len(known) - 1, 1)
-    whole = np.array([_is_whole(track, f) for f in known])
-    quality = np.sqrt(area / area.max()) * (0.5 + 0.5 * rank) * np.where(whole, 1.0, 0.45)
-    quality *= np.array([0.3 + 0.7 * track.confidence.get(f.index, 1.0) for f in known])
-    target = _rough_centre(capture, track, known[int(np.argmax(area))])
-    direction = _unit(np.array([f.world_from_camera.translation for f in known]) - target)
-    chosen = [int(np.argmax(quality))]
-    gap = np.full(len(known), np.inf)
-    while len(chosen) < min(count, len(known)):
-        gap = np.minimum(gap, np.arccos(np.clip(direction @ direction[chosen[-1]], -1.0, 1.0)))
-        gain = quality * (0.02 + np.minimum(gap, 1.0))
-        gain[chosen] = -1.0
-        chosen.append(int(np.argmax(gain)))
-    return tuple(known[i] for i in sorted(chosen))
+    target = _rough_centre(capture, track, max(known, key=lambda f: track.masks[f.index].area_px))
+    views = [
+        MaskView(
+            frame_index=frame.index,
+            mask=track.masks[frame.index],
+            sharpness=frame.sharpness,
+            confidence=track.confidence.get(frame.index, 1.0),
+            from_object=frame.world_from_camera.translation - target,
+        )
+        for frame in known
+    ]
+    chosen = {view.frame_index for view in choose_views(views, count)}
+    return tuple(frame for frame in known if frame.index in chosen)
+
+
+def _in_one_state(found: dict[Frame, Points], track: MaskTrack) -> tuple[Frame, ...]:
+    """The frames that show a front where it was measured, not pulled or swung open; all, where none or no front does."""
+    if track.front is None:
+        return tuple(found)
+    front_from_world = track.front.world_from_front.inverse
+    closed = [
+        frame
+        for frame, points in found.items()
+        if not stands_open(-front_from_world.apply(frame.world_from_camera.apply(points))[:, 1])
+    ]
+    return tuple(closed or found)
 
 
 def masked_points(frame: Frame, depth: Depth, mask: Mask) -> Points:
@@ -270,12 +283,6 @@ def _turn_depth(frame: Frame, depth: Depth, old_rays: np.ndarray, new_from_old: 
     value, within = sample_nearest(known, uv.reshape(-1, 2))
     value = np.where(within, value, 0.0).reshape(old_rays.shape[:2])
     return (value * (old_rays @ new_from_old[2])).astype(np.float32)
-
-
-def _is_whole(track: MaskTrack, frame: Frame) -> bool:
-    """Whether the mask stays clear of the photo's border."""
-    m = track.masks[frame.index]
-    return m.left > 1 and m.top > 1 and m.left + m.box_width < m.width - 1 and m.top + m.box_height < m.height - 1
 
 
 def _rough_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:

@@ -10,10 +10,10 @@ from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, pixel_centres, sample_nearest
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands_open, view_scores
 from r2c2r_core.model.capture import Capture, Frame
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 
-_AZIMUTH_BINS = 12
 _EDGE_STEP = 0.06  # of the depth within 3x3 pixels: the object's outline, where depth mixes (backends.md 2.7)
 
 
@@ -47,16 +47,19 @@ class Evidence:
 
 
 def gather_evidence(capture: Capture, track: MaskTrack, pool_size: int) -> Evidence:
-    """Load the object's good frames: large, whole, sharp masks, spread in azimuth (method.md row 14); raises ObjectNotSeen."""
+    """Load the object's good frames (paper 4.2; see geometry/views.py), in one joint state; raises ObjectNotSeen."""
     frames = [frame for frame in capture.frames if frame.index in track.masks and track.masks[frame.index].area_px > 0]
     if not frames:
         raise ObjectNotSeen(f"{track.name}: its masks are empty in all frames", hint="click it in a frame that shows it")
-    quality = _qualities(frames, track)
-    centre = object_centre(capture, track, frames[int(np.argmax(quality))])
-    chosen = _spread_choice(frames, quality, centre, pool_size)
-    order = np.argsort(np.argsort([frame.sharpness for frame in chosen])) / max(len(chosen) - 1, 1)
-    pool = tuple(_load_view(capture, track.masks[f.index], f, float(rank)) for f, rank in zip(chosen, order, strict=True))
-    return Evidence(capture=capture, track=track, pool=pool)
+    largest = max(frames, key=lambda frame: track.masks[frame.index].area_px)
+    centre = object_centre(capture, track, largest)
+    chosen = choose_views([_view_of(frame, track, centre) for frame in frames], pool_size)
+    order = np.argsort(np.argsort([view.sharpness for view in chosen])) / max(len(chosen) - 1, 1)
+    best_first = np.argsort(-view_scores(chosen), kind="stable")
+    pool = [_load_view(capture, chosen[k].mask, capture.frame(chosen[k].frame_index), float(order[k])) for k in best_first]
+    front = track.front
+    closed = [view for view in pool if front is None or not _is_open(view, front)]  # one joint state: as it was measured
+    return Evidence(capture=capture, track=track, pool=tuple(closed or pool))
 
 
 def object_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
@@ -112,35 +115,19 @@ def _rgb_pixels_of_depth(view: View) -> np.ndarray:
     return np.column_stack([x, y])
 
 
-def _qualities(frames: list[Frame], track: MaskTrack) -> np.ndarray:
-    """How good each frame is to make a mesh from: area, wholeness, sharpness, confidence (paper §4.2)."""
-    area = np.array([track.masks[f.index].area_px for f in frames], dtype=np.float64)
-    whole = np.array([0.4 if _touches_border(track.masks[f.index]) else 1.0 for f in frames])
-    sharp = np.argsort(np.argsort([f.sharpness for f in frames])) / max(len(frames) - 1, 1)
-    confidence = np.array([track.confidence.get(f.index, 0.5) for f in frames])
-    return np.asarray(np.sqrt(area / area.max()) * whole * (0.4 + 0.6 * sharp) * (0.2 + 0.8 * confidence))
+def _view_of(frame: Frame, track: MaskTrack, centre_world: Vector3) -> MaskView:
+    return MaskView(
+        frame_index=frame.index,
+        mask=track.masks[frame.index],
+        sharpness=frame.sharpness,
+        confidence=track.confidence.get(frame.index, 0.5),
+        from_object=frame.world_from_camera.translation - centre_world,
+    )
 
 
-def _touches_border(mask: PackedMask) -> bool:
-    right, bottom = mask.left + mask.box_width, mask.top + mask.box_height
-    return mask.left <= 1 or mask.top <= 1 or right >= mask.width - 1 or bottom >= mask.height - 1
-
-
-def _spread_choice(frames: list[Frame], quality: np.ndarray, centre: Vector3, count: int) -> list[Frame]:
-    """The best frame of each azimuth bin in turn, until `count` are chosen; best first."""
-    offsets = np.array([f.world_from_camera.translation - centre for f in frames])
-    azimuth = np.unwrap(np.sort(np.arctan2(offsets[:, 1], offsets[:, 0])))
-    order = np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]))
-    position = np.zeros(len(frames))
-    position[order] = (azimuth - azimuth[0]) / max(float(np.ptp(azimuth)), 1e-6)
-    bins = np.minimum((position * _AZIMUTH_BINS).astype(int), _AZIMUTH_BINS - 1)
-    turn = np.zeros(len(frames), dtype=int)
-    for b in range(_AZIMUTH_BINS):
-        members = np.flatnonzero(bins == b)
-        turn[members[np.argsort(-quality[members])]] = np.arange(len(members))
-    poor = quality < 0.25 * quality.max()
-    chosen = np.lexsort((-quality, turn, poor))[:count]
-    return [frames[i] for i in chosen[np.argsort(-quality[chosen])]]
+def _is_open(view: View, front: FrontPanel) -> bool:
+    """Whether the front stands open in a view."""
+    return stands_open(-front.world_from_front.inverse.apply(masked_points(view))[:, 1])
 
 
 def _load_view(capture: Capture, packed: PackedMask, frame: Frame, sharpness: float) -> View:
@@ -162,7 +149,7 @@ def _load_view(capture: Capture, packed: PackedMask, frame: Frame, sharpness: fl
         depth_camera=depth_camera,
         world_from_camera=frame.world_from_camera,
         sharpness=sharpness,
-        is_cropped=_touches_border(packed),
+        is_cropped=is_cropped(packed),
     )
 
 

@@ -1,60 +1,90 @@
-"""Which frames show an object well: the paper's interval choice (section 4.2), on plain figures of its masks."""
+"""Which frames show an object well (paper 4.2): the best of each interval of the recording, spread over viewing angles.
+
+The paper takes the best frame of 20 intervals. Intervals alone repeat a view where the person lingers (method.md row 14),
+so the winners of the intervals are candidates, and each next one taken is the best that also looks from somewhere new.
+"""
 
 from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.masks import PackedMask
+
+INTERVALS = 20  # the paper's, and at least two for every view asked for
+_BORDER_PX = 2
+_FULL_TURN_RAD = 1.0  # views this far apart share nothing worth having both for
+_SAME_PLACE = 0.02  # worth of a view from where another one stands, beside one from a full turn away
+_STANDS_OUT_M = 0.06  # handles stand out by up to 5 cm
+_STANDS_OUT_SHARE = 0.2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaskView:
     """What is needed to judge one frame's view of an object."""
 
     frame_index: int
-    area_px: int
-    left: int  # bounding box in pixels
-    top: int
-    box_width: int
-    box_height: int
-    width: int  # image size
-    height: int
-    sharpness: float
-    confidence: float = 1.0
+    mask: PackedMask
+    sharpness: float  # only its order means something
+    confidence: float  # 0..1
+    from_object: Vector3  # to the camera, in the world
 
 
-def choose_views(views: list[MaskView], count: int = 20, *, border_px: int = 2) -> list[int]:
-    """Frame numbers in recording order: the views are split into `count` intervals, each gives its best.
-
-    Best means large, uncropped, near the image centre and sharp. A cropped view stands in only where an interval
-    offers no whole one and fewer than a quarter of the intervals do.
-    """
-    ordered = sorted((view for view in views if view.area_px > 0), key=lambda view: view.frame_index)
-    if not ordered:
+def choose_views(views: list[MaskView], count: int) -> list[MaskView]:
+    """Up to `count` views, in the order taken: the best one, then always the best that looks from somewhere new."""
+    seen = sorted((view for view in views if view.mask.area_px > 0), key=lambda view: view.frame_index)
+    if not seen:
         return []
-    count = min(count, len(ordered))
-    largest = max(view.area_px for view in ordered)
-    sharpest = max(max(view.sharpness for view in ordered), 1e-9)
-    chosen: list[MaskView] = []
-    for i in range(count):
-        interval = ordered[i * len(ordered) // count : (i + 1) * len(ordered) // count]
-        chosen.append(max(interval, key=lambda view: (view_score(view, largest, sharpest, border_px), -view.frame_index)))
-    whole = [view for view in chosen if not is_cropped(view, border_px)]
-    kept = whole if len(whole) >= max(1, count // 4) else chosen
-    return [view.frame_index for view in kept]
+    score = view_scores(seen)
+    winners = _interval_winners(score, max(INTERVALS, 2 * count))
+    towards = np.array([seen[k].from_object for k in winners])
+    towards = towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+    worth = score[winners]
+    taken = [int(np.argmax(worth))]
+    gap = np.full(len(winners), np.inf)
+    while len(taken) < min(count, len(winners)):
+        gap = np.minimum(gap, np.arccos(np.clip(towards @ towards[taken[-1]], -1.0, 1.0)))
+        gain = worth * (_SAME_PLACE + np.minimum(gap, _FULL_TURN_RAD))
+        gain[taken] = -1.0
+        taken.append(int(np.argmax(gain)))
+    return [seen[winners[k]] for k in taken]
 
 
-def view_score(view: MaskView, largest_px: int, sharpest: float, border_px: int = 2) -> float:
-    """How well a frame shows the object, 0..1."""
-    off_x = abs(view.left + view.box_width / 2 - view.width / 2) / (view.width / 2)
-    off_y = abs(view.top + view.box_height / 2 - view.height / 2) / (view.height / 2)
-    centred = 1 - 0.5 * min(1.0, (off_x**2 + off_y**2) ** 0.5)
-    sharp = 0.5 + 0.5 * min(1.0, view.sharpness / sharpest) ** 0.5
-    whole = 0.3 if is_cropped(view, border_px) else 1.0
-    return float((view.area_px / largest_px) ** 0.5 * centred * sharp * whole * max(view.confidence, 0.05))
+def view_scores(views: list[MaskView]) -> np.ndarray:
+    """How well each view shows the object beside the others, 0..1: large, whole, central, sharp, trusted."""
+    area = np.array([view.mask.area_px for view in views], dtype=np.float64)
+    sharpness = np.array([view.sharpness for view in views])
+    sharp = np.searchsorted(np.sort(sharpness), sharpness) / max(len(views) - 1, 1)  # its rank: equals are equal
+    whole = np.array([0.4 if is_cropped(view.mask) else 1.0 for view in views])
+    central = np.array([1 - 0.3 * _off_centre(view.mask) for view in views])
+    trusted = 0.25 + 0.75 * np.array([view.confidence for view in views])
+    return np.asarray(np.sqrt(area / area.max()) * (0.45 + 0.55 * sharp) * whole * central * trusted)
 
 
-def is_cropped(view: MaskView, border_px: int = 2) -> bool:
+def is_cropped(mask: PackedMask) -> bool:
     """Whether the mask touches the image border."""
-    return (
-        view.left < border_px
-        or view.top < border_px
-        or view.left + view.box_width > view.width - border_px
-        or view.top + view.box_height > view.height - border_px
-    )
+    right, bottom = mask.left + mask.box_width, mask.top + mask.box_height
+    beyond = mask.left < _BORDER_PX or mask.top < _BORDER_PX
+    return beyond or right > mask.width - _BORDER_PX or bottom > mask.height - _BORDER_PX
+
+
+def stands_open(outward_m: np.ndarray) -> bool:
+    """Whether points of a front, by how far they lie in front of where it was measured, show it pulled or swung open.
+
+    Only what stands out counts: seen from the side, a box shows points behind its front.
+    """
+    return bool(len(outward_m) and np.quantile(outward_m, 1 - _STANDS_OUT_SHARE) > _STANDS_OUT_M)
+
+
+def _interval_winners(score: np.ndarray, intervals: int) -> np.ndarray:
+    """Position of the best of each interval; the earliest of equals."""
+    edges = np.linspace(0, len(score), min(intervals, len(score)) + 1).round().astype(int)
+    return np.array([low + int(np.argmax(score[low:high])) for low, high in pairwise(edges)])
+
+
+def _off_centre(mask: PackedMask) -> float:
+    """Distance of the mask's middle from the image's, as a share of half the image, at most 1."""
+    x = (mask.left + mask.box_width / 2) / (mask.width / 2) - 1
+    y = (mask.top + mask.box_height / 2) / (mask.height / 2) - 1
+    return min(1.0, float(np.hypot(x, y)))

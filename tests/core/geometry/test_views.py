@@ -1,36 +1,90 @@
-from r2c2r_core.geometry.views import MaskView, choose_views
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands_open, view_scores
 
 
 def view(
-    frame_index: int, *, area: int = 1000, left: int = 300, top: int = 200, size: int = 40, sharpness: float = 10.0
+    frame_index: int,
+    *,
+    azimuth_deg: float = 0.0,
+    area: int = 1000,
+    left: int = 300,
+    top: int = 220,
+    size: int = 40,
+    sharpness: float = 10.0,
+    confidence: float = 1.0,
 ) -> MaskView:
+    mask = PackedMask(height=480, width=640, left=left, top=top, box_width=size, box_height=size, bits=b"", area_px=area)
+    turn = np.radians(azimuth_deg)
     return MaskView(
         frame_index=frame_index,
-        area_px=area,
-        left=left,
-        top=top,
-        box_width=size,
-        box_height=size,
-        width=640,
-        height=480,
+        mask=mask,
         sharpness=sharpness,
+        confidence=confidence,
+        from_object=2.0 * np.array([np.cos(turn), np.sin(turn), 0.0]),
     )
 
 
-def test_each_interval_gives_its_best_frame_in_order() -> None:
-    views = [view(i, area=2000 if i % 10 == 3 else 1000) for i in reversed(range(100))]
-    assert choose_views(views, 10) == [10 * k + 3 for k in range(10)]
+def chosen(views: list[MaskView], count: int) -> list[int]:
+    return [found.frame_index for found in choose_views(views, count)]
 
 
-def test_whole_sharp_and_central_views_win() -> None:
-    cropped, blurred, aside, good = view(0, left=0), view(1, sharpness=0.1), view(2, left=580), view(3)
-    assert choose_views([cropped, blurred, aside, good], 1) == [3]
+def test_each_interval_of_the_recording_gives_its_best_frame() -> None:
+    views = [view(k, azimuth_deg=0.5 * k, area=2000 if k % 5 == 3 else 1000) for k in reversed(range(100))]
+    assert sorted(chosen(views, 10)) == sorted(set(chosen(views, 10)) & {5 * k + 3 for k in range(20)})
+    assert len(chosen(views, 10)) == 10
 
 
-def test_cropped_views_stand_in_only_where_there_is_nothing_better() -> None:
-    assert choose_views([view(0, left=0), view(5), view(9, left=0)], 3) == [5]
-    assert choose_views([view(0, left=0), view(9, left=0)], 3) == [0, 9]
+@pytest.mark.parametrize(
+    "worse",
+    [{"left": 0}, {"sharpness": 0.1}, {"left": 560}, {"area": 300}, {"confidence": 0.2}],
+    ids=["cropped", "blurred", "aside", "small", "unsure"],
+)
+def test_large_whole_sharp_central_and_sure_views_win(worse: dict[str, float]) -> None:
+    assert chosen([view(0, **worse), view(1)], 1) == [1]  # type: ignore[arg-type]
+    scores = view_scores([view(0, **worse), view(1)])  # type: ignore[arg-type]
+    assert scores[0] < scores[1] <= 1
 
 
-def test_frames_without_the_object_do_not_count() -> None:
-    assert choose_views([view(0, area=0)], 5) == []
+def test_views_are_spread_over_angles_though_the_camera_lingered() -> None:
+    """Fifty frames from one place, ten on the way to another: intervals of time alone would take most from the first."""
+    views = [view(k) for k in range(50)] + [view(50 + k, azimuth_deg=9 * k) for k in range(10)]
+    frames = chosen(views, 4)
+    azimuths = sorted(9 * (k - 50) if k >= 50 else 0 for k in frames)
+    assert azimuths[0] < 10
+    assert azimuths[-1] > 60
+    assert min(np.diff(azimuths)) >= 9  # one place is taken once
+
+
+def test_the_first_is_the_best_of_all() -> None:
+    views = [view(k, azimuth_deg=3 * k, area=1000 + 10 * (k == 17)) for k in range(30)]
+    assert chosen(views, 5)[0] == 17
+
+
+def test_the_choice_does_not_depend_on_the_order_the_views_come_in() -> None:
+    views = [view(k, azimuth_deg=7 * k % 90, area=1000 + 37 * k % 11, sharpness=float(k % 13)) for k in range(60)]
+    assert chosen(views, 8) == chosen(views[::-1], 8)
+
+
+def test_no_more_views_than_there_are_and_none_without_the_object() -> None:
+    assert sorted(chosen([view(0), view(5)], 20)) == [0, 5]
+    assert chosen([view(0, area=0)], 5) == []
+
+
+def test_cropped_means_touching_the_border() -> None:
+    assert not is_cropped(view(0).mask)
+    assert is_cropped(view(0, left=1).mask)
+    assert is_cropped(view(0, left=600).mask)
+    assert is_cropped(view(0, top=440).mask)
+
+
+def test_a_pulled_drawer_stands_open_but_a_handle_and_a_side_do_not() -> None:
+    rng = np.random.default_rng(0)
+    front = rng.normal(0, 0.01, 900)
+    assert not stands_open(np.concatenate([front, rng.normal(0.045, 0.005, 100)]))  # its handle
+    assert not stands_open(np.concatenate([front, rng.uniform(-0.6, 0, 2000)]))  # its side, behind the front
+    assert stands_open(np.concatenate([front[:300], rng.uniform(0.05, 0.3, 200)]))  # a door swung open
+    assert stands_open(front + 0.3)  # a drawer pulled out
+    assert not stands_open(np.zeros(0))
