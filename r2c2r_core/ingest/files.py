@@ -6,6 +6,7 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Protocol, cast
 
@@ -52,9 +53,10 @@ class FolderFiles:
     def __init__(self, source: Path) -> None:
         self.source = source
         self._root = source.resolve()
-        self._names = frozenset(
-            path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file() and not _is_clutter(path.name)
-        )
+        found = (path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file())
+        self._names = frozenset(islice((name for name in found if not _is_clutter(name)), _MAX_MEMBERS + 1))
+        if len(self._names) > _MAX_MEMBERS:
+            raise CaptureError(f"{source}: more than {_MAX_MEMBERS} files", hint="choose the folder of one recording")
 
     def names(self) -> frozenset[str]:
         """All file names."""

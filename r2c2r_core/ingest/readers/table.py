@@ -45,6 +45,10 @@ def open_recording(source: Path) -> Recording:
         for reader in READERS:
             if not reader.missing(root.names()):
                 return upright(plausible(reader.open(root)))
+    if archives := sorted(name for name in files.names() if name.endswith((".r3d", ".zip"))):
+        raise CaptureError(
+            f"{source}: holds {archives[0]}, which may be a recording itself", hint="choose that file (unpacked)"
+        )
     miss = _nearest_miss(roots)
     if miss is None:
         raise CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"looked for {_formats()}")

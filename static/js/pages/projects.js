@@ -79,7 +79,12 @@ export class ProjectsPage extends LiveElement {
       h(
         "div",
         {},
-        h("p", { class: "muted" }, "Drop a Record3D .r3d file here, or try everything on a kitchen made for it."),
+        h(
+          "p",
+          { class: "muted" },
+          "Drop a scan here: Record3D's .r3d, or a zip of what Stray Scanner, Polycam or another RGB-D app or dataset exports.",
+        ),
+        h("p", { class: "muted" }, "Or try everything on a kitchen made for it."),
         h(
           "div",
           { class: "row" },

@@ -335,3 +335,26 @@ def test_a_frame_a_kilometre_away_is_left_out(tmp_path):
     recording = open_recording(folder)
     assert [f.index for f in recording.frames] == [0, 10, 15]
     assert told(recording, "more than a kilometre")
+
+
+def test_tum_poses_by_line_stay_with_their_images_when_one_is_missing(tmp_path):
+    folder = write_tum(tmp_path / "t", ROOM, pose_clock_offset_s=0.006)
+    rows = [line.split() for line in (folder / "groundtruth.txt").read_text().splitlines()[1:]]
+    images = [line for line in (folder / "rgb.txt").read_text().splitlines() if not line.startswith("#")]
+    (folder / "groundtruth.txt").write_text("\n".join(" ".join([str(k), *rows[k][1:]]) for k in range(len(images))))
+    (folder / images[2].split()[1]).unlink()
+    recording = open_recording(folder)
+    assert told(recording, "matched by line")
+    assert 2 not in [f.index for f in recording.frames]
+    for frame in recording.frames:
+        assert np.allclose(frame.capture_from_camera.translation, [float(n) for n in rows[frame.index][1:4]])
+
+
+def test_an_archive_inside_is_named(tmp_path):
+    from .tiny import write_r3d
+
+    (tmp_path / "scans").mkdir()
+    write_r3d(tmp_path / "scans" / "kitchen.r3d", SMALL)
+    with pytest.raises(CaptureError, match=r"holds kitchen\.r3d") as caught:
+        open_recording(tmp_path / "scans")
+    assert "choose" in caught.value.hint
