@@ -256,7 +256,7 @@ export class AnnotatePage extends LiveElement {
 
   /** @param {FrameMask & { done: number, total: number }} message */
   #receive(message) {
-    if (!this.#objects.has(message.object)) return;
+    // A first look can be here before the answer that names its object.
     const lane = this.#lanes.get(message.object) ?? new Map();
     this.#lanes.set(message.object, lane);
     if (message.mask.box_width) lane.set(message.frame, message.confidence);
