@@ -4,7 +4,7 @@ transformers' own call detects anew for every pair; 6 photos against 100 views w
 kept (the result is the same, stack.md §7), and of many images only those that look most alike go through the network.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,9 +44,10 @@ class GlueMatcher:
     """A matcher of SuperPoint keypoints; its two kinds differ in the class and in how it is called."""
 
     class_name: str  # in transformers
+    settings: Mapping[str, float] = {}  # of its configuration, where the stored ones do not suit
 
     def __init__(self, *, weights: Path) -> None:
-        self._model = _load(self.class_name, weights)
+        self._model = _load(self.class_name, weights, self.settings)
 
     def describe(self, image: Image, mask: Mask) -> Features:
         """The strongest keypoints of `image` inside `mask`."""
@@ -66,7 +67,7 @@ class GlueMatcher:
         raise NotImplementedError
 
 
-def _load(class_name: str, weights: Path) -> Any:
+def _load(class_name: str, weights: Path, settings: Mapping[str, float]) -> Any:
     """The model of that transformers class from a folder, on the GPU where there is one; raises BackendUnavailable."""
     import torch
     import transformers
@@ -75,6 +76,8 @@ def _load(class_name: str, weights: Path) -> Any:
     try:
         config = model_class.config_class.from_pretrained(weights, local_files_only=True)
         config.keypoint_detector_config.max_keypoints = _DETECTED * KEYPOINTS
+        for name, value in settings.items():
+            setattr(config, name, value)
         model = model_class.from_pretrained(weights, config=config, local_files_only=True)
     except Exception as error:  # files of another model, cut short, of another version: each means that they are no use
         line = (str(error).strip() or type(error).__name__).splitlines()[0]

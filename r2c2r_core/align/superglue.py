@@ -3,6 +3,7 @@
 The weights (magic-leap-community/superglue_indoor, which hold SuperPoint's too) may not be used commercially.
 """
 
+from types import MappingProxyType
 from typing import Any
 
 from r2c2r_core.align.glue import CANVAS_PX, GlueMatcher, Pair
@@ -12,6 +13,7 @@ class SuperGlueMatcher(GlueMatcher):
     """Matches with SuperGlueForKeypointMatching."""
 
     class_name = "SuperGlueForKeypointMatching"
+    settings = MappingProxyType({"matching_threshold": 0.2})  # Magic Leap's own; stored as 0, every mutual best would do
 
     def _partners(self, pair: Pair) -> Any:
         # private in transformers 5.23 (pinned): the public call detects keypoints anew for every pair

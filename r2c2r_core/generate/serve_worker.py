@@ -3,10 +3,10 @@ r"""Serve any generator of this project over HTTP, for the `remote` generator of
 On the machine with the GPU, in the model's own Python environment with this package beside it:
 
     pip install --no-deps r2c2r && pip install numpy scipy opencv-python-headless trimesh open3d-cpu manifold3d \
-        scikit-image fast-simplification xatlas pillow jaxtyping
+        scikit-image fast-simplification xatlas pillow jaxtyping networkx
+    hf download microsoft/TRELLIS-image-large
     export R2C2R_WORKER_TOKEN=$(openssl rand -hex 16)
-    SPCONV_ALGO=native python -m r2c2r_core.generate.serve_worker --generator trellis \
-        --weights microsoft/TRELLIS-image-large --host 0.0.0.0 --port 9000
+    SPCONV_ALGO=native python -m r2c2r_core.generate.serve_worker --generator trellis --host 0.0.0.0 --port 9000
 
 and where the pipeline runs:
 

@@ -51,6 +51,12 @@ def folders(tmp_path_factory):
     return found
 
 
+@pytest.fixture(autouse=True)
+def lenient(monkeypatch):
+    """Random weights are sure of nothing: every mutual best counts."""
+    monkeypatch.setattr(SuperGlueMatcher, "settings", {})
+
+
 @pytest.fixture(scope="module")
 def pictures():
     """Two photos of one textured patch, the second moved by (24, 16) pixels."""
@@ -118,6 +124,15 @@ def test_pairs_are_one_to_one_and_nothing_matches_nothing(folders, pictures, nam
     assert len(nothing.uv_px) == 0
     assert len(matcher.match(first, nothing).first) == 0
     assert len(matcher.match(nothing, nothing).first) == 0
+
+
+def test_superglue_keeps_only_pairs_it_is_sure_of(folders, pictures, monkeypatch):
+    images, masks = pictures
+    lenient = SuperGlueMatcher(weights=folders["superglue"])
+    first, second = (lenient.describe(image, mask) for image, mask in zip(images, masks, strict=True))
+    monkeypatch.undo()
+    strict = SuperGlueMatcher(weights=folders["superglue"])
+    assert len(lenient.match(first, second).first) > len(strict.match(first, second).first)
 
 
 def test_of_many_views_only_the_most_alike_go_through_the_network(folders, pictures, monkeypatch):
