@@ -1,10 +1,10 @@
-"""Peak memory of reading a recording, against its number of frames, at 1920x1440.
+"""Peak memory of reading and examining a recording, against its number of frames, at 1920x1440.
 
     python benchmarks/memory.py [--frames 250 500 1000] [--sample scan.r3d] [--update] [--workdir DIR]
 
 A synthetic kitchen's frames (colour enlarged to 1920x1440) are repeated along its path until the recording is long enough, so
-that the fused room and the size of the files are real. Each recording is read in a process of its own with all its frames
-kept. --update writes the figures under "memory" in benchmarks/capture.json.
+that the fused room and the size of the files are real. Each recording is read, and examined by the doctor, in a process of
+its own with all its frames kept. --update writes the figures under "memory" in benchmarks/capture.json.
 """
 
 import argparse
@@ -23,6 +23,8 @@ import cv2
 import numpy as np
 from measure import run_measured
 
+from r2c2r_core.ingest.doctor import examine
+from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -40,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--read", type=Path, nargs=2, metavar=("SOURCE", "STORE"), help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.read:
-        read_capture(options.read[0], options.read[1], IngestConfig(most_frames=10**6))
+        source, store = options.read
+        examine(read_capture(source, store, IngestConfig(most_frames=10**6)), open_recording(source))
         return 0
     with tempfile.TemporaryDirectory(prefix="r2c2r-memory-", dir=options.workdir) as folder:
         figures = measure(options.frames, options.sample or _sample(Path(folder)), Path(folder))
@@ -62,8 +65,8 @@ def measure(counts: Sequence[int], sample: Path, folder: Path) -> dict[str, Any]
         peaks[str(count)], speeds[str(count)] = round(cost.peak_bytes / 2**20), round(cost.wall_s / count * 1000, 1)
         print(f"{count} frames: {peaks[str(count)]} MiB, {speeds[str(count)]} ms a frame", file=sys.stderr, flush=True)
     return {
-        "ingest_ms_per_frame": speeds,
-        "ingest_peak_mib": peaks,
+        "import_ms_per_frame": speeds,
+        "import_peak_mib": peaks,
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
         "size_px": list(SIZE),
     }

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import cv2
 import numpy as np
 
 from r2c2r_core.errors import CaptureError
@@ -146,8 +147,6 @@ def _depth_of(
 
 
 def _mask(files: Files, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    import cv2
-
     white = colour_pixels(files.read(name), name).max(axis=2)
     return np.asarray(cv2.resize(white, shape[::-1], interpolation=cv2.INTER_NEAREST) > 0)
 

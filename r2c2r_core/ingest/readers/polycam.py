@@ -26,7 +26,7 @@ _CONFIDENCE_LEVELS = (64, 192)  # between 0, 127 and 255
 def open_polycam(files: Files) -> Recording:
     """The recording in a Polycam raw export; raises CaptureError."""
     names = files.names()
-    corrected = all(Part("", f"keyframes/corrected_{kind}").is_in(names) for kind in (_IMAGES, _CAMERAS))
+    corrected = all(numbered(names, f"keyframes/corrected_{kind}") for kind in (_IMAGES, _CAMERAS))
     kind = "keyframes/corrected_" if corrected else "keyframes/"
     by_time = [numbered(names, pattern) for pattern in (kind + _IMAGES, kind + _CAMERAS, _DEPTH, _CONFIDENCE)]
     ranks = {time_us: rank for rank, time_us in enumerate(sorted(set().union(*by_time)))}

@@ -14,8 +14,8 @@ import numpy as np
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
-from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3, nearest_rotation
-from r2c2r_core.ingest.readers.texts import parse_json
+from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
+from r2c2r_core.ingest.readers.texts import integer_centred, parse_json, pose_of_quaternion
 
 _TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
 
@@ -102,19 +102,11 @@ def _cameras(metadata: dict[str, Any], width: int, height: int, count: int, sour
         rows = np.array([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]])
     if not (np.isfinite(rows).all() and (rows[:, :2] > 0).all()):
         raise CaptureError(f"{source}: a focal length is not a positive number", hint="export the recording again")
-    return tuple(
-        Intrinsics(fx=float(fx), fy=float(fy), cx=float(cx) + 0.5, cy=float(cy) + 0.5, width=width, height=height)
-        for fx, fy, cx, cy in rows
-    )
+    return tuple(integer_centred(fx, fy, cx, cy, (width, height)) for fx, fy, cx, cy in rows)
 
 
 def _pose(row: np.ndarray) -> Rigid3 | None:
-    from scipy.spatial.transform import Rotation
-
-    if not np.isfinite(row).all() or not 0.5 < np.linalg.norm(row[:4]) < 2.0:
-        return None
-    world_from_gl = Rotation.from_quat(row[:4]).as_matrix()
-    return Rigid3(nearest_rotation(world_from_gl @ CAMERA_CV_FROM_GL), row[4:].copy())
+    return pose_of_quaternion(np.concatenate([row[4:], row[:4]]), CAMERA_CV_FROM_GL)
 
 
 def _up(metadata: dict[str, Any], poses: np.ndarray) -> Vector3 | None:

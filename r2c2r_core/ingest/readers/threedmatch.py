@@ -5,6 +5,7 @@ own, f = 585, about 20 px away from colour, whose f is 525. uint16 millimetres, 
 camera-to-world with OpenCV axes; pixel centres lie at integers.
 """
 
+import re
 from functools import partial
 
 from r2c2r_core.geometry.camera import Intrinsics
@@ -21,7 +22,7 @@ _COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?:jpe?g
 
 def open_threedmatch(files: Files) -> Recording:
     """The first sequence of a 3DMatch or 7-Scenes scene; raises CaptureError."""
-    folders = sorted({name.rpartition("/")[0] for name in files.names() if Part("", _FOLDER + _DEPTH).is_in(frozenset({name}))})
+    folders = sorted({name.rpartition("/")[0] for name in files.names() if re.fullmatch(_FOLDER + _DEPTH, name)})
     prefix = f"{folders[0]}/" if folders[0] else ""
     colour, depth, poses = (numbered(files.names(), prefix + pattern) for pattern in (_COLOUR, _DEPTH, _POSE))
     size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")

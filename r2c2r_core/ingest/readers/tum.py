@@ -16,7 +16,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
@@ -74,9 +74,9 @@ class _Placed(NamedTuple):
 
 def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: int) -> _Placed:
     """A pose for each image, by clock; by line where the clocks have nothing in common and the lines are as many."""
-    rows, pose_lines = _pose_rows(files, pose_name)
-    table = np.array(sorted(rows.values(), key=lambda row: float(row[0])))
-    trajectory = Trajectory(table[:, 0], [_rigid(row[1:]) for row in table])
+    posed, pose_lines = _timed_poses(files, pose_name)
+    by_time = sorted(posed.values(), key=lambda timed: timed[0])
+    trajectory = Trajectory(np.array([time_s for time_s, _ in by_time]), [pose for _, pose in by_time])
     near = {n: trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for n, t in times_s.items()}
     if any(pose is not None for pose in near.values()):
         return _Placed({n: pose for n, pose in near.items() if pose is not None}, times_s, None)
@@ -86,29 +86,23 @@ def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: 
             hint="the pose file belongs to another recording",
         )
     return _Placed(
-        {n: _rigid(row[1:]) for n, row in rows.items()},
-        {n: float(row[0]) for n, row in rows.items()},
+        {n: pose for n, (_, pose) in posed.items()},
+        {n: time_s for n, (time_s, _) in posed.items()},
         f"the clocks of rgb.txt and {pose_name} differ, their counts agree: poses are matched by line",
     )
 
 
-def _rigid(row: np.ndarray) -> Rigid3:
-    from scipy.spatial.transform import Rotation
-
-    return Rigid3(Rotation.from_quat(row[3:]).as_matrix(), row[:3].copy())
-
-
-def _pose_rows(files: Files, name: str) -> tuple[dict[int, np.ndarray], int]:
-    """Rows `t x y z qx qy qz qw` by line, unusable ones left out, and how many lines there are."""
-    rows = {}
-    lines = lines_of(files, name)
+def _timed_poses(files: Files, name: str) -> tuple[dict[int, tuple[float, Rigid3]], int]:
+    """(time, pose) by line `t x y z qx qy qz qw`, unusable ones left out, and how many lines there are."""
+    posed, lines = {}, lines_of(files, name)
     for number, line in enumerate(lines):
         row = read_numbers(line.encode())
-        if row is not None and row.size >= 8 and np.isfinite(row[:8]).all() and 0.5 < np.linalg.norm(row[4:8]) < 2.0:
-            rows[number] = row[:8]
-    if not rows:
+        pose = None if row is None or row.size < 8 else pose_of_quaternion(row[1:8])
+        if row is not None and pose is not None and np.isfinite(row[0]):
+            posed[number] = float(row[0]), pose
+    if not posed:
         raise CaptureError(f"{files.source}/{name}: no line of the form 't x y z qx qy qz qw'", hint="check the pose file")
-    return rows, len(lines)
+    return posed, len(lines)
 
 
 def _image_list(files: Files, name: str) -> tuple[dict[int, tuple[float, str]], int]:
