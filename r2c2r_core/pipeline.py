@@ -185,7 +185,8 @@ def make_candidates(
     missing = {name: track for name, track in tracks.items() if name not in made}
     if not missing or chosen == GENERATORS.default:
         return made
-    excuses = {name: f"{chosen} made no mesh, {GENERATORS.default} stands in: {ledger.failures.pop(name)}" for name in missing}
+    reasons = {name: ledger.failures.pop(name).removeprefix(f"generate: {name}: ") for name in missing}
+    excuses = {name: f"{chosen} made no mesh, {GENERATORS.default} stands in: {why}" for name, why in reasons.items()}
     stood_in = made_by(GENERATORS.default, missing, excuses)
     return {name: {**made, **stood_in}[name] for name in tracks if name in made or name in stood_in}
 

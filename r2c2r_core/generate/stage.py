@@ -108,12 +108,16 @@ def generate_candidates(
     made, failures = _make_all(backend, evidence, config.count, seed, progress.part(0.1, 1.0))
     if not made and not given:
         raise GenerationFailed(
-            f"{track.name}: all {config.count} candidates failed: {failures[0]}",
+            f"{track.name}: {_count_of(failures)} failed: {failures[0]}",
             hint="add a click on a clearer frame, or upload a mesh",
         )
     if not made:  # what the person gave stands alone; why is said with it
         given = [_warned(asset, f"{generator} made no mesh: {failures[0]}") for asset in given]
     return choose_candidate([*made, *given], rejected=rejected, rule=config.rule)
+
+
+def _count_of(failures: list[str]) -> str:
+    return "the candidate" if len(failures) == 1 else f"all {len(failures)} candidates"
 
 
 def load_generator(name: str, config: GenerateConfig, progress: Progress = SILENT) -> MeshGenerator:
