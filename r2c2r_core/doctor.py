@@ -76,7 +76,12 @@ def _backends() -> list[MachineFinding]:
 
 def _loaders() -> list[MachineFinding]:
     findings = []
-    for package, hint in (("mujoco", ""), ("yourdfpy", ""), ("pybullet", "pip install 'r2c2r[bullet]'")):
+    for package, hint in (
+        ("mujoco", ""),
+        ("yourdfpy", ""),
+        ("usd-core", "pip install usd-core"),
+        ("pybullet", "pip install 'r2c2r[bullet]'"),
+    ):
         try:
             findings.append(MachineFinding(f"loader {package}", "ok", version(package)))
         except PackageNotFoundError:
