@@ -75,8 +75,34 @@ class FolderListing(Shape):
     entries: list[FolderEntry]
 
 
+class CaptureRemark(Shape):
+    """One thing that is wrong with a recording, how much it matters, and what to do."""
+
+    verdict: str  # good | usable with care | unusable
+    cause: str
+    text: str
+    advice: str
+
+
+class CaptureMoment(Shape):
+    """What one of the frames that the doctor looked at is like."""
+
+    frame_index: int
+    sharpness: float  # over the median frame's
+    depth_share: float
+    brightness: float
+    error_mm: float | None  # disagreement of its depth with a later frame's
+
+
+class CaptureFigure(Shape):
+    """One measured figure, as a person reads it."""
+
+    name: str
+    value: str
+
+
 class CaptureFacts(Shape):
-    """What the recording is: shown before any work starts."""
+    """What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png."""
 
     format: str = ""
     sha256: str = ""
@@ -90,7 +116,9 @@ class CaptureFacts(Shape):
     up_source: str = ""
     floor_found: bool = False
     verdict: str = ""  # good | usable with care | unusable
-    reasons: list[str] = Field(default_factory=list)
+    remarks: list[CaptureRemark] = Field(default_factory=list)  # worst first
+    figures: list[CaptureFigure] = Field(default_factory=list)
+    moments: list[CaptureMoment] = Field(default_factory=list)
 
 
 class FrameInfo(Shape):

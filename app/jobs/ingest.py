@@ -1,16 +1,18 @@
 """Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR`.
 
 A zipped folder is unpacked first. Beside the workspace it writes what the web process needs at hand without loading the
-recording: frames.json (the frame table) and facts.json (what the recording is, and its problems).
+recording: frames.json (the frame table), facts.json (what the recording is, and its problems) and pictures of the scan.
 """
 
 import argparse
 import json
 import sys
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from app import archives
@@ -50,9 +52,18 @@ def ingest(workdir: Path, folder: Path, progress: Progress) -> None:
 
 
 def describe(capture: Capture, folder: Path, source: Path | None) -> None:
-    """Write frames.json and facts.json."""
+    """Write frames.json, facts.json, scan-plan.png and scan-view.png."""
+    from r2c2r_core.ingest.doctor import draw_scan
+
+    for name, picture in draw_scan(capture)._asdict().items():
+        png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA))[1]
+        write_atomically(folder / f"scan-{name}.png", png.tobytes())
     write_atomically(folder / "frames.json", json.dumps(frame_table(capture)).encode())
-    facts = {"facts": capture_facts(capture), "notices": list(capture.notices), "source": str(source) if source else None}
+    facts = {
+        "facts": capture_facts(capture, source),
+        "notices": list(capture.notices),
+        "source": str(source) if source else None,
+    }
     write_atomically(folder / "facts.json", json.dumps(facts, indent=1).encode())
 
 
@@ -71,12 +82,15 @@ def frame_table(capture: Capture) -> list[dict[str, Any]]:
     ]
 
 
-def capture_facts(capture: Capture) -> dict[str, Any]:
+def capture_facts(capture: Capture, source: Path | None) -> dict[str, Any]:
     """schemas.CaptureFacts."""
+    from r2c2r_core.ingest.doctor import examine
+    from r2c2r_core.ingest.readers.table import open_recording
+
+    report = examine(capture, open_recording(source) if source else None)
     first = capture.frames[0]
     path = np.array([frame.world_from_camera.translation for frame in capture.frames])
     stamps = [frame.timestamp_s for frame in capture.frames if frame.timestamp_s is not None]
-    verdict, reasons = _examined(capture)
     return {
         "format": capture.format,
         "sha256": capture.sha256,
@@ -89,16 +103,11 @@ def capture_facts(capture: Capture) -> dict[str, Any]:
         "path_length_m": round(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), 3),
         "up_source": capture.room.up_source,
         "floor_found": capture.room.floor_found,
-        "verdict": verdict,
-        "reasons": reasons,
+        "verdict": report.verdict,
+        "remarks": [asdict(remark) for remark in report.remarks],
+        "figures": [{"name": name, "value": value} for name, value in report.rows()],
+        "moments": [asdict(moment) for moment in report.moments],
     }
-
-
-def _examined(capture: Capture) -> tuple[str, list[str]]:
-    from r2c2r_core.ingest.doctor import examine
-
-    report = examine(capture)
-    return report.verdict, list(report.reasons)
 
 
 def _plain_source(source: Path, folder: Path, progress: Progress) -> Path:

@@ -1,6 +1,6 @@
 """Pixels, meshes and bundles. What cannot change is cached for ever; the address changes when the content does."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
@@ -31,6 +31,12 @@ def depth_image(context: Ctx, request: Request, project: str, frame: FrameNumber
 def thumbnail(context: Ctx, request: Request, project: str, v: str = "") -> Response:
     """The project's picture."""
     return send(request, media.thumbnail(context, project), "image/jpeg", immutable=bool(v))
+
+
+@router.get("/scan/{side}.png", operation_id="scanPicture")
+def scan_picture(context: Ctx, request: Request, project: str, side: Literal["plan", "view"], v: str = "") -> Response:
+    """The fused scan with the camera's path, from above or from where it was filmed; transparent around it."""
+    return send(request, media.scan(context, project, side), "image/png", immutable=bool(v))
 
 
 @router.get("/candidates/{object}/{candidate}.glb", operation_id="candidateMesh")

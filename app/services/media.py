@@ -53,6 +53,14 @@ def thumbnail(context: Context, project_id: str) -> Path:
     return frame(context, project_id, int(best["index"]), 480)
 
 
+def scan(context: Context, project_id: str, side: str) -> Path:
+    """The fused scan from above ("plan") or from where it was filmed ("view"), drawn when the recording was read."""
+    path = _files(context, project_id).root / f"scan-{side}.png"
+    if not path.is_file():
+        raise NotFound("the scan was not drawn", hint="import the recording again")
+    return path
+
+
 def candidate_glb(context: Context, project_id: str, object_id: int, candidate: str) -> Path:
     """A candidate as GLB."""
     files, name = _object_files(context, project_id, object_id)

@@ -57,7 +57,7 @@ export interface CandidateGroup {
   can_redo: boolean;
 }
 
-/** What the recording is: shown before any work starts. */
+/** What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png. */
 export interface CaptureFacts {
   format: string;
   sha256: string;
@@ -71,7 +71,32 @@ export interface CaptureFacts {
   up_source: string;
   floor_found: boolean;
   verdict: string;
-  reasons: string[];
+  remarks: CaptureRemark[];
+  figures: CaptureFigure[];
+  moments: CaptureMoment[];
+}
+
+/** One measured figure, as a person reads it. */
+export interface CaptureFigure {
+  name: string;
+  value: string;
+}
+
+/** What one of the frames that the doctor looked at is like. */
+export interface CaptureMoment {
+  frame_index: number;
+  sharpness: number;
+  depth_share: number;
+  brightness: number;
+  error_mm: number | null;
+}
+
+/** One thing that is wrong with a recording, how much it matters, and what to do. */
+export interface CaptureRemark {
+  verdict: string;
+  cause: string;
+  text: string;
+  advice: string;
 }
 
 /** One line of the category table. */
@@ -699,6 +724,8 @@ export interface Operations {
   sceneReport: { parameters: { project: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/review.html */
   sceneReview: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/scan/{side}.png */
+  scanPicture: { parameters: { project: string; side: "plan" | "view"; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/scene.glb */
   sceneMesh: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/thumbnail.jpg */

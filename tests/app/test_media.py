@@ -38,6 +38,16 @@ def test_depth_is_a_coloured_picture(web: Running) -> None:
     assert answer.content.startswith(b"\x89PNG")
 
 
+def test_the_scan_drawn_when_it_was_read_is_sent(web: Running) -> None:
+    project = web.sample()
+    assert web.client.get(f"/media/{project}/scan/plan.png").json()["kind"] == "not-found"  # a project from before
+    drawn = web.settings.data_dir / "projects" / project / "scan-plan.png"
+    drawn.write_bytes(b"\x89PNG drawn")
+    answer = web.client.get(f"/media/{project}/scan/plan.png?v=1")
+    assert (answer.content, answer.headers["content-type"]) == (b"\x89PNG drawn", "image/png")
+    assert web.client.get(f"/media/{project}/scan/elsewhere.png").status_code == 422
+
+
 def test_a_bundle_download_can_go_on_where_it_stopped_and_is_known_by_its_checksum(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")

@@ -52,6 +52,8 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     page.wait_for_url(re.compile(r"/p/\w+"))
     page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
     expect(page.get_by_text("480 × 360")).to_be_visible()
+    expect(page.locator(".scan-pictures img")).to_have_count(2)
+    expect(page.get_by_role("img", name=re.compile("Sharpness over the frames"))).to_be_visible()
     picture(page, "2-overview")
 
     # Annotate: click, mask, name; a wrong click is undone

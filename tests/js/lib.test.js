@@ -3,6 +3,7 @@ import test from "node:test";
 import { ago, bytes, counted, duration, jointValue } from "../../static/js/lib/format.js";
 import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
+import { strips } from "../../static/js/lib/strips.js";
 import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
 
@@ -81,4 +82,23 @@ test("proposals are walked round the end, past those about to go", () => {
     surest(items, 0.6).map((item) => item.id),
     ["a", "b"],
   );
+});
+
+test("frames that stand out are marked in the strips", () => {
+  const usual = { sharpness: 1, depth_share: 0.9, brightness: 0.5, error_mm: 6 };
+  const odd = { sharpness: 0.2, depth_share: 0.1, brightness: 0.99, error_mm: 60 };
+  const moments = [usual, usual, usual, odd, { ...usual, error_mm: null }].map((m, k) => ({ ...m, frame_index: 5 * k }));
+  const found = strips(moments);
+  assert.deepEqual(
+    found.map((strip) => strip.name),
+    ["Sharpness", "Depth", "Brightness", "Disagreement"],
+  );
+  for (const { bars, summary } of found) {
+    assert.deepEqual(
+      bars.flatMap((bar) => (bar.off ? [bar.frame] : [])),
+      [15],
+    );
+    assert.match(summary, /^1 of 5 frames/);
+    assert.ok(bars.every((bar) => bar.height >= 0 && bar.height <= 1));
+  }
 });

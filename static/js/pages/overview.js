@@ -2,6 +2,7 @@
 
 import { changeProject, getHistory, getProject, getSystem } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
+import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
 import { JobPanel } from "../elements/job-panel.js";
 import { SegmenterChoice } from "../elements/segmenter-choice.js";
 import { sayError } from "../elements/toasts.js";
@@ -60,14 +61,12 @@ export class OverviewPage extends LiveElement {
       project.status === "ready"
         ? ""
         : h("section", { class: "card stack" }, h("h2", {}, "Importing"), failure(project), this.#job),
-      capture && project.status === "ready"
-        ? h(
-            "div",
-            { class: "split" },
-            h("div", { class: "stack" }, this.#facts(project, capture), this.#segmenter),
-            this.#cloud(),
-          )
-        : "",
+      ...(capture && project.status === "ready"
+        ? [
+            h("div", { class: "split" }, this.#facts(project, capture), scanCard(project)),
+            h("div", { class: "split" }, this.#segmenter, this.#cloud()),
+          ]
+        : []),
       h("section", { class: "stack" }, h("h2", {}, "History"), this.#history()),
     );
     if (capture && project.status === "ready" && !this.#shown) {
@@ -81,7 +80,6 @@ export class OverviewPage extends LiveElement {
    * @param {NonNullable<Project["capture"]>} capture
    */
   #facts(project, capture) {
-    const tone = capture.verdict === "good" ? "good" : capture.verdict === "unusable" ? "bad" : "warn";
     /** @type {[string, string][]} */
     const rows = [
       ["Format", capture.format],
@@ -97,10 +95,11 @@ export class OverviewPage extends LiveElement {
       "section",
       { class: "card stack" },
       h("h2", {}, "The recording"),
-      capture.verdict ? h("div", {}, h("span", { class: `chip ${tone}` }, capture.verdict)) : null,
+      verdictCard(capture),
       h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
-      list(capture.reasons),
       list(project.notices),
+      momentStrips(capture),
+      allFigures(capture),
     );
   }
 
@@ -129,6 +128,16 @@ export class OverviewPage extends LiveElement {
     }, sayError);
     return table;
   }
+}
+
+/** @param {Project} project */
+function scanCard(project) {
+  return h(
+    "section",
+    { class: "card stack" },
+    h("h2", {}, "The scan"),
+    scanPictures(project.id, project.media_version),
+  );
 }
 
 /** @param {string[]} lines */

@@ -1,0 +1,132 @@
+/** The capture doctor's report: verdict, what is wrong and what to do, the scan drawn, and plots over the frames. */
+
+import { h } from "../dom.js";
+import { strips } from "../lib/strips.js";
+
+/** @typedef {import("../api-types").CaptureFacts} CaptureFacts */
+/** @typedef {import("../lib/strips.js").Strip} Strip */
+
+const SVG = "http://www.w3.org/2000/svg";
+const HEIGHT = 28;
+
+/**
+ * The verdict with its remarks, worst first.
+ * @param {CaptureFacts} capture
+ */
+export function verdictCard(capture) {
+  return h(
+    "div",
+    { class: "stack verdict" },
+    h("p", {}, h("span", { class: `chip ${tone(capture.verdict)}` }, capture.verdict || "not examined")),
+    capture.remarks.length
+      ? h("ol", { class: "remarks" }, ...capture.remarks.map(remarkLine))
+      : h("p", { class: "muted" }, "Poses, depth and colour agree; nothing stands in the way."),
+  );
+}
+
+/** @param {CaptureFacts["remarks"][number]} remark */
+function remarkLine(remark) {
+  return h(
+    "li",
+    { class: tone(remark.verdict) },
+    h("span", {}, sentence(remark.text)),
+    h("span", { class: "muted" }, sentence(remark.advice)),
+  );
+}
+
+/**
+ * The fused scan from above and from where it was filmed.
+ * @param {string} project
+ * @param {string} version
+ */
+export function scanPictures(project, version) {
+  /** @type {[string, string, string][]} */
+  const sides = [
+    ["plan", "From above", "The scan from above, with the camera's path"],
+    ["view", "From where it was filmed", "The scan from where it was filmed, with the camera's path"],
+  ];
+  return h(
+    "div",
+    { class: "scan-pictures" },
+    ...sides.map(([side, caption, alt]) => {
+      const src = `/media/${encodeURIComponent(project)}/scan/${side}.png?v=${version}`;
+      const image = h("img", { src, alt, width: 960, height: 640, loading: "lazy" });
+      const figure = h("figure", {}, image, h("figcaption", { class: "muted" }, caption));
+      image.addEventListener("error", () => figure.remove()); // a project from before scans were drawn
+      return figure;
+    }),
+    h(
+      "p",
+      { class: "muted path-key" },
+      h("span", { class: "path-start" }),
+      "the camera's path begins",
+      h("span", { class: "path-end" }),
+      "and ends",
+    ),
+  );
+}
+
+/**
+ * Sharpness, depth, brightness and disagreement over the frames.
+ * @param {CaptureFacts} capture
+ */
+export function momentStrips(capture) {
+  if (capture.moments.length < 2) return null;
+  return h(
+    "dl",
+    { class: "strips" },
+    ...strips(capture.moments).flatMap((strip) => [
+      h("dt", {}, strip.name),
+      h("dd", {}, plot(strip), h("span", { class: "muted" }, strip.summary)),
+    ]),
+  );
+}
+
+/**
+ * Every figure that was measured, folded away.
+ * @param {CaptureFacts} capture
+ */
+export function allFigures(capture) {
+  if (!capture.figures.length) return null;
+  return h(
+    "details",
+    {},
+    h("summary", {}, "All figures"),
+    h(
+      "dl",
+      { class: "facts" },
+      ...capture.figures.flatMap(({ name, value }) => [h("dt", {}, name), h("dd", {}, value)]),
+    ),
+  );
+}
+
+/** @param {Strip} strip */
+function plot(strip) {
+  const svg = document.createElementNS(SVG, "svg");
+  svg.setAttribute("viewBox", `0 0 ${strip.bars.length} ${HEIGHT}`);
+  svg.setAttribute("preserveAspectRatio", "none");
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", `${strip.name} over the frames: ${strip.summary}`);
+  strip.bars.forEach((bar, k) => {
+    const rect = document.createElementNS(SVG, "rect");
+    const height = Math.max(bar.height * HEIGHT, 1);
+    const place = { x: k + 0.1, width: 0.8, y: HEIGHT - height, height };
+    for (const [name, value] of Object.entries(place)) rect.setAttribute(name, String(value));
+    if (bar.off) rect.setAttribute("class", "off");
+    const title = document.createElementNS(SVG, "title");
+    title.textContent = `frame ${bar.frame}: ${bar.text}`;
+    rect.append(title);
+    svg.append(rect);
+  });
+  return svg;
+}
+
+/** @param {string} verdict */
+function tone(verdict) {
+  return verdict === "good" ? "good" : verdict === "unusable" ? "bad" : "warn";
+}
+
+/** @param {string} text */
+function sentence(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+}
