@@ -99,7 +99,7 @@ class LearnedSession:
         return self.bench.prefetch()
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
-        """Frame, mask and confidence as the model gives them: clicked frames first, then outwards both ways."""
+        """As the model gives them: the frame clicked last, the other clicked ones, then outwards both ways."""
         return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
@@ -159,7 +159,8 @@ class LearnedSession:
         for point in prompt.points:
             camera = self.capture.frame(point.frame).rgb_camera
             click = Click(point.x / camera.width, point.y / camera.height, point.label)
-            clicks.setdefault(position_of[point.frame], []).append(click)
+            position = position_of[point.frame]
+            clicks[position] = [*clicks.pop(position, []), click]  # the frame clicked last comes last
         colour = self.model.follow(self._colour, len(frames), clicks)
         if self.config.fusion != "depth-mask":
             for seen in colour:

@@ -68,16 +68,17 @@ class VideoModel:
     def follow(
         self, image_at: Callable[[int], Image], count: int, clicks: Mapping[int, list[Click]], *, channel: str = "rgb"
     ) -> Iterator[Seen]:
-        """The object in all of `count` frames: the clicked ones first, then outwards both ways.
+        """The object in all of `count` frames: the one clicked last, the other clicked ones, then outwards both ways.
 
-        `clicks` holds at least one click on the object. The frame of the first such click starts; a click in another frame
-        is read with the memory of those before it, so that a lone click off the object makes sense there.
+        `clicks` are in the order of their frames' last click, at least one of them on the object. The frame of the first
+        such click is read alone; the others with the memory of those before, so that a lone click off the object makes sense.
         """
         follower = _Follower(self, image_at, channel)
-        ordered = _clicked_order(clicks)
-        for position in ordered:
-            yield follower.look(position, clicks[position])
-        for position in _outwards(ordered[0], count):
+        clicked = {position: follower.look(position, clicks[position]) for position in _read_order(clicks)}
+        start = list(clicks)[-1]
+        yield from sorted(clicked.values(), key=lambda seen: abs(seen.position - start))
+        follower.start_from(start)
+        for position in _outwards(start, count):
             if position not in clicks:
                 yield follower.look(position)
 
@@ -154,12 +155,15 @@ class _Follower:
         config = owner.model.config
         self.reach = max(int(config.num_maskmem), int(config.max_object_pointers_in_encoder))
 
+    def start_from(self, position: int) -> None:
+        """Where the two directions part."""
+        self.start = self.ahead = self.behind = position
+
     def look(self, position: int, clicks: list[Click] | None = None) -> Seen:
         """The object in one frame, by its clicks there or by what is remembered of it."""
         first = self.start is None
-        if first:
-            self.start = self.ahead = self.behind = position
-        assert self.start is not None
+        if self.start is None:
+            self.start = position
         image = self.image_at(position)
         if clicks:
             self._click(position, clicks, first=first)
@@ -233,7 +237,7 @@ class _Follower:
         return Seen(position, mask, present * sure / maybe if maybe else 0.0)
 
 
-def _clicked_order(clicks: Mapping[int, list[Click]]) -> list[int]:
+def _read_order(clicks: Mapping[int, list[Click]]) -> list[int]:
     """The first frame with a click on the object, then the others by their distance from it."""
     start = next(position for position, here in clicks.items() if any(click.label for click in here))
     return sorted(clicks, key=lambda position: (abs(position - start), position))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.geometric import GeometricSession
 from r2c2r_core.segment.learned import LearnedSession
 from r2c2r_core.segment.sam_video import SAM2, Click, Seen
-from r2c2r_core.segment.stage import SegmentConfig
+from r2c2r_core.segment.stage import SegmentConfig, open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, prompt
 
@@ -36,7 +37,7 @@ class TrueMasks:
     def follow(
         self, image_at: Callable[[int], np.ndarray], count: int, clicks: Mapping[int, list[Click]], *, channel: str = "rgb"
     ) -> Iterator[Seen]:
-        start = next(iter(clicks))
+        start = list(clicks)[-1]
         for position in sorted(range(count), key=lambda p: (abs(p - start), -p)):
             assert image_at(position).dtype == np.uint8
             self.asked.append(position)
@@ -170,6 +171,13 @@ def test_the_real_class_with_random_weights_runs_through(session: GeometricSessi
     assert [frame for frame, _, _ in found][:5] == [60, 70, 50, 80, 40]
     assert len(found) == len(boxes[0].frames)
     assert {(packed.width, packed.height) for _, packed, _ in found} == {(480, 360)}
+
+
+def test_a_session_opens_by_name_from_a_folder_of_weights(boxes: Boxes, cache: Path, tmp_path: Path) -> None:
+    tiny(SAM2).model.save_pretrained(tmp_path)
+    learned = open_session(boxes[0], cache, "sam2", SegmentConfig(weights=str(tmp_path), least_area_px=0))
+    two = prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 60), click_on(boxes[0], (1.3, -0.36, 1.0), 90, 0))
+    assert [frame for (frame, _, _), _ in zip(learned.stream(two), range(3), strict=False)] == [90, 60, 100]
 
 
 def _moved(mask: np.ndarray, rows: int) -> np.ndarray:
