@@ -1,7 +1,8 @@
 """Objects proposed without a click: confirmed ones become objects like any other, dismissals are remembered as events."""
 
 import time
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from sqlmodel import Session, col, select
@@ -22,25 +23,19 @@ _SCOPE = "proposals"
 
 def current(context: Context, project_id: str) -> schemas.Proposals:
     """What is proposed now."""
-    with reading(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        gone = _dismissed(session, project_id)
-    at_work = context.live.proposing(project_id)
-    stored = read_proposals(context.files(project).proposals) if at_work is None else None
-    lines = at_work[1] if at_work is not None else stored or []
-    left = _without_objects(context, project_id, lines)
+    found = _look(context, project_id)
+    left = _without_covered(context, project_id, found.lines)
     return schemas.Proposals(
-        state="running" if at_work is not None else "none" if stored is None else "done",
-        fraction=at_work[0] if at_work is not None else float(stored is not None),
-        items=[_shape(line) for line in left if line["id"] not in gone],
-        dismissed=sum(line["id"] in gone for line in left),
+        state=found.state,
+        fraction=found.fraction,
+        items=[_shape(line) for line in left if line["id"] not in found.dismissed],
+        dismissed=sum(line["id"] in found.dismissed for line in left),
     )
 
 
 def confirm(context: Context, project_id: str, ids: list[str]) -> list[schemas.SceneObject]:
     """Make objects of proposals: each its click, under its category."""
-    items = {item.id: item for item in current(context, project_id).items}
-    wanted = [_known(items, proposal) for proposal in dict.fromkeys(ids)]
+    wanted = _wanted(context, project_id, ids)
     made = [
         prompts.create(
             context,
@@ -57,8 +52,7 @@ def confirm(context: Context, project_id: str, ids: list[str]) -> list[schemas.S
 
 def dismiss(context: Context, project_id: str, ids: list[str]) -> schemas.Proposals:
     """Leave proposals out from now on."""
-    items = {item.id: item for item in current(context, project_id).items}
-    wanted = [_known(items, proposal) for proposal in dict.fromkeys(ids)]
+    wanted = _wanted(context, project_id, ids)
     with writing(context.engine) as session:
         for item in wanted:
             text = f"dismissed a proposed {item.category}, frame {item.frame}"
@@ -77,10 +71,39 @@ def restore(context: Context, project_id: str) -> schemas.Proposals:
     return current(context, project_id)
 
 
-def _known(items: dict[str, schemas.Proposal], proposal: str) -> schemas.Proposal:
-    if proposal not in items:
-        raise NotFound(f"no proposal {proposal}", hint="it may have been confirmed or dismissed meanwhile")
-    return items[proposal]
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What the segmenter proposed, less what was confirmed."""
+
+    state: Literal["none", "running", "done"]
+    fraction: float
+    lines: list[dict[str, Any]]
+    dismissed: set[str]
+
+
+def _look(context: Context, project_id: str) -> _Found:
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        dismissed = _dismissed(session, project_id)
+        points = [point for item in queries.live_objects(session, project_id) for point in queries.points_of(session, item.id)]
+    clicks = {(point.frame, point.x, point.y) for point in points if point.label}
+    at_work = context.live.proposing(project_id)
+    stored = read_proposals(context.files(project).proposals) if at_work is None else None
+    lines = at_work[1] if at_work is not None else stored or []
+    left = [line for line in lines if (line["frame"], line["x"], line["y"]) not in clicks]
+    if at_work is not None:
+        return _Found("running", at_work[0], left, dismissed)
+    return _Found("none" if stored is None else "done", float(stored is not None), left, dismissed)
+
+
+def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.Proposal]:
+    """The proposals with these ids; raises NotFound for one that is not open any more."""
+    found = _look(context, project_id)
+    items = {line["id"]: _shape(line) for line in found.lines if line["id"] not in found.dismissed}
+    for proposal in ids:
+        if proposal not in items:
+            raise NotFound(f"no proposal {proposal}", hint="it may have been confirmed or dismissed meanwhile")
+    return [items[proposal] for proposal in dict.fromkeys(ids)]
 
 
 def _event(context: Context, project_id: str, action: str, text: str, frame: int | None, after: dict[str, Any] | None) -> Event:
@@ -100,16 +123,12 @@ def _dismissed(session: Session, project_id: str) -> set[str]:
     return gone
 
 
-def _without_objects(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The proposals that no object covers, whether it was confirmed or clicked."""
-    objects = prompts.list_objects(context, project_id, deleted=False)
-    clicks = {(point.frame, point.x, point.y) for item in objects for point in item.points if point.label}
+def _without_covered(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The proposals that no object's mask covers: what was clicked by hand is proposed no more."""
     shown: dict[int, list[np.ndarray]] = {}
     left = []
     for line in lines:
         frame = line["frame"]
-        if (frame, line["x"], line["y"]) in clicks:
-            continue
         if frame not in shown:
             shown[frame] = [bits_mask(mask.mask.model_dump()) for mask in masks.on_frame(context, project_id, frame)]
         outline = bits_mask(line["mask"])

@@ -34,21 +34,23 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     page.keyboard.press("y")
     expect(rows).to_have_count(count - 1)
     expect(rows.first).to_have_class("current")  # the next one
-    expect(objects.get_by_role("listitem")).to_have_count(1)
+    expect(objects.locator(".head")).to_have_count(1, timeout=LONG_MS)
     expect(objects).to_contain_text(re.compile(r"1 click · \d+ frames"), timeout=LONG_MS)
     picture(page, "13-proposal-confirmed")
 
     page.keyboard.press("Control+z")
-    expect(rows).to_have_count(count)
-    expect(page.locator(".toast").last).to_contain_text("confirmed proposal")
+    expect(page.locator(".toast", has_text="Undone: confirmed proposal")).to_be_visible(timeout=LONG_MS)
+    expect(rows).to_have_count(count, timeout=LONG_MS)
 
     page.keyboard.press("n")
     page.keyboard.press("x")
     expect(rows).to_have_count(count - 1)
-    page.reload()
-    expect(page.get_by_role("button", name="Bring back 1 dismissed")).to_be_visible(timeout=LONG_MS)
-    page.get_by_role("button", name="Bring back 1 dismissed").click()
-    expect(rows).to_have_count(count)
+    restore = page.get_by_role("button", name="Bring back 1 dismissed")
+    expect(restore).to_be_visible(timeout=LONG_MS)
+    page.reload()  # remembered
+    expect(restore).to_be_visible(timeout=LONG_MS)
+    restore.click()
+    expect(rows).to_have_count(count, timeout=LONG_MS)
 
     page.get_by_label("Least confidence").select_option("0.5")
     sure = int(proposals.get_by_role("button", name=re.compile(r"^Confirm \d+$")).inner_text().split()[1])
@@ -59,6 +61,6 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     picture(page, "14-proposals-dark")
     page.keyboard.press("Shift+Y")
     expect(objects.locator(".object-list > li")).to_have_count(sure, timeout=LONG_MS)
-    expect(rows).to_have_count(count - sure)
+    expect(rows).to_have_count(count - sure, timeout=LONG_MS)
     expect(objects).not_to_contain_text("finding it", timeout=LONG_MS)
     picture(page, "15-all-confirmed-dark")

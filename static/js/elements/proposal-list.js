@@ -35,7 +35,9 @@ export class ProposalList extends LiveElement {
   #bulk = h("div", { class: "row" }, this.#every, h("span", { class: "muted" }, "from"), this.#least);
   #restore = h("button", { type: "button", class: "quiet" });
   #timer = 0;
-  #busy = false;
+  /** @type {Set<string>} ids that are being confirmed or dismissed */
+  #going = new Set();
+  #saving = Promise.resolve();
 
   connected() {
     this.#least.value = "0.8";
@@ -123,40 +125,45 @@ export class ProposalList extends LiveElement {
 
   /** @param {string[]} ids */
   #confirm(ids) {
-    const next = ids.length === 1 ? neighbour(this.#all.items, this.#current, 1, new Set(ids)) : null;
-    this.#act(async () => {
+    this.#leave(ids, async () => {
       const made = await confirmProposals(this.project, ids);
-      this.#all = { ...this.#all, items: this.#all.items.filter((item) => !ids.includes(item.id)) };
       this.emit("objects-made", made);
       say(made.length === 1 ? `Confirmed ${made[0]?.name}` : `Confirmed ${counted(made.length, "proposal")}`);
-      this.#show(next);
     });
   }
 
   /** @param {Proposal} item */
   #dismiss(item) {
-    const next = neighbour(this.#all.items, item.id, 1, new Set([item.id]));
-    this.#act(async () => {
-      this.#take(await dismissProposals(this.project, [item.id]));
-      this.#show(next);
+    this.#leave([item.id], async () => {
+      await dismissProposals(this.project, [item.id]);
     });
   }
 
   /**
-   * One change at a time: a key held down must not confirm twice.
+   * Take proposals off the list and go to the next at once; storing follows, one change after the other.
+   * @param {string[]} ids
    * @param {() => Promise<void>} change
    */
-  async #act(change) {
-    if (this.#busy) return;
-    this.#busy = true;
-    try {
-      await change();
-    } catch (error) {
-      sayError(error);
-      await this.load();
-    } finally {
-      this.#busy = false;
-    }
+  #leave(ids, change) {
+    const next = ids.length === 1 ? neighbour(this.#all.items, ids[0] ?? null, 1, new Set(ids)) : null;
+    for (const id of ids) this.#going.add(id);
+    this.#all = { ...this.#all, items: this.#all.items.filter((item) => !this.#going.has(item.id)) };
+    this.#show(next);
+    this.#act(change, ids);
+  }
+
+  /**
+   * @param {() => Promise<void>} change
+   * @param {string[]} ids
+   */
+  #act(change, ids = []) {
+    this.#saving = this.#saving
+      .then(change)
+      .catch(sayError)
+      .then(() => {
+        for (const id of ids) this.#going.delete(id);
+        return this.load();
+      });
   }
 
   /** @param {Proposal | null} item */
@@ -170,7 +177,7 @@ export class ProposalList extends LiveElement {
 
   /** @param {Proposals} all */
   #take(all) {
-    this.#all = all;
+    this.#all = { ...all, items: all.items.filter((item) => !this.#going.has(item.id)) };
     if (!this.#chosen) this.#current = null;
     this.#draw();
     this.emit("proposals-changed");

@@ -35,6 +35,8 @@ import { remember } from "../router.js";
 
 const PREFETCH = 12;
 const FRAME_MS = 100;
+/** What a key held down must not do again and again. */
+const ONE_A_PRESS = new Set(["confirm-proposal", "dismiss-proposal", "confirm-all"]);
 
 export class AnnotatePage extends LiveElement {
   project = "";
@@ -514,7 +516,7 @@ export class AnnotatePage extends LiveElement {
     const act = this.#actions[action];
     if (!act) return;
     event.preventDefault();
-    act();
+    if (!(event.repeat && ONE_A_PRESS.has(action))) act();
   }
 
   /** @type {Record<string, () => void>} */
