@@ -17,6 +17,7 @@ from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 
 _CANDIDATES = 36  # lines tried a direction
+_SHADOW_M = 0.02  # lines this near above a support are its shadow's
 _COVERED = 1.2  # what depth saw of the plane weighs as much as all four edges: it belongs to the appliance
 _TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
 
@@ -31,8 +32,10 @@ class ApplianceSize:
     spread: float = 0.15  # of sizes about the usual one, as a share
 
 
-def find_rectangle(run: Run, clicks: np.ndarray, size: ApplianceSize, refused: np.ndarray) -> Cell | None:
-    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size."""
+def find_rectangle(
+    run: Run, clicks: np.ndarray, size: ApplianceSize, refused: np.ndarray, support_row: float | None = None
+) -> Cell | None:
+    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support."""
     cell_m = run.grid.cell_m
     low, high = clicks.min(axis=0), clicks.max(axis=0)
     part = _component(run, clicks)
@@ -40,6 +43,8 @@ def find_rectangle(run: Run, clicks: np.ndarray, size: ApplianceSize, refused: n
     vertical, horizontal = _sums(upright), _sums(level)
     columns = _candidates(upright, low[1], high[1], 0.4 * size.height[0] / cell_m)
     rows = _candidates(level, low[0], high[0], 0.4 * size.width[0] / cell_m)
+    if support_row is not None:
+        rows = np.append(rows[rows < support_row - _SHADOW_M / cell_m], support_row)
     support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     best: tuple[float, Cell] | None = None
     for left in columns[columns < low[0]]:

@@ -18,8 +18,9 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.appliance_clicks import appliance_margins
 from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
-from r2c2r_core.segment.finders import appliance_margins, find_object, glimpse_object
+from r2c2r_core.segment.finders import find_object, glimpse_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import kept
 from r2c2r_core.segment.prompts import check_prompt

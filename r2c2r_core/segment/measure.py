@@ -16,7 +16,6 @@ from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
 from r2c2r_core.segment.consensus import Body, vote, voting_frames
 from r2c2r_core.segment.cut import Cell, joined
 from r2c2r_core.segment.edges import as_lab, panel_edges
-from r2c2r_core.segment.finders import Workbench
 from r2c2r_core.segment.fronts import Front, front_panel, wall_behind
 from r2c2r_core.segment.handles import find_handles
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -24,6 +23,7 @@ from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import support_height
+from r2c2r_core.segment.workbench import Workbench
 
 _GRID_STEP_M = 0.01  # of the votes on a plane
 _COVERED = 0.6  # of the votes: what some views add at one side stays out

@@ -12,6 +12,7 @@ from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import Thing
 
 _ATTACHED_M, _ATTACHED_ODDS = 0.035, 3.2  # handles and caps that hulls lack: depth and colour together may add them
+_SURE_ODDS = 9.0
 _ON_SUPPORT_M = 0.008  # above it: lower points are the support's
 _POSE_ERROR_M = 0.04  # of the height of a support between frames, at most
 
@@ -31,9 +32,19 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
     odds = seen_odds(thing, scene, frame, area)
     hull = _moved(hull, _best_shift(hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale)))
     odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), _ATTACHED_M * scale)
-    odds[hidden] = -9.0
+    odds[hidden] = -_SURE_ODDS
+    for click in thing.clicks:
+        if click.frame == frame.index:
+            _mark(odds, click.x - area[1].start, click.y - area[0].start, 0.004 * scale, click.label)
     empty[area] = _held_by(cut_pixels(rgb, odds), hull) & ~hidden
     return empty, share
+
+
+def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: int) -> None:
+    """Settle the pixels under a click."""
+    row, column = np.ogrid[: odds.shape[0], : odds.shape[1]]
+    near = np.hypot(column + 0.5 - x_px, row + 0.5 - y_px) < max(radius_px, 2.0)
+    odds[near] = _SURE_ODDS if label else -_SURE_ODDS
 
 
 def seen_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
@@ -181,8 +192,8 @@ def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
     inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     deep = min(band_px, 0.5 * float(inside.max()))
     steps = np.where(hull, (inside - 0.5) / max(deep, 0.5), (0.5 - outside) / band_px)
-    odds = np.clip(steps * (1 + steps**2 / 4), -_ATTACHED_ODDS, 9)
-    odds[outside > attached_px] = -9
+    odds = np.clip(steps * (1 + steps**2 / 4), -_ATTACHED_ODDS, _SURE_ODDS)
+    odds[outside > attached_px] = -_SURE_ODDS
     return np.asarray(odds)
 
 

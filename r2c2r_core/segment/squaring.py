@@ -14,7 +14,7 @@ from r2c2r_core.segment.things import ThingConfig, support_height
 
 _SHELL_M = 0.05  # how far the rectangle may be off
 _FACING = 0.85  # cosine: normals of noisy scans scatter
-_LEAST_SHARE = 0.12  # of a face, that depth must have seen to measure anything by it
+_LEAST_SHARE = 0.07  # of a face, that depth must have seen to measure anything by it
 _STRAY_M, _LEAST_NOISE_M = 0.008, 0.003  # of fused depth; it goes together over about _PATCH_M2
 _PATCH_M2 = 9e-4
 _SURE_RAD = np.radians(0.7)

@@ -8,6 +8,7 @@ from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.mincut import VoxelGraph, build_graph, cut
 from r2c2r_core.segment.occlusion import refine_border
 from r2c2r_core.segment.pixels import ColourModel
@@ -44,6 +45,7 @@ class Thing:
     pose_error_m: float = 0.02  # how far a frame may show it from where it stands
     border_m: float = 0.006  # how far its outline may be off
     colours: ColourModel | None = None  # learned from where frames are sure
+    clicks: tuple[PromptPoint, ...] = ()  # what a person said of single pixels holds in their frames
 
     @property
     def points(self) -> Points:

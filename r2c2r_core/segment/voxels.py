@@ -64,8 +64,8 @@ def part_at(solid: np.ndarray, voxels: Voxels, positives: Points, negatives: Poi
         label = label_near(labels, voxels, point, reach_m)
         if label:
             chosen.add(label)
-    for point in negatives:
-        chosen.discard(label_near(labels, voxels, point, reach_m / 2))
+    refused = {label_near(labels, voxels, point, reach_m / 2) for point in negatives}
+    chosen = chosen - refused or chosen  # a click off it, beside its border, refuses no part that a click on it chose
     if not chosen:
         return None
     part = np.isin(labels, sorted(chosen))

@@ -1,0 +1,164 @@
+"""From clicks to the front of an appliance: on its front, its glass, a side or the top."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.segment.appliances import ApplianceSize, find_rectangle, measure_depth
+from r2c2r_core.segment.categories import APPLIANCE_SIZES, CategoryHint
+from r2c2r_core.segment.cut import Cell
+from r2c2r_core.segment.edges import as_lab, panel_edges
+from r2c2r_core.segment.fronts import Front, near_plane, nudged, wall_behind
+from r2c2r_core.segment.handles import find_handles
+from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
+from r2c2r_core.segment.runs import Run
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.squaring import squared
+from r2c2r_core.segment.things import ThingConfig, support_height
+from r2c2r_core.segment.workbench import Workbench
+
+_LOW_M = 0.6  # lower appliances stand on worktops
+_OFF_FRONT_M = 0.04  # behind its plane: a side or the top
+_PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
+
+
+def appliance_front(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points) -> tuple[Front, bool] | None:
+    """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
+
+    Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere.
+    """
+    assert hint.appliance is not None
+    clicks = [click for click in prompt.points if click.label == 1]
+    found = _plane_of(bench, clicks[0], hint)
+    if found is None:
+        return None
+    region, point = found
+    room = bench.scene.capture.room
+    run = bench.run_of(region, margin_m=_margin(region, hint.appliance))
+    if run is None:
+        return None
+    on = run.grid.cells_of(np.array([point, *_on_plane(bench, region, clicks[1:])]))
+    off = run.grid.cells_of(near_plane(run, negatives))
+    cell = _rectangle(run, on, off, hint.appliance, _support_row(bench, run, point, hint.appliance))
+    if cell is None:
+        return None
+    lab, seen_colour = as_lab(run.mosaic)
+    cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
+    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    front = Front(run, cell, handle, hint.depth_m)
+    wall = wall_behind(run, cell, room, hint.depth_m)
+    depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
+    front = squared(replace(front, depth_m=depth), bench.scene)
+    front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
+    return front, seen
+
+
+def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize, support_row: float | None) -> Cell | None:
+    """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
+    cell = find_rectangle(run, on[:1], size, off[:0], support_row)
+    if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
+        on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
+        cell = find_rectangle(run, on[:1], size, off[:0], support_row)
+    if cell is None:
+        return None
+    missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
+    wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
+    if not missed and not wrong:
+        return cell
+    return find_rectangle(run, np.array([on[0], *missed]), size, np.array(wrong).reshape(-1, 2), support_row) or cell
+
+
+def _support_row(bench: Workbench, run: Run, point: Vector3, size: ApplianceSize) -> float | None:
+    """The row of the run's grid at which what a small appliance stands on lies; None for tall ones and where none was seen."""
+    if size.height[2] > _LOW_M:
+        return None
+    support = support_height(bench.scene, point[None], ThingConfig(radius_m=size.width[1] / 2))
+    if support is None:
+        return None
+    row = float(run.grid.cells_of(np.array([[point[0], point[1], support]]))[0, 1])
+    return row if row < run.grid.rows else None
+
+
+def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
+    """The rectangle with its borders moved to the clicks beside them."""
+    for label, clicks in ((1, on), (0, off)):
+        for column, row in clicks:
+            cell = nudged(cell, column, row, label, cell_m) or cell
+    return cell
+
+
+def _on_plane(bench: Workbench, region: PlaneRegion, clicks: list[PromptPoint]) -> list[Vector3]:
+    """Where clicks meet the front's plane; those whose depth shows a side or the top say nothing about the front."""
+    points = []
+    for click in clicks:
+        seen = bench.scene.pick(click.frame, click.x, click.y)
+        has_depth = bench.scene.has_depth(click.frame, click.x, click.y)
+        if has_depth and seen is not None and _behind(region, seen) > _OFF_FRONT_M:
+            continue
+        origin, ray = bench.scene.ray(click.frame, click.x, click.y)
+        met = region_along((region,), origin, ray, 10.0, 1.0)
+        points += [met[1]] if met else []
+    return points
+
+
+def _plane_of(bench: Workbench, click: PromptPoint, hint: CategoryHint) -> tuple[PlaneRegion, Vector3] | None:
+    """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
+    scene = bench.scene
+    origin, ray = scene.ray(click.frame, click.x, click.y)
+    point = scene.pick(click.frame, click.x, click.y)
+    if scene.has_depth(click.frame, click.x, click.y) and point is not None:
+        region = region_at(bench.planes, point)
+        front = _front_before(bench, point, hint)
+        if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
+            return front, _support_near(front, point)
+        if region is not None:
+            return region, point
+    farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
+    assert hint.appliance is not None
+    small = tuple(plane for plane in bench.planes if plane.width_m < 2.5 * hint.appliance.width[2])
+    return region_along(small, origin, ray, farthest, hint.appliance.width[2])
+
+
+def _front_before(bench: Workbench, point: Vector3, hint: CategoryHint) -> PlaneRegion | None:
+    """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
+    assert hint.appliance is not None
+    planes = [
+        plane
+        for plane in bench.planes
+        if plane.width_m < 1.3 * hint.appliance.width[2]
+        and _OFF_FRONT_M < _behind(plane, point) < hint.appliance.depth + 0.1
+        and plane.supports(point[None], 0.12)[0]
+    ]
+    return max(planes, key=lambda plane: _faced(bench.scene, plane, point), default=None)
+
+
+def _behind(plane: PlaneRegion, point: Vector3) -> float:
+    return -float((point - plane.world_from_plane.translation) @ plane.outward)
+
+
+def _faced(scene: Scene, plane: PlaneRegion, point: Vector3) -> float:
+    """How squarely the recording looks at a plane: the mean cosine over the cameras."""
+    towards = np.stack([frame.world_from_camera.translation for frame in scene.frames]) - point
+    return float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).mean())
+
+
+def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
+    """A point of what was seen of a plane, near to another point."""
+    seen = plane.points
+    order = np.argsort(np.linalg.norm(seen - point, axis=1))
+    return np.asarray(seen[order[: max(1, round(0.06**2 / plane.cell_m**2))]].mean(axis=0))
+
+
+def _margin(region: PlaneRegion, size: ApplianceSize) -> float:
+    """How far the front may reach beyond what depth saw of it."""
+    missing = max(size.width[1] - region.width_m, size.height[1] - region.height_m, 0.0)
+    return round(missing + 0.05, 2) if missing > 0.08 else 0.0
+
+
+def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
+    """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
+    sizes = [size for size in APPLIANCE_SIZES if region.width_m < size.width[2] and region.height_m < size.height[2]]
+    margins = {_margin(region, size) for size in sizes}
+    return tuple(sorted(margin for margin in margins if 0 < margin <= _PREPARED_MARGIN_M))
