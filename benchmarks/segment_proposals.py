@@ -60,13 +60,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             continue
         seeds[str(seed)] = bench_seed(sample, options.workdir / f"seed{seed}", options.pictures)
         print(seed, json.dumps(seeds[str(seed)]), flush=True)
+        if options.update:
+            store({str(seed): seeds[str(seed)]})
     if not seeds:
         return 2
     print(_table(seeds))
-    if options.update:
-        stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
-        RESULTS.write_text(json.dumps(stored | {"proposals": {"seeds": seeds, "all": _all(seeds)}}, indent=1) + "\n")
     return 0
+
+
+def store(seeds: dict[str, dict[str, Any]]) -> None:
+    """Put these seeds' figures among those measured before."""
+    stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
+    merged = dict(sorted((stored.get("proposals", {}).get("seeds", {}) | seeds).items()))
+    stored["proposals"] = {"seeds": merged, "all": _all(merged)}
+    RESULTS.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
 
 
 def bench_seed(sample: Path, folder: Path, pictures: Path | None) -> dict[str, Any]:
