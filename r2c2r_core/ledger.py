@@ -72,6 +72,11 @@ class Ledger:
         progress.at(1.0, "done")
         return results
 
+    def stored(self, stage: Stage, name: str, item: Kept[S], inputs: tuple[object, ...]) -> Any | None:
+        """What an earlier run made of the item with these inputs, when nothing has taken its place yet."""
+        found = self.work.find(stage, name, content_key(stage, _code_key(stage), item.key, inputs))
+        return None if found is None else found[0]
+
     def sort_out(self, stage: Stage, items: Mapping[str, Kept[S]], decide: Callable[[str, S], T]) -> dict[str, Kept[T]]:
         """Quick decisions on a stage's results, with the same treatment of failures; their keys stay."""
         results: dict[str, Kept[T]] = {}

@@ -12,7 +12,7 @@ from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.errors import StageError
 from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.consensus import Rule, choose_candidate, chosen_by_person
-from r2c2r_core.generate.stage import GENERATORS, generate_candidates, marked
+from r2c2r_core.generate.stage import GENERATORS, generate_candidates, marked, with_uploads
 from r2c2r_core.ingest.stage import read_capture
 from r2c2r_core.ledger import Kept, Ledger, Reached, Stage, keys_of
 from r2c2r_core.model.capture import Capture
@@ -156,31 +156,27 @@ def make_candidates(
 ) -> dict[str, Kept[CandidateSet]]:
     """Every object's candidates. Where the chosen generator fails on one, the weight-free one stands in, with a warning.
 
-    The failure is not stored, so that the next run asks the chosen generator again.
+    The failure is not stored, so that the next run asks the chosen generator again. A mesh given by a person joins the
+    candidates that are there: nothing is generated anew for it.
     """
+    config, chosen = request.config.generate, request.tools.generator
 
     def made_by(
         generator: str, objects: dict[str, Kept[MaskTrack]], excuse: Mapping[str, str]
     ) -> dict[str, Kept[CandidateSet]]:
-        return ledger.each(
-            "generate",
-            objects,
-            lambda name: (generator, config, request.seed, *map(file_key, _uploads(request.overrides, name)), excuse.get(name)),
-            lambda name, track, p: _marked(
-                generate_candidates(
-                    capture,
-                    track,
-                    generator,
-                    config,
-                    uploads=_uploads(request.overrides, name),
-                    seed=request.seed,
-                    progress=p,
-                ),
-                excuse.get(name),
-            ),
-        )
+        def inputs(name: str, given: tuple[Path, ...]) -> tuple[object, ...]:
+            return generator, config, request.seed, excuse.get(name), *map(file_key, given)
 
-    config, chosen = request.config.generate, request.tools.generator
+        def make(name: str, track: MaskTrack, progress: Progress) -> CandidateSet:
+            given = _uploads(request.overrides, name)
+            before = ledger.stored("generate", name, tracks[name], inputs(name, ())) if given else None
+            if before is not None:
+                return with_uploads(before, given, config.rule)
+            found = generate_candidates(capture, track, generator, config, uploads=given, seed=request.seed, progress=progress)
+            return marked(found, excuse[name]) if name in excuse else found
+
+        return ledger.each("generate", objects, lambda name: inputs(name, _uploads(request.overrides, name)), make)
+
     made = made_by(chosen, tracks, {})
     missing = {name: track for name, track in tracks.items() if name not in made}
     if not missing or chosen == GENERATORS.default:
@@ -189,10 +185,6 @@ def make_candidates(
     excuses = {name: f"{chosen} made no mesh, {GENERATORS.default} stands in: {why}" for name, why in reasons.items()}
     stood_in = made_by(GENERATORS.default, missing, excuses)
     return {name: {**made, **stood_in}[name] for name in tracks if name in made or name in stood_in}
-
-
-def _marked(found: CandidateSet, excuse: str | None) -> CandidateSet:
-    return found if excuse is None else marked(found, excuse)
 
 
 def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) -> CandidateSet:

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 import cv2
 
 from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed, InputError, R2C2RError
-from r2c2r_core.generate.consensus import choose_candidate
+from r2c2r_core.generate.consensus import Rule, choose_candidate
 from r2c2r_core.generate.evidence import Evidence, gather_evidence
 from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.upload import read_upload
@@ -74,7 +73,7 @@ class GenerateConfig:
 
     count: int = 5  # the paper samples up to 10; 5 take about 4 s an object on one core
     pool_frames: int = 20  # the paper divides the images into 20 intervals (§4.2)
-    rule: Literal["medoid", "mean"] = "medoid"  # "mean" is the paper's; see consensus.py for why not
+    rule: Rule = "medoid"  # "mean" is the paper's; see consensus.py for why not
     weights: str = ""  # of a learned generator: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
     url: str = field(default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""))  # of the remote generator
 
@@ -101,7 +100,7 @@ def generate_candidates(
     A candidate that fails is left out; raises GenerationFailed when none is left, OverrideError for an unusable upload, and
     BackendUnavailable when the generator cannot be used on this machine at all.
     """
-    given = [read_upload(path, track.name, f"upload{k}") for k, path in enumerate(uploads)]
+    given = _read_all(uploads, track.name)
     backend = load_generator(generator, config, progress)
     progress.at(0.0, f"{track.name}: loading frames")
     evidence = gather_evidence(capture, track, config.pool_frames)
@@ -125,6 +124,15 @@ def load_generator(name: str, config: GenerateConfig, progress: Progress = SILEN
     served = {"url": config.url, "progress": progress} if name == "remote" else {}
     backend: MeshGenerator = GENERATORS.load(name, weights=config.weights, **served)
     return backend
+
+
+def with_uploads(found: CandidateSet, uploads: tuple[Path, ...], rule: Rule) -> CandidateSet:
+    """The candidates and the given meshes, and the consensus of all; raises OverrideError for an unusable upload."""
+    return choose_candidate([*found.candidates, *_read_all(uploads, found.object_name)], rule=rule)
+
+
+def _read_all(uploads: tuple[Path, ...], name: str) -> list[MeshAsset]:
+    return [read_upload(path, name, f"upload{k}") for k, path in enumerate(uploads)]
 
 
 def marked(found: CandidateSet, warning: str) -> CandidateSet:

@@ -78,6 +78,20 @@ def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
     assert "remote made no mesh" in asset.warnings[0]
 
 
+def test_an_upload_joins_the_candidates_that_are_there_without_making_them_anew(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    (tmp_path / "mine.glb").write_bytes(box_glb((0.4, 0.3, 0.1)))
+    overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "mine.glb"))})
+    one = {"bad_1": tracks["bad_1"]}
+    with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
+        before = make_candidates(request_for(address), Ledger(Workspace(tmp_path / "work"), SILENT), capture, one)
+        after = make_candidates(request_for(address, overrides), Ledger(Workspace(tmp_path / "work"), SILENT), capture, one)
+    assert len(asked) == 1
+    assert [c.candidate_id for c in after["bad_1"].value.candidates] == ["c0", "upload0"]
+    assert after["bad_1"].value.candidates[0].generator == "remote:trellis-nim"
+    assert before["bad_1"].key != after["bad_1"].key
+
+
 def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
     capture, tracks = two_bottles
     path = tmp_path / "mine.glb"
