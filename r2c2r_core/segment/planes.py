@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.capture import SceneSurface
+from r2c2r_core.segment.surface import face_normals
 
 _CELL_M = 0.02  # of the support map
 _NORMAL_COS = np.cos(np.radians(22))  # TSDF normals of noisy scans scatter
@@ -129,20 +130,6 @@ def region_along(
         if best is None or score < best[0]:
             best = (score, region, point)
     return (best[1], best[2]) if best else None
-
-
-def face_normals(vertices: Points, faces: Faces) -> tuple[Points, Points, np.ndarray]:
-    """Centres, unit normals averaged over two rings (those of a 1 cm TSDF are noisy) and areas of triangles."""
-    corners = vertices[faces]
-    raw = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = 0.5 * np.linalg.norm(raw, axis=1)
-    for _ in range(2):
-        smooth = np.zeros_like(vertices)
-        for k in range(3):
-            for axis in range(3):
-                smooth[:, axis] += np.bincount(faces[:, k], raw[:, axis], len(vertices))
-        raw = smooth[faces].sum(axis=1)
-    return corners.mean(axis=1), raw / np.maximum(np.linalg.norm(raw, axis=1, keepdims=True), 1e-12), areas
 
 
 def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:

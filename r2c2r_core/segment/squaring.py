@@ -8,7 +8,6 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.fronts import Front
-from r2c2r_core.segment.planes import face_normals
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import ThingConfig, support_height
 
@@ -43,7 +42,8 @@ def squared(front: Front, scene: Scene) -> Front:
     middle = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
     centred = Rigid3(grid.world_from_plane.rotation, middle)
     half_w, half_h = cell.width * grid.cell_m / 2, cell.height * grid.cell_m / 2
-    faces = _faces_near(scene, centred, reach_m=2 * max(half_w, half_h) + front.depth_m)
+    reach = np.array([half_w + _SHELL_M, front.depth_m, half_h + _SHELL_M])
+    faces = _faces_inside(scene, centred, reach * [-1, 0, -1] - [0, 0.02, 0], reach)
     level = np.abs(faces.centres[:, 2]) < half_h - 0.02
     behind = (faces.centres[:, 1] > 0.03) & (faces.centres[:, 1] < front.depth_m)
     x, y = faces.centres[:, 0], faces.centres[:, 1]
@@ -102,14 +102,16 @@ def _turn(face: _Faces, sides: dict[int, _Faces]) -> tuple[float, dict[int, floa
     return turn, {sign: float(solution[k]) for k, (sign, _) in enumerate(groups) if sign != 0}
 
 
-def _faces_near(scene: Scene, world_from_front: Rigid3, reach_m: float) -> _Faces:
-    surface = scene.capture.surface
-    faces = surface.faces[scene.parts.faces_near(world_from_front.translation, reach_m)]
-    near = np.linalg.norm(surface.vertices_world[faces] - world_from_front.translation, axis=2) < reach_m
-    faces = faces[near.all(axis=1)]
-    used, renumbered = np.unique(faces, return_inverse=True)
-    centres, normals, areas = face_normals(surface.vertices_world[used], renumbered.reshape(-1, 3))
-    return _Faces(world_from_front.inverse.apply(centres), normals @ world_from_front.rotation, areas)
+def _faces_inside(scene: Scene, world_from_front: Rigid3, low: np.ndarray, high: np.ndarray) -> _Faces:
+    """The surface's faces with their middle in a box of the front frame."""
+    parts = scene.parts
+    centre = world_from_front.apply((low + high)[None] / 2)[0]
+    near = parts.faces_near(centre, float(np.linalg.norm(high - low)) / 2)
+    centres = world_from_front.inverse.apply(parts.middles[near])
+    x, y, z = centres.T
+    inside = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (z > low[2]) & (z < high[2])
+    near = near[inside]
+    return _Faces(centres[inside], parts.normals[near] @ world_from_front.rotation, parts.areas_m2[near])
 
 
 def _floor(scene: Scene, middle: Vector3, half_w: float) -> float:

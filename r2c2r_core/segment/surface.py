@@ -31,7 +31,11 @@ class SurfaceParts:
     starts: np.ndarray  # of each part in `faces`, and the end
     centres: Points
     radii_m: np.ndarray
-    upward: np.ndarray  # cosine between each face's normal and up, by its number in the surface
+    # By a face's number in the surface:
+    upward: np.ndarray  # cosine between its own normal and up
+    middles: Points
+    normals: Points  # smoothed
+    areas_m2: np.ndarray
 
     def faces_near(self, point_world: Vector3, reach_m: float, *, any_height: bool = False) -> np.ndarray:
         """Numbers, in order, of the surface's faces that may have a corner within reach; farther ones may be among them."""
@@ -46,10 +50,19 @@ def parts_of(surface: SceneSurface) -> SurfaceParts:
         empty = surface.faces.astype(np.int32)
         nothing = np.zeros(0)
         return SurfaceParts(
-            surface.vertices_world.astype(np.float32), empty, _NONE, _NONE[:1], np.zeros((0, 3)), nothing, nothing
+            surface.vertices_world.astype(np.float32),
+            empty,
+            _NONE,
+            _NONE[:1],
+            np.zeros((0, 3)),
+            nothing,
+            nothing,
+            np.zeros((0, 3)),
+            np.zeros((0, 3)),
+            nothing,
         )
     corners = surface.vertices_world[surface.faces]
-    middles = corners.mean(axis=1)
+    middles, normals, areas = face_normals(surface.vertices_world, surface.faces)
     cells = np.floor(middles / _PART_M).astype(np.int64)
     cells -= cells.min(axis=0)
     span = cells.max(axis=0) + 1
@@ -63,7 +76,21 @@ def parts_of(surface: SceneSurface) -> SurfaceParts:
     starts = np.concatenate([[0], counts.cumsum()])
     vertices = surface.vertices_world.astype(np.float32)
     faces = surface.faces[order].astype(np.int32)
-    return SurfaceParts(vertices, faces, order, starts, centres, radii, _upward(corners))
+    return SurfaceParts(vertices, faces, order, starts, centres, radii, _upward(corners), middles, normals, areas)
+
+
+def face_normals(vertices: Points, faces: Faces) -> tuple[Points, Points, np.ndarray]:
+    """Centres, unit normals averaged over two rings (those of a 1 cm TSDF are noisy) and areas of triangles."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    raw = np.cross(b - a, c - a)
+    areas = 0.5 * np.linalg.norm(raw, axis=1)
+    for _ in range(2):
+        smooth = np.zeros_like(vertices)
+        for k in range(3):
+            for axis in range(3):
+                smooth[:, axis] += np.bincount(faces[:, k], raw[:, axis], len(vertices))
+        raw = smooth[faces[:, 0]] + smooth[faces[:, 1]] + smooth[faces[:, 2]]
+    return (a + b + c) / 3, raw / np.maximum(np.linalg.norm(raw, axis=1, keepdims=True), 1e-12), areas
 
 
 def _upward(corners: np.ndarray) -> np.ndarray:

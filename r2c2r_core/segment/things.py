@@ -160,12 +160,11 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
 
 def _level_faces(scene: Scene, point: Vector3, reach_m: float) -> tuple[Points, np.ndarray]:
     """Centres and areas of the surface's level faces around a point, in plan."""
-    surface = scene.capture.surface
-    near = scene.parts.faces_near(point, reach_m, any_height=True)
-    corners = surface.vertices_world[surface.faces[near[scene.parts.upward[near] > _LEVEL_COS]]]
-    corners = corners[(np.linalg.norm(corners[..., :2] - point[:2], axis=2) < reach_m).all(axis=1)]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return corners.mean(axis=1), np.linalg.norm(cross, axis=1) / 2
+    parts = scene.parts
+    near = parts.faces_near(point, reach_m, any_height=True)
+    near = near[parts.upward[near] > _LEVEL_COS]
+    near = near[np.linalg.norm(parts.middles[near, :2] - point[:2], axis=1) < reach_m]
+    return parts.middles[near], parts.areas_m2[near]
 
 
 def _over_bins(profile: np.ndarray) -> np.ndarray:
