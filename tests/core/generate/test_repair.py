@@ -8,11 +8,18 @@ import pytest
 import trimesh
 from PIL import Image
 
+from r2c2r_core.generate import repair
 from r2c2r_core.generate.meshfile import missing_files, parts_of
 from r2c2r_core.generate.repair import mended
 from r2c2r_core.generate.upload import read_upload
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, oriented_extents, volume
 from tests.core.generate.stub import textured_box
+
+
+@pytest.fixture(autouse=True)
+def small_textures(monkeypatch):
+    """A new texture of 1024 px takes over a second, and most of these facts are about shape."""
+    monkeypatch.setattr(repair, "_TEXTURE_PX", 256)
 
 
 def repaired(*geometries):

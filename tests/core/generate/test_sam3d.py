@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 torch = pytest.importorskip("torch")
 
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed  # noqa: E402  # after the skip
-from r2c2r_core.generate import sam3d  # noqa: E402
+from r2c2r_core.generate import repair, sam3d  # noqa: E402
 from r2c2r_core.generate.evidence import gather_evidence  # noqa: E402
 from r2c2r_core.geometry.meshes import box_mesh, is_watertight  # noqa: E402
 
@@ -85,6 +85,7 @@ class Config(dict):
 
 @pytest.fixture
 def package(monkeypatch, tmp_path):
+    monkeypatch.setattr(repair, "_TEXTURE_PX", 256)  # 1024 px take over a second
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "pipeline.yaml").write_text("")
     pipeline = FakePipeline()
