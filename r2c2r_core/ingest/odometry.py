@@ -20,6 +20,7 @@ _AGREEING = 0.7  # share of the common surface that must coincide: right motions
 _RETURN_M, _RETURN_DEG = 0.015, 0.7  # how near there and back must end where it began; wrong motions end centimetres off
 _KEY_OVERLAP = 0.6  # a frame that shares less than this with its keyframe becomes the next one
 _LOOP_LANDMARKS = 20
+_MOST_LOOP_KEYS = 60  # every two of them are compared, at about 10 ms
 _PAIR_REACHES_M = (0.08, 0.05, 0.03)
 _LOOSE_M, _LOOSE_DEG = 0.01, 0.5  # how far the depth may move a motion told by landmarks, one sigma
 _LEAST_FRAMES, _LEAST_SHARE = 5, 0.5
@@ -192,8 +193,9 @@ def _close_loops(track: _Track, rng: np.random.Generator) -> list[Rigid3]:
         motion = track.poses[keys[i]].inverse @ track.poses[keys[i + 1]]
         graph.edges.append(_edge(i + 1, i, motion.matrix, uncertain=False))
     loops = 0
-    for i in range(len(keys)):
-        for j in range(i + 2, len(keys)):
+    step = -(-len(keys) // _MOST_LOOP_KEYS)
+    for i in range(0, len(keys), step):
+        for j in range(i + max(2, step), len(keys), step):
             first, second = track.sights[keys[i]], track.sights[keys[j]]
             told = motion_between(first.landmarks, second.landmarks, rng)
             if told is None or told.agreeing < _LOOP_LANDMARKS:
