@@ -96,9 +96,11 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
     if best.factor is not None and abs(np.log(best.factor)) < _LEAST_OFF:
         return None
     so = compare(views, pairs, **best.change)
+    # A short path hardly tells a scale from a focal length: then both are named
+    alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < 1.05 * best.cost.mean()]
     return Finding(
         cause=best.cause,
-        text=best.text,
+        text=" or ".join((best.text, *alike)),
         factor=best.factor,
         agreement_given=float(given.agreement.mean()),
         agreement_so=float(so.agreement.mean()),
