@@ -8,13 +8,14 @@ PORT ?= 8000
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+LEARNED := $(VENV)/.learned
 
 .PHONY: demo test env check bench libs clean
 
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
 
-test: env check
+test: env check $(LEARNED)
 	"$(BIN)/python" scripts/run_tests.py
 
 env: libs $(STAMP)
@@ -26,6 +27,11 @@ $(STAMP): pyproject.toml constraints.txt
 	bash scripts/make-venv.sh "$(PYTHON)" "$(VENV)"
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
 	touch "$(STAMP)"
+
+# torch is large: only the tests bring it
+$(LEARNED): $(STAMP)
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt --group learned
+	touch "$(LEARNED)"
 
 check: env
 	"$(BIN)/ruff" format --check .

@@ -87,7 +87,9 @@ def capture_facts(capture: Capture, source: Path | None) -> dict[str, Any]:
     from r2c2r_core.ingest.doctor import examine
     from r2c2r_core.ingest.readers.table import open_recording
 
-    report = examine(capture, open_recording(source) if source else None)
+    # a finished run outlives its recording: the doctor then says what the stored frames tell
+    recording = open_recording(source) if source is not None and source.exists() else None
+    report = examine(capture, recording)
     first = capture.frames[0]
     path = np.array([frame.world_from_camera.translation for frame in capture.frames])
     stamps = [frame.timestamp_s for frame in capture.frames if frame.timestamp_s is not None]
