@@ -1,5 +1,6 @@
 """The recording formats. To add one: a file with a READER, and a line here."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from r2c2r_core.errors import CaptureError
@@ -40,32 +41,45 @@ _DEEPEST, _WIDEST = 6, 50  # folders that are looked into
 def open_recording(source: Path) -> Recording:
     """The recording at `source`, its format recognised from what it holds; raises CaptureError."""
     files = open_files(source)
-    roots = _roots(files)
-    for root in roots:
-        for reader in READERS:
-            if not reader.missing(root.names()):
-                return upright(plausible(reader.open(root)))
-    if archives := sorted(name for name in files.names() if name.endswith((".r3d", ".zip"))):
-        raise CaptureError(
-            f"{source}: holds {archives[0]}, which may be a recording itself", hint="choose that file (unpacked)"
-        )
+    outer, inner = _roots(files)
+    for root in outer:
+        if reader := _reader_of(root):
+            return upright(plausible(reader.open(root)))
+    if matches := {folder: reader for folder, root in inner.items() if (reader := _reader_of(root))}:
+        folder = next(iter(matches))
+        recording = upright(plausible(matches[folder].open(inner[folder])))
+        choice = f"{len(matches)} recordings lie here, {folder} is read: {', '.join(list(matches)[:6])}"
+        return replace(recording, notices=(choice, *recording.notices)) if len(matches) > 1 else recording
+    raise _unknown(source, files, [*outer, *inner.values()])
+
+
+def _reader_of(root: Files) -> Reader | None:
+    return next((reader for reader in READERS if not reader.missing(root.names())), None)
+
+
+def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
+    """What was found, what it most looks like, and what was looked for."""
     miss = _nearest_miss(roots)
+    archives = sorted(name for name in files.names() if name.endswith((".r3d", ".zip")))
+    if miss is None and archives:
+        inside = f"{source}: holds {archives[0]}, which may be a recording itself"
+        return CaptureError(inside, hint="choose that file; take it out first if it lies in another archive")
     if miss is None:
-        raise CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"looked for {_formats()}")
+        return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"looked for {_formats()}")
     reader, missing = miss
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
-    raise CaptureError(
+    return CaptureError(
         f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}",
         hint=f"it holds {reader.expects}; also looked for {', '.join(r.name for r in READERS if r is not reader)}",
     )
 
 
-def _roots(files: Files) -> list[Files]:
-    """The top, the folders right below it (an export may lie beside other things), and down to the first fork."""
-    roots: list[Files] = [files]
-    while len(folders := top_folders(roots[-1])) == 1 and len(roots) < _DEEPEST:
-        roots.append(SubFiles(roots[-1], folders[0]))
-    return [*roots, *(SubFiles(roots[-1], folder) for folder in folders[:_WIDEST])]
+def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
+    """The top and on down to the first fork (a zip of a folder has that on top), and the folders below the fork by name."""
+    outer: list[Files] = [files]
+    while len(folders := top_folders(outer[-1])) == 1 and len(outer) < _DEEPEST:
+        outer.append(SubFiles(outer[-1], folders[0]))
+    return outer, {folder: SubFiles(outer[-1], folder) for folder in folders[:_WIDEST]}
 
 
 def _nearest_miss(roots: list[Files]) -> tuple[Reader, tuple[str, ...]] | None:

@@ -358,3 +358,11 @@ def test_an_archive_inside_is_named(tmp_path):
     with pytest.raises(CaptureError, match=r"holds kitchen\.r3d") as caught:
         open_recording(tmp_path / "scans")
     assert "choose" in caught.value.hint
+
+
+def test_of_several_recordings_the_first_is_read_and_named(tmp_path):
+    for name in ("monday", "tuesday"):
+        write_scannet(tmp_path / "scans" / name, SMALL)
+    recording = open_recording(tmp_path / "scans")
+    assert len(recording.frames) == 4
+    assert told(recording, "2 recordings lie here, monday is read: monday, tuesday")
