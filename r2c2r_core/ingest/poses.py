@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.cloud import spread_frames
 from r2c2r_core.ingest.overlap import SmallView, match, overlaps, small_view
 from r2c2r_core.model.capture import Frame, FrameImages, PoseEvidence
@@ -53,6 +53,7 @@ def refine_poses(
         return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=None, gap_m=None), ())
     judges = loops[::_HELD_OUT]
     moved = bring_together(views, given, [*near, *(p for p in loops if p not in set(judges))])
+    moved = _held_level(given, moved)
     before, after = median_gap(views, given, judges), median_gap(views, moved, judges)
     if before is None or after is None or not _is_drift(given, moved, before, after):
         return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=before, gap_m=before), ())
@@ -64,6 +65,17 @@ def refine_poses(
     recorded = np.array([f.world_from_camera.matrix for f in frames])
     evidence = PoseEvidence(source="refined", given_gap_m=before, gap_m=after, given=recorded)
     return SettledPoses(carried(frames, keyframes, moved), evidence, (notice,))
+
+
+def _held_level(given: Sequence[Rigid3], moved: Sequence[Rigid3]) -> list[Rigid3]:
+    """The moved poses, turned and shifted as a whole so that they keep the given ones' mean: the depth tells nothing about it.
+
+    A phone's gravity is exact, and a room that turned by half a degree would stand askew in it.
+    """
+    turn = nearest_rotation(sum((a.rotation @ b.rotation.T for a, b in zip(given, moved, strict=True)), np.zeros((3, 3))))
+    turned = [Rigid3(turn, np.zeros(3)) @ pose for pose in moved]
+    shift = np.mean([a.translation - b.translation for a, b in zip(given, turned, strict=True)], axis=0)
+    return [Rigid3(pose.rotation, pose.translation + shift) for pose in turned]
 
 
 def _is_drift(given: Sequence[Rigid3], moved: Sequence[Rigid3], before_m: float, after_m: float) -> bool:

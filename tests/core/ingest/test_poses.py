@@ -76,6 +76,15 @@ def test_drift_of_3_cm_is_taken_out_and_told(walk):
     assert np.allclose(result.evidence.given, [f.world_from_camera.matrix for f in bent])
 
 
+def test_refining_turns_the_room_as_a_whole_by_nothing(walk):
+    frames, views = walk
+    bent = drifted(frames, 0.03, 1.5)
+    result = refined(bent, views)
+    turns = [a.world_from_camera.rotation @ b.world_from_camera.rotation.T for a, b in zip(result.frames, bent, strict=True)]
+    mean = Rotation.from_matrix(np.array(turns)).mean().magnitude()
+    assert np.degrees(mean) < 0.02
+
+
 def test_frames_between_the_keyframes_move_along(walk):
     frames, views = walk
     bent = drifted(frames, 0.03, 1.5)
