@@ -133,6 +133,11 @@ def history(
         return [_entry(row, row.id in undone) for row in rows]
 
 
+def _facts(stored: dict[str, Any]) -> schemas.CaptureFacts:
+    """What the doctor said when the recording was read, as far as this version still says it."""
+    return schemas.CaptureFacts(**{name: stored[name] for name in schemas.CaptureFacts.model_fields if name in stored})
+
+
 def shape(context: Context, session: Session, row: Project) -> schemas.Project:
     """A project as it goes over the wire."""
     active = select(Job).where(Job.project_id == row.id).order_by(col(Job.state).in_(queries.ACTIVE).desc(), col(Job.id).desc())
@@ -148,7 +153,7 @@ def shape(context: Context, session: Session, row: Project) -> schemas.Project:
         updated=row.updated,
         source_name=row.source_name,
         media_version=row.media_version,
-        capture=schemas.CaptureFacts(**row.capture) if row.capture else None,
+        capture=_facts(row.capture) if row.capture else None,
         notices=row.notices,
         error=schemas.ErrorBody(**row.error) if row.error else None,
         counts=_counts(session, row.id),

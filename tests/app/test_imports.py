@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from app.db.engine import writing
+from app.db.tables import Project
 from app.security import COOKIE
 from tests.app.conftest import Running
 
@@ -37,6 +39,16 @@ def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> N
     ready = web.get(f"/api/projects/{project['id']}")
     assert (ready["capture"]["frame_count"], ready["notices"], ready["result"]) == (3, ["a notice"], "none")
     assert [f["index"] for f in web.get(f"/api/projects/{project['id']}/frames")] == [0, 3, 7]
+
+
+def test_facts_of_another_version_do_not_hide_a_project(web: Running) -> None:
+    project = upload(web, R3D, "My kitchen.r3d")["id"]
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
+    with writing(web.context.engine) as session:
+        row = session.get(Project, project)
+        row.capture = {**row.capture, "reasons": ["said by an older version"]}
+        session.add(row)
+    assert web.get(f"/api/projects/{project}")["capture"]["frame_count"] == 3
 
 
 def test_a_name_cannot_lead_out_of_the_project(web: Running) -> None:
