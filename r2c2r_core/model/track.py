@@ -1,6 +1,6 @@
 """Where an object is seen."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from r2c2r_core.arrays import Vector3
@@ -65,3 +65,4 @@ class MaskTrack:
     backend: str
     prompt_count: int
     warnings: tuple[str, ...]
+    opened_m: dict[int, float] = field(default_factory=dict)  # frames in which its front is drawn out, and how far

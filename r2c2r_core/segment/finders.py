@@ -26,6 +26,7 @@ from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import small_mask
 from r2c2r_core.segment.small import find_small, glimpse_small
+from r2c2r_core.segment.states import drawn_out
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import Thing, ThingConfig, find_thing, thing_mask
 from r2c2r_core.segment.trust import expected_iou
@@ -49,9 +50,13 @@ class FoundFront:
 
     def mask(self, frame: Frame) -> tuple[Mask, float]:
         """Visible pixels and how far to trust them."""
-        mask, share = front_mask(self.front, self.scene, frame)
+        mask, share = front_mask(self.front, self.scene, frame, self.opened_m(frame))
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
         return mask, expected_iou(mask, share, frame, corners, _BORDERS_M["front"])
+
+    def opened_m(self, frame: Frame) -> float:
+        """How far it is drawn out in a frame."""
+        return drawn_out(self.front, self.scene, frame)
 
     def panel(self) -> FrontPanel | None:
         """The rectangle and its handle."""
@@ -76,6 +81,10 @@ class FoundAppliance:
         mask, share = appliance_mask(self.front, self.scene, frame)
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
         return mask, expected_iou(mask, share, frame, corners, _BORDERS_M["appliance"])
+
+    def opened_m(self, frame: Frame) -> float:
+        """Appliances do not move; their doors are not told open."""
+        return 0.0
 
     def panel(self) -> FrontPanel | None:
         """The rectangle of its front and its handle."""
@@ -102,6 +111,10 @@ class FoundThing:
         mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
         border_m = 0.5 * self.thing.border_m if self.small else _BORDERS_M["thing"]
         return mask, expected_iou(mask, share, frame, self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)], border_m)
+
+    def opened_m(self, frame: Frame) -> float:
+        """Things do not open."""
+        return 0.0
 
     def panel(self) -> FrontPanel | None:
         """None: things have no front panel."""

@@ -47,6 +47,9 @@ class Found(Protocol):
     def mask(self, frame: Frame) -> tuple[Mask, float]:
         """Visible pixels, and how far to trust them (0..1)."""
 
+    def opened_m(self, frame: Frame) -> float:
+        """How far its front is drawn out in a frame; 0 where closed or not to be told."""
+
     def panel(self) -> FrontPanel | None:
         """Its flat front, measured."""
 
@@ -130,6 +133,7 @@ class GeometricSession:
             backend="geometric",
             prompt_count=len(prompt.points),
             warnings=found.warnings,
+            opened_m={index: out for index in sorted(masks) if (out := found.opened_m(self.scene.frame(index))) > 0},
         )
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:

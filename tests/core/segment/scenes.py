@@ -51,18 +51,18 @@ class Shapes:
     ids: np.ndarray  # a vertex: 0 none
 
 
-def kitchen() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
-    """The capture, and the true mask of each named thing in each frame."""
-    shapes, names = _shapes()
+def kitchen(drawn_out_m: float = 0.0, from_step: int = 0) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """The capture, and the true mask of each named thing in each frame; from a step on, the middle drawer stands out."""
     colours: dict[int, np.ndarray] = {}
     depths: dict[int, np.ndarray] = {}
-    truth: dict[str, dict[int, np.ndarray]] = {name: {} for name in names}
+    truth: dict[str, dict[int, np.ndarray]] = {name: {} for name in (*DOORS, *DRAWERS, "carton")}
     frames = []
     rgb_camera = Intrinsics(fx=400.0, fy=400.0, cx=WIDTH / 2, cy=HEIGHT / 2, width=WIDTH, height=HEIGHT)
     depth_camera = rgb_camera.resized(WIDTH // 2, HEIGHT // 2)
     rng = np.random.default_rng(5)
     for index, (x, y, z, target) in enumerate(_path()):
         pose = look_at(np.array([x, y, z]), np.array(target))
+        shapes, names = _shapes(drawn_out_m if index >= from_step else 0.0)
         fine = rgb_camera.resized(2 * WIDTH, 2 * HEIGHT)
         picture = rasterize(shapes.vertices, shapes.faces, shapes.colours, fine, pose.inverse)
         small = cv2.resize(picture.attributes, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
@@ -128,7 +128,7 @@ def _path() -> list[tuple[float, float, float, tuple[float, float, float]]]:
     return path
 
 
-def _shapes() -> tuple[Shapes, list[str]]:
+def _shapes(drawn_out_m: float) -> tuple[Shapes, list[str]]:
     boxes: list[tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]] = [
         ((-1.5, 0.0, 0.0), (3.5, 0.02, 2.4), (200, 202, 198), None),  # wall
         ((-1.5, -3.5, -0.02), (3.5, 0.0, 0.0), (120, 100, 80), None),  # floor
@@ -143,12 +143,13 @@ def _shapes() -> tuple[Shapes, list[str]]:
         at = x + width - 0.05 if name != "door_b" else x + 0.05
         boxes.append(((at - 0.006, FRONT_Y - 0.036, 0.62), (at + 0.006, FRONT_Y - 0.024, 0.80), (210, 210, 214), name))
     for name, (x, width, z, height) in DRAWERS.items():
-        boxes.append(((x, FRONT_Y, z), (x + width, FRONT_Y + 0.018, z + height), (176, 60, 52), name))
+        front = FRONT_Y - (drawn_out_m if name == "drawer_mid" else 0.0)
+        boxes.append(((x, front, z), (x + width, front + 0.018, z + height), (176, 60, 52), name))
         middle, level = x + width / 2, z + height / 2
         boxes.append(
             (
-                (middle - 0.08, FRONT_Y - 0.036, level - 0.006),
-                (middle + 0.08, FRONT_Y - 0.024, level + 0.006),
+                (middle - 0.08, front - 0.036, level - 0.006),
+                (middle + 0.08, front - 0.024, level + 0.006),
                 (210, 210, 214),
                 name,
             )
