@@ -64,6 +64,6 @@ def test_no_large_file_is_tracked() -> None:
     assert large == []
 
 
-@pytest.mark.parametrize("command", ["serve", "demo", "sample", "info", "run", "check", "evaluate", "doctor"])
+@pytest.mark.parametrize("command", ["serve", "demo", "sample", "info", "run", "check", "evaluate", "dataset", "doctor"])
 def test_every_command_is_in_the_readme(command: str) -> None:
     assert f"r2c2r {command}" in (ROOT / "README.md").read_text()
