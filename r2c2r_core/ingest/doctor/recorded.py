@@ -26,8 +26,7 @@ def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timi
     every = recording.frames if recording else frames
     numbers = np.array([f.index for f in every])
     times = np.array([f.timestamp_s for f in every if f.timestamp_s is not None])
-    step = int(np.median(np.diff(numbers))) if len(numbers) > 1 else 1
-    expected = np.arange(numbers[0], numbers[-1] + 1, step)
+    expected = _expected_numbers(numbers)
     missing = np.setdiff1d(expected, numbers)
     unposed = _still_there(recording, missing) if recording else 0
     between = np.diff(times)
@@ -39,6 +38,15 @@ def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timi
         fps=(len(times) - 1) / duration if duration else None,
         duration_s=duration,
     )
+
+
+def _expected_numbers(numbers: np.ndarray) -> np.ndarray:
+    """The numbers a recording without gaps would have; those it has, where they follow no step (such as times)."""
+    gaps = np.diff(numbers)
+    step = int(np.quantile(gaps, 0.25, method="lower")) if len(gaps) else 1
+    if step < 1 or (gaps % step != 0).mean() > 0.1:
+        return numbers
+    return np.arange(numbers[0], numbers[-1] + 1, step)
 
 
 def _still_there(recording: Recording, numbers: np.ndarray) -> int:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.doctor import CaptureReport, draw_scan, examine, refusal_to_json
+from r2c2r_core.ingest.doctor.recorded import measure_timing
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.model.capture import Capture, Depth, Frame
@@ -151,6 +152,19 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=beside)))
     assert report.remarks[0].cause == "unregistered"
     assert report.registration.off_px == pytest.approx(20.0, abs=4.0)  # 10 of 320 px are 20 of 640
+
+
+@pytest.mark.parametrize(
+    ("numbers", "missing"),
+    [
+        (range(0, 120, 5), 0.0),  # every fifth frame was exported
+        ([n for n in range(0, 120, 5) if n % 15 != 5], 1 / 3),  # a third of those is gone: steps of 5 and of 10
+        ([1_000_003 * n + n * n for n in range(24)], 0.0),  # times, not numbers
+    ],
+)
+def test_only_gaps_in_regular_numbers_are_dropped_frames(capture, numbers, missing):
+    numbered = replace(capture, frames=tuple(replace(f, index=n) for f, n in zip(capture.frames, numbers, strict=False)))
+    assert measure_timing(None, numbered.frames).missing_share == pytest.approx(missing)
 
 
 def test_a_jump_of_the_tracking_is_told(capture):
