@@ -18,6 +18,7 @@ from r2c2r_core.segment.scene import Scene
 
 _USUAL_PROTRUSION_M = 0.035
 _PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
+_MET_WIDTH_SHARE, _HANDLES_MEET = 0.2, 0.5  # a cell may hold the gap beside its door
 _SUPPORTED_SHARE = 0.25  # of a column or row of cells, for it to belong to the panel
 _OFF_PLANE_M = 0.06  # handles stand out by up to 5 cm
 _STEADY_M = 0.012  # clicks this near a border are within pose error of it
@@ -133,11 +134,16 @@ def _partner(run: Run, cell: Cell) -> Cell | None:
         if abs(other.top - cell.top) < slack
         and abs(other.bottom - cell.bottom) < slack
         and min(abs(other.left - cell.right), abs(other.right - cell.left)) < slack
-        and abs(other.width - cell.width) < _PAIR_WIDTH_SHARE * cell.width
+        and abs(other.width - cell.width) < _width_slack(run, cell, other) * cell.width
     ]
     if not beside:
         return None
     return max(beside, key=lambda other: (_pair_score(run, cell, other), -abs(other.width - cell.width)))
+
+
+def _width_slack(run: Run, cell: Cell, other: Cell) -> float:
+    """How differently wide two doors of a pair may have been cut, as a share: more where their handles meet at the seam."""
+    return _MET_WIDTH_SHARE if _pair_score(run, cell, other) > _HANDLES_MEET else _PAIR_WIDTH_SHARE
 
 
 def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
