@@ -180,7 +180,10 @@ class GeometricSession:
         return hint, positives, self._points(prompt, 0, must_hit=False)
 
     def _points(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Points:
-        """World points under the clicks of one label; raises PromptError where one must hit a surface and does not."""
+        """World points under the clicks of one label; raises PromptError where the first must hit a surface and does not.
+
+        A later one on what has no depth (glass, gloss, a far wall) counts where its ray passes nearest to the first.
+        """
         points = []
         for click in prompt.points:
             if click.label != label:
@@ -188,6 +191,9 @@ class GeometricSession:
             point = self.scene.pick(click.frame, click.x, click.y)
             if point is not None:
                 points.append(point)
+            elif points and label == 1:
+                origin, ray = self.scene.ray(click.frame, click.x, click.y)
+                points.append(origin + ray * float((points[0] - origin) @ ray))
             elif must_hit:
                 raise PromptError(
                     _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"

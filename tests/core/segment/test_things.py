@@ -8,6 +8,7 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.geometric import GeometricSession
+from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import FRONT_Y, Pixels, click_on, prompt
@@ -44,6 +45,16 @@ def test_a_click_on_nothing_names_the_click_and_the_next_step(boxes: Boxes, tmp_
     )
     with pytest.raises(PromptError, match=r"mug: the click at \(240, 180\) on frame 60 hits no surface.*; click where"):
         session.mask_at(prompt("mug", "mug", PromptPoint(frame=60, x=240.0, y=180.0, label=1)), 60)
+
+
+def test_a_second_click_on_what_has_no_depth_does_not_lose_the_object(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = (click_on(boxes[0], (1.06, -0.36, height), frame) for height, frame in ((1.0, 60), (1.05, 70)))
+    once = session.mask_at(prompt("carton", "box", first), 60)
+    seen = Scene.pick
+    monkeypatch.setattr(Scene, "pick", lambda self, frame, x, y: None if frame == 70 else seen(self, frame, x, y))
+    assert mask_iou(once, session.mask_at(prompt("carton", "box", first, second), 60)) > 0.9
 
 
 def test_an_object_that_no_frame_sees_is_an_error(
