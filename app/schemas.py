@@ -620,6 +620,7 @@ class JointVerdict(Shape):
     joint: str
     deepest_penetration_m: float
     travel_reached: float
+    cavity_open: float | None = None  # share of the space it opens that is free
 
 
 class Certificate(Shape):

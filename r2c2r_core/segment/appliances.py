@@ -190,6 +190,8 @@ def _along_rows(sums: np.ndarray, rows: np.ndarray, left: float, right: float, b
 def _candidates(evidence: Evidence, low: float, high: float, reach: float) -> np.ndarray:
     """Positions (cell centres) of the clearest lines across the clicks' surroundings."""
     first = int(max((low - reach) // evidence.block, 0))
+    if first >= len(evidence.score):
+        return np.zeros(0)  # the clicks lie beside what was seen
     last = int(max(min(np.ceil((high + reach) / evidence.block), len(evidence.score)), first + 1))
     shown = np.where(evidence.known[first:last], np.clip(evidence.score[first:last], 0, 6), 0).mean(axis=0)
     profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), 1.2)[0]

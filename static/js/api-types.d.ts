@@ -235,6 +235,7 @@ export interface JointVerdict {
   joint: string;
   deepest_penetration_m: number;
   travel_reached: number;
+  cavity_open: number | null;
 }
 
 /** Where an object is seen. */

@@ -43,7 +43,9 @@ def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timi
 def _expected_numbers(numbers: np.ndarray) -> np.ndarray:
     """The numbers a recording without gaps would have; those it has, where they follow no step (such as times)."""
     gaps = np.diff(numbers)
-    step = int(np.quantile(gaps, 0.25, method="lower")) if len(gaps) else 1
+    if not len(gaps):
+        return numbers
+    step = int(np.quantile(gaps, 0.25, method="lower"))
     if step < 1 or (gaps % step != 0).mean() > 0.1:
         return numbers
     return np.arange(numbers[0], numbers[-1] + 1, step)
