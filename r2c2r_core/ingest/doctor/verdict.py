@@ -5,6 +5,7 @@ from r2c2r_core.ingest.doctor.registration import Registration
 from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Verdict
 
 _LEAST_DEPTH = 0.1  # of the median frame
+_MASKS_SUFFER_PX = 4.0  # of 640: a handle's width at 2 m; below, sizes and masks stay within their tolerances
 
 
 def judge(
@@ -81,7 +82,8 @@ def _unregistered(found: Registration) -> Remark:
         return _remark("unusable", "colour_focal_length", text + gain, "correct the colour calibration")
     text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
     fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
-    return _remark("unusable", "unregistered", text + fit, "export registered depth, or give the two cameras' calibration")
+    verdict: Verdict = "unusable" if found.off_px > _MASKS_SUFFER_PX else "usable with care"
+    return _remark(verdict, "unregistered", text + fit, "export registered depth, or give the two cameras' calibration")
 
 
 def _recording(figures: CaptureFigures) -> list[Remark]:

@@ -11,6 +11,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.doctor import CaptureReport, draw_scan, examine, refusal_to_json
 from r2c2r_core.ingest.doctor.recorded import measure_timing
+from r2c2r_core.ingest.doctor.verdict import judge
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.model.capture import Capture, Depth, Frame
@@ -152,6 +153,14 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=beside)))
     assert report.remarks[0].cause == "unregistered"
     assert report.registration.off_px == pytest.approx(20.0, abs=4.0)  # 10 of 320 px are 20 of 640
+    assert report.verdict == "unusable"
+
+
+def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(capture):
+    report = examine(capture)
+    slight = replace(report.registration, off_px=2.4, limit_px=2.0, edge_px=2.0, edge_best_px=1.5, focal_only=False)
+    remarks = judge(report.figures, None, None, slight)
+    assert ("usable with care", "unregistered") in {(r.verdict, r.cause) for r in remarks}
 
 
 @pytest.mark.parametrize(
