@@ -38,6 +38,7 @@ class IngestConfig:
     finest_voxel_m: float = 0.01
     coarsest_voxel_m: float = 0.025
     smallest_part_m2: float = 0.004  # a handle 2 x 20 cm stays
+    outlier_neighbours: int = 0  # the paper removes statistical outliers by 20 neighbours: mostly true surface (cloud.py)
     most_bad_share: float = 0.2
     least_valid_share: float = 0.2  # high confidence alone must leave this much of the median frame
     seed: int = 0
@@ -65,6 +66,7 @@ def read_capture(
         coarsest_voxel_m=config.coarsest_voxel_m,
         depth_max_m=config.fused_far_m,
         smallest_part_m2=config.smallest_part_m2,
+        outlier_neighbours=config.outlier_neighbours,
         progress=progress.part(0.75, 0.9),
     )
     progress.at(0.9, "levelling")
