@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from r2c2r_core.align.protocol import NO_MATCH, Features, Matches
+from r2c2r_core.align.protocol import Features, Matches
 from r2c2r_core.arrays import Image, Mask
+from r2c2r_core.geometry.descriptors import mutual_pairs
 
 
 class SiftMatcher:
@@ -27,19 +28,7 @@ class SiftMatcher:
 
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that are each other's best and clearly better than the second best."""
-        if len(first.uv_px) < 2 or len(second.uv_px) < 2:
-            return NO_MATCH
-        likeness = first.descriptors @ second.descriptors.T  # of unit vectors: distance^2 = 2 - 2 * likeness
-        best = likeness.argmax(axis=1)
-        rows = np.arange(len(best))
-        top = likeness[rows, best]
-        likeness[rows, best] = -1.0
-        runner_up = likeness.max(axis=1)
-        likeness[rows, best] = top
-        clear = (1.0 - top) < self._ratio**2 * (1.0 - runner_up)
-        mutual = likeness.argmax(axis=0)[best] == rows
-        chosen = np.flatnonzero(clear & mutual)
-        return Matches(chosen, best[chosen])
+        return Matches(*mutual_pairs(first.descriptors, second.descriptors, self._ratio))
 
     def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
         """The pairs with each of the others."""

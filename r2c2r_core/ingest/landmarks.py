@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import sample_nearest, unproject
+from r2c2r_core.geometry.descriptors import mutual_pairs
 from r2c2r_core.geometry.registration import DegenerateFitError, similarity_ransac, umeyama
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
@@ -75,11 +76,5 @@ def _common(first: Landmarks, second: Landmarks) -> tuple[np.ndarray, np.ndarray
     """Indices into both of landmarks that are each other's best match, clearly better than the next."""
     if min(len(first.points), len(second.points)) < _LEAST:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    likeness = second.descriptors @ first.descriptors.T
-    best = likeness.argmax(axis=1)
-    runner_up, winner = np.partition(likeness, -2, axis=1)[:, -2:].T
-    here = np.arange(len(best))
-    clear = (1.0 - winner) < _RATIO**2 * (1.0 - runner_up)
-    mutual = likeness.argmax(axis=0)[best] == here
-    chosen = clear & mutual
-    return best[chosen], here[chosen]
+    here, there = mutual_pairs(second.descriptors, first.descriptors, _RATIO)
+    return there, here

@@ -1,0 +1,20 @@
+"""Which descriptors of two images belong together."""
+
+import numpy as np
+
+
+def mutual_pairs(first: np.ndarray, second: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of unit descriptors `first` (n, d) and `second` (m, d) that are each other's best, by rising row of the first.
+
+    The best must be clearly better than the second best: its distance below `ratio` times that one's (Lowe 2004). With
+    fewer than two of either nothing can be clear, and the answer is empty.
+    """
+    if min(len(first), len(second)) < 2:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    likeness = first @ second.T  # of unit vectors: distance^2 = 2 - 2 * likeness
+    best = likeness.argmax(axis=1)
+    runner_up, top = np.partition(likeness, -2, axis=1)[:, -2:].T
+    rows = np.arange(len(best))
+    clear = (1.0 - top) < ratio**2 * (1.0 - runner_up)
+    chosen = np.flatnonzero(clear & (likeness.argmax(axis=0)[best] == rows))
+    return chosen, best[chosen]

@@ -1,0 +1,22 @@
+import numpy as np
+
+from r2c2r_core.geometry.descriptors import mutual_pairs
+
+
+def unit(rows: list[list[float]]) -> np.ndarray:
+    array = np.array(rows)
+    return array / np.linalg.norm(array, axis=1, keepdims=True)
+
+
+def test_only_clear_and_mutual_pairs_are_taken() -> None:
+    first = unit([[1, 0, 0], [0, 1, 0], [0.8, 0.1, 0.6], [0, 0, 1]])
+    second = unit([[0, 1, 0.02], [1, 0.02, 0], [0.1, 0, 1], [0, 0.1, 1]])
+    rows, columns = mutual_pairs(first, second, 0.8)
+    # row 2 likes column 1, which likes row 0 better; row 3 has two equal favourites
+    assert rows.tolist() == [0, 1]
+    assert columns.tolist() == [1, 0]
+
+
+def test_with_one_descriptor_nothing_is_clear() -> None:
+    one = unit([[1, 0, 0]])
+    assert [len(found) for found in mutual_pairs(one, unit([[1, 0, 0], [0, 1, 0]]), 0.8)] == [0, 0]
