@@ -1,5 +1,6 @@
 """Where a project's files are, and names that cannot leave their folder."""
 
+import contextlib
 import os
 import re
 import shutil
@@ -100,11 +101,16 @@ def free_bytes(folder: Path) -> int:
 
 
 def folder_bytes(folder: Path) -> int:
-    """Bytes of all files below the folder; links are not followed."""
+    """Bytes of all files below the folder; links are not followed.
+
+    Workers write while this walks: a file that is renamed or deleted between
+    its listing and its measuring counts nothing.
+    """
     total = 0
     for parent, _, names in os.walk(folder):
         for name in names:
-            total += os.lstat(os.path.join(parent, name)).st_size
+            with contextlib.suppress(FileNotFoundError):
+                total += os.lstat(os.path.join(parent, name)).st_size
     return total
 
 
