@@ -1,6 +1,6 @@
 """Finished bundles: versions, their certificate, and single files out of the newest one."""
 
-import os
+import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from app.db.engine import reading
 from app.db.tables import Bundle
 from app.errors import NotFound, NotReady
 from app.services.context import Context
+from r2c2r_core.workspace import write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +78,12 @@ def member(context: Context, project_id: str, name: str) -> Path:
         raise NotReady("there is no bundle yet", hint="run the project first")
     target = files.previews / f"bundle-v{row.version}" / name
     if not target.is_file():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        part = target.with_name(f".{target.name}.{os.getpid()}")
         try:
             with zipfile.ZipFile(files.bundles / row.path) as archive:
-                part.write_bytes(archive.read(_inside(archive, name)))
+                content = archive.read(_inside(archive, name))
         except (KeyError, FileNotFoundError) as error:
             raise NotFound(f"the bundle has no {name}") from error
-        part.replace(target)
+        write_atomically(target, content)
     return target
 
 
@@ -98,10 +97,16 @@ def folder(context: Context, project_id: str) -> Path | None:
         return None
     target = files.previews / f"bundle-v{row.version}" / "files"
     if not target.is_dir():
-        part = target.with_name(f".files.{os.getpid()}")
-        with zipfile.ZipFile(files.bundles / row.path) as archive:
-            archive.extractall(part)  # our own exporter's archive
-        part.replace(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".files.") as scratch:
+            part = Path(scratch) / "files"
+            with zipfile.ZipFile(files.bundles / row.path) as archive:
+                archive.extractall(part)  # our own exporter's archive
+            try:
+                part.replace(target)
+            except OSError:  # another thread unpacked it meanwhile
+                if not target.is_dir():
+                    raise
     urdf = next(iter(sorted(target.rglob("scene.urdf"))), None)
     return urdf.parent if urdf else None
 

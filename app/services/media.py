@@ -1,6 +1,5 @@
 """Pixels and meshes for the browser, made once and kept in the project's previews."""
 
-import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from app.files import ProjectFiles, inside
 from app.services import projects
 from app.services.context import Context
 from app.services.reviews import candidate_mesh, generate_key
+from r2c2r_core.workspace import write_atomically
 
 WIDTHS = (160, 320, 480, 960, 1920)
 _DEPTH_WIDTH = 640  # pixels of a depth picture
@@ -104,11 +104,7 @@ def _kept(target: Path, make: Callable[[], bytes]) -> Path:
         return target
     with _LOCKS[hash(target) % len(_LOCKS)]:
         if not target.is_file():
-            content = make()
-            target.parent.mkdir(parents=True, exist_ok=True)
-            part = target.with_name(f".{target.name}.{os.getpid()}")
-            part.write_bytes(content)
-            part.replace(target)
+            write_atomically(target, make())
     return target
 
 

@@ -1,5 +1,6 @@
 """What this app can do, and folders a recording may be taken from."""
 
+import stat
 from pathlib import Path
 
 from app import schemas
@@ -48,7 +49,7 @@ def browse(context: Context, path: str | None) -> schemas.FolderListing:
         )
     except PermissionError as error:
         raise Forbidden(f"{folder} may not be read by this app", hint="choose another folder") from error
-    entries = [_entry(p) for p in found[:2000] if p.is_dir() or p.is_file()]
+    entries = [entry for p in found[:2000] if (entry := _entry(p))]
     parent = folder.parent if _is_allowed(context, folder.parent) else None
     return schemas.FolderListing(path=str(folder), parent=str(parent) if parent else "", entries=entries)
 
@@ -71,9 +72,17 @@ def _is_allowed(context: Context, path: Path) -> bool:
     return any(path.is_relative_to(root.resolve()) for root in context.settings.roots)
 
 
-def _entry(path: Path) -> schemas.FolderEntry:
-    folder = path.is_dir()
-    return schemas.FolderEntry(name=path.name, path=str(path), folder=folder, size=None if folder else path.stat().st_size)
+def _entry(path: Path) -> schemas.FolderEntry | None:
+    """A folder or a plain file; None for what is neither, or has just gone."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    if stat.S_ISDIR(found.st_mode):
+        return schemas.FolderEntry(name=path.name, path=str(path), folder=True, size=None)
+    if stat.S_ISREG(found.st_mode):
+        return schemas.FolderEntry(name=path.name, path=str(path), folder=False, size=found.st_size)
+    return None
 
 
 def _backend(registry: Registry, backend: Backend) -> schemas.Backend:

@@ -9,9 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+
+expect.set_options(timeout=60_000)  # what is waited for comes late on two busy cores
 
 QUIET = [  # without these Chromium looks for servers of its maker; a software GL draws the 3D view
     "--no-sandbox",

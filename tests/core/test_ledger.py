@@ -1,6 +1,7 @@
 """Resuming: what is computed again, and what is not."""
 
 import errno
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -92,3 +93,14 @@ def test_keys_follow_content(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("22")
     assert file_key(tmp_path / "a") != before[0]
     assert file_key(tmp_path) != before[1]
+
+
+def test_threads_that_write_one_file_at_once_do_not_take_each_others_half(tmp_path: Path) -> None:
+    path = tmp_path / "overrides.json"
+    with ThreadPoolExecutor(8) as pool:
+        for done in [pool.submit(write_atomically, path, bytes([value]) * 100_000) for value in range(160)]:
+            done.result()
+    content = path.read_bytes()
+    assert len(content) == 100_000
+    assert len(set(content)) == 1
+    assert [entry.name for entry in tmp_path.iterdir()] == ["overrides.json"]
