@@ -47,13 +47,13 @@ def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> N
             serve(host="127.0.0.1", port=0, data_dir=tmp_path)
     finally:
         server.terminate()
-        assert server.wait(timeout=10) in (0, -15)
+        assert server.wait(timeout=60) in (0, -15)
         server.stdout.close()  # type: ignore[union-attr]
 
 
 def _answers(address: str) -> bool:
     try:
-        with urllib.request.urlopen(f"{address.split('/?')[0]}/api/health", timeout=5) as answer:
+        with urllib.request.urlopen(f"{address.split('/?')[0]}/api/health", timeout=60) as answer:
             return bool(json.load(answer)["state"] == "ok")
     except OSError:
         return False

@@ -137,7 +137,7 @@ def test_the_raw_port_takes_only_those_who_know_the_key() -> None:
 
 
 def _status(port: int, headers: dict[str, str]) -> int:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("GET", "/", headers=headers)
         return connection.getresponse().status

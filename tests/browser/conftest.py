@@ -59,7 +59,7 @@ def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[
     assert found, line
     yield found.group()
     server.terminate()
-    server.wait(timeout=20)
+    server.wait(timeout=60)
     server.stdout.close()
 
 

@@ -55,7 +55,7 @@ def main() -> int:
             archive.writestr("report.json", json.dumps({"certificate": {"passed": True, "findings": [], "drift_m": 0.001}}))
     say(done=stage, computed=[], failures={}, passed=True)
     if behaviour == "lingers":
-        time.sleep(60)
+        time.sleep(600)
     return 0
 
 

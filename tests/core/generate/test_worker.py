@@ -140,7 +140,7 @@ def test_a_mesh_damaged_on_its_way_is_not_used(evidence):
 )
 def test_the_worker_answers_what_it_cannot_serve(method, path, headers, status):
     with worker(lambda wish, progress: None) as address:
-        connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=5)
+        connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=60)
         connection.putrequest(method, path)
         for name, value in headers.items():
             connection.putheader(name, value)
