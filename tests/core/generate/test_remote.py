@@ -4,7 +4,6 @@ import base64
 import io
 import json
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -118,20 +117,19 @@ def test_an_endless_answer_is_cut_off(evidence, monkeypatch):
 
 
 def test_a_person_can_stop_a_request_that_hangs(evidence):
-    stop, released = threading.Event(), threading.Event()
+    stop, released, answered = threading.Event(), threading.Event(), threading.Event()
 
     def hang(*request):
         stop.set()
-        released.wait(10)
+        released.wait(120)
+        answered.set()
         return said(200, {})
 
     with answering(hang) as (address, _):
-        started = time.monotonic()
         with pytest.raises(Cancelled):
             nim(address, progress=Progress(is_cancelled=stop.is_set)).make(evidence, "c0", 0)
-        waited = time.monotonic() - started
+        assert not answered.is_set()
         released.set()
-    assert waited < 5
 
 
 def test_a_server_that_hangs_is_asked_once(evidence):
