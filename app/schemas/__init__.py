@@ -1,0 +1,88 @@
+"""What goes over the wire. Times are seconds since 1970; lengths are metres; pixels are of the stored RGB frame."""
+
+from app.schemas.base import ErrorBody
+from app.schemas.bundles import Bundle, Certificate
+from app.schemas.captures import CaptureFacts, FrameInfo
+from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
+from app.schemas.masks import FrameMask, Lane, LaneEntry, LiveState, LiveStatus, MaskBits
+from app.schemas.objects import (
+    HistoryEntry,
+    ObjectIn,
+    ObjectPatch,
+    Point,
+    PointIn,
+    PointPatch,
+    PromptsFile,
+    PromptsFileObject,
+    PromptsFilePoint,
+    SceneObject,
+    SegmentState,
+    Undone,
+    UndoRequest,
+)
+from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, ProjectPatch, SampleRequest
+from app.schemas.proposals import Proposal, ProposalIds, Proposals
+from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
+from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
+from app.schemas.system import Backend, Category, FolderEntry, FolderListing, SystemInfo
+from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerShown
+
+__all__ = [
+    "Backend",
+    "Bundle",
+    "Candidate",
+    "CandidateGroup",
+    "CaptureFacts",
+    "Category",
+    "Certificate",
+    "Deleted",
+    "ErrorBody",
+    "FolderEntry",
+    "FolderListing",
+    "FrameInfo",
+    "FrameMask",
+    "HistoryEntry",
+    "ImportPath",
+    "Job",
+    "JobEvent",
+    "JointValues",
+    "Lane",
+    "LaneEntry",
+    "LiveState",
+    "LiveStatus",
+    "MaskBits",
+    "ObjectIn",
+    "ObjectPatch",
+    "OverrideData",
+    "OverridePatch",
+    "Placement",
+    "Point",
+    "PointIn",
+    "PointPatch",
+    "Project",
+    "ProjectCounts",
+    "ProjectPatch",
+    "PromptsFile",
+    "PromptsFileObject",
+    "PromptsFilePoint",
+    "Proposal",
+    "ProposalIds",
+    "Proposals",
+    "Reviewed",
+    "RunRequest",
+    "SampleRequest",
+    "SceneItem",
+    "SceneJoint",
+    "SceneObject",
+    "SceneSummary",
+    "SegmentState",
+    "StageInfo",
+    "StageState",
+    "SystemInfo",
+    "UndoRequest",
+    "Undone",
+    "VerdictIn",
+    "ViewerSession",
+    "ViewerShow",
+    "ViewerShown",
+]

@@ -1,0 +1,62 @@
+"""A recording: what it is, how good it is, and its frames."""
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+
+
+class CaptureRemark(Shape):
+    """One thing that is wrong with a recording, how much it matters, and what to do."""
+
+    verdict: str  # good | usable with care | unusable
+    cause: str
+    text: str
+    advice: str
+
+
+class CaptureMoment(Shape):
+    """What one of the frames that the doctor looked at is like."""
+
+    frame_index: int
+    sharpness: float  # over the median frame's
+    depth_share: float
+    brightness: float
+    error_mm: float | None  # disagreement of its depth with a later frame's
+
+
+class CaptureFigure(Shape):
+    """One measured figure, as a person reads it."""
+
+    name: str
+    value: str
+
+
+class CaptureFacts(Shape):
+    """What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png."""
+
+    format: str = ""
+    sha256: str = ""
+    frame_count: int = 0
+    width: int = 0
+    height: int = 0
+    depth_width: int = 0
+    depth_height: int = 0
+    duration_s: float | None = None
+    path_length_m: float = 0.0
+    up_source: str = ""
+    floor_found: bool = False
+    verdict: str = ""  # good | usable with care | unusable
+    remarks: list[CaptureRemark] = Field(default_factory=list)  # worst first
+    figures: list[CaptureFigure] = Field(default_factory=list)
+    moments: list[CaptureMoment] = Field(default_factory=list)
+
+
+class FrameInfo(Shape):
+    """One frame; `index` is its number in the recording. Image: /media/{project}/frames/{index}.jpg?w=960&v={media_version}."""
+
+    index: int
+    timestamp_s: float | None
+    width: int
+    height: int
+    sharpness: float
+    camera: list[float]  # position in the world frame, metres

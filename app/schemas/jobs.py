@@ -1,0 +1,61 @@
+"""Heavy work and its history."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.schemas.base import ErrorBody, Shape
+
+JobState = Literal["queued", "running", "cancelling", "cancelled", "failed", "done"]
+JobKind = Literal["import", "sample", "run"]
+
+
+class StageState(Shape):
+    """One stage of a job."""
+
+    name: str
+    state: Literal["waiting", "running", "done", "failed", "cancelled"]
+
+
+class Job(Shape):
+    """One piece of heavy work."""
+
+    id: int
+    project: str
+    project_name: str
+    kind: JobKind
+    state: JobState
+    stage: str
+    stage_fraction: float
+    stages: list[StageState]
+    progress: float  # 0..1 over all stages
+    eta_s: float | None
+    message: str
+    error: ErrorBody | None
+    position: int | None  # in the queue, 1 is next
+    attempts: int
+    who: str
+    has_log: bool
+    created: float
+    started: float | None
+    finished: float | None
+
+
+class JobEvent(Shape):
+    """One line of a job's history."""
+
+    id: int
+    at: float
+    kind: str
+    stage: str
+    fraction: float
+    text: str
+
+
+class RunRequest(Shape):
+    """Which backends, where not the defaults."""
+
+    segmenter: str | None = Field(default=None, max_length=60)
+    generator: str | None = Field(default=None, max_length=60)
+    matcher: str | None = Field(default=None, max_length=60)
+    seed: int = Field(default=0, ge=0, lt=2**31)

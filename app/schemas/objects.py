@@ -1,0 +1,126 @@
+"""Objects, clicks, undo and history."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+
+SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"]
+
+
+class PointIn(Shape):
+    """A click. Outside the frame is refused."""
+
+    frame: int = Field(ge=0, lt=2**31)
+    x: float = Field(allow_inf_nan=False)
+    y: float = Field(allow_inf_nan=False)
+    label: Literal[0, 1] = 1
+
+
+class PointPatch(Shape):
+    """A moved or flipped click."""
+
+    x: float | None = Field(default=None, allow_inf_nan=False)
+    y: float | None = Field(default=None, allow_inf_nan=False)
+    label: Literal[0, 1] | None = None
+
+
+class Point(Shape):
+    """A stored click."""
+
+    id: int
+    frame: int
+    x: float
+    y: float
+    label: Literal[0, 1]
+
+
+class ObjectIn(Shape):
+    """A new object; without a name it gets its category's and the next number."""
+
+    name: str | None = Field(default=None, max_length=60)
+    category: str = Field(default="object", min_length=1, max_length=60)
+    points: list[PointIn] = Field(default_factory=list, max_length=100)
+
+
+class ObjectPatch(Shape):
+    """What changes; with `version`, only if nobody changed it meanwhile."""
+
+    name: str | None = Field(default=None, max_length=60)
+    category: str | None = Field(default=None, min_length=1, max_length=60)
+    colour: int | None = Field(default=None, ge=0, le=999)
+    version: int | None = None
+
+
+class SceneObject(Shape):
+    """One object a person named."""
+
+    id: int
+    project: str
+    name: str
+    category: str
+    colour: int
+    version: int
+    deleted: bool
+    points: list[Point]
+    can_undo: bool
+    can_redo: bool
+    segment: SegmentState
+    mask_frames: int
+    mask_backend: str  # the segmenter that drew the masks; empty while there are none
+    notices: list[str]
+    saved: float  # when the last change was stored
+
+
+class UndoRequest(Shape):
+    """What to undo or redo: the last change of this object, or of any object when None."""
+
+    object: int | None = Field(default=None, ge=0, lt=2**63)
+    scope: Literal["prompts", "review"] = "prompts"
+
+
+class Undone(Shape):
+    """What was undone or redone, so that the page can say it."""
+
+    object: SceneObject
+    text: str
+    frame: int | None
+
+
+class HistoryEntry(Shape):
+    """Who changed what, when."""
+
+    id: int
+    object: int | None
+    scope: str
+    action: str
+    text: str
+    frame: int | None
+    who: str
+    at: float
+    undone: bool
+
+
+class PromptsFile(Shape):
+    """prompts.json."""
+
+    version: Literal[1]
+    objects: list["PromptsFileObject"] = Field(max_length=10_000)
+
+
+class PromptsFileObject(Shape):
+    """One object of prompts.json."""
+
+    name: str = Field(max_length=60)
+    category: str = Field(max_length=60)
+    points: list["PromptsFilePoint"] = Field(max_length=1000)
+
+
+class PromptsFilePoint(Shape):
+    """One click of prompts.json."""
+
+    frame: int = Field(ge=0, lt=2**31)
+    x: float = Field(allow_inf_nan=False)
+    y: float = Field(allow_inf_nan=False)
+    label: Literal[0, 1]

@@ -1,0 +1,37 @@
+"""Objects proposed without a click."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+
+
+class Proposal(Shape):
+    """An object that nobody clicked yet; confirming it adds this click under this category."""
+
+    id: str
+    kind: Literal["front", "appliance", "thing"]
+    category: str
+    confidence: float
+    frame: int  # the one that shows it best
+    x: float
+    y: float
+    size_m: list[float]  # width, depth, height
+    outline: list[tuple[float, float]]  # in pixels of the stored frame
+    handle: list[tuple[float, float]]  # its corners there; empty where none was found
+
+
+class Proposals(Shape):
+    """What is proposed now: dismissed ones and those that became objects are left out."""
+
+    state: Literal["none", "running", "done"]
+    fraction: float
+    items: list[Proposal]
+    dismissed: int
+
+
+class ProposalIds(Shape):
+    """Which proposals are meant."""
+
+    ids: list[str] = Field(min_length=1, max_length=500)

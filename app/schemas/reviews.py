@@ -1,0 +1,104 @@
+"""Candidates, what people say about them, and what they correct."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+from app.schemas.jobs import Job
+
+
+class Candidate(Shape):
+    """One candidate mesh with its evidence."""
+
+    id: str
+    generator: str
+    seed: int
+    watertight: bool
+    faces: int
+    frames: list[int]
+    metrics: dict[str, float]
+    parameters: dict[str, float]
+    warnings: list[str]
+    verdict: Literal["accepted", "rejected"] | None
+    verdict_reason: str
+    verdict_by: str
+    glb: str
+    thumbnail: str
+
+
+class Placement(Shape):
+    """Where the chosen candidate stands, with the evidence for it."""
+
+    candidate: str
+    scale: float
+    translation_m: list[float]
+    matches: int
+    inliers: int
+    rms_m: float
+    mask_iou: float
+    condition: float
+    unsure: bool
+    runner_up: float | None
+    method: str
+    votes: dict[int, int]
+    warnings: list[str]
+
+
+class CandidateGroup(Shape):
+    """All candidates of one object, the automatic choice and its reason, and what people said."""
+
+    object: int
+    name: str
+    category: str
+    chosen: str
+    chosen_by: str
+    reason: str
+    ranking: list[str]
+    accepted: str | None
+    candidates: list[Candidate]
+    placement: Placement | None
+    override: "OverrideData"
+    can_undo: bool
+    can_redo: bool
+
+
+class VerdictIn(Shape):
+    """What a reviewer says. Rejecting makes new candidates; accepting another one aligns it anew."""
+
+    candidate: str = Field(min_length=1, max_length=60)
+    verdict: Literal["accepted", "rejected", "cleared"]
+    reason: str = Field(default="", max_length=500)
+    rerun: bool = True
+
+
+class OverrideData(Shape):
+    """What a person corrected about one object; None is computed."""
+
+    candidate: str | None = None
+    hinge: Literal["left", "right", "top", "bottom"] | None = None
+    dimensions_m: tuple[float, float, float] | None = None
+    pose: list[list[float]] | None = None  # world_from_object, 4x4
+    joint_lower: float | None = None
+    joint_upper: float | None = None
+    rejected: list[str] = Field(default_factory=list)
+
+
+class OverridePatch(Shape):
+    """The fields that are present are set; null clears."""
+
+    candidate: str | None = None
+    hinge: Literal["left", "right", "top", "bottom"] | None = None
+    dimensions_m: tuple[float, float, float] | None = None
+    pose: list[list[float]] | None = None
+    joint_lower: float | None = Field(default=None, allow_inf_nan=False)
+    joint_upper: float | None = Field(default=None, allow_inf_nan=False)
+    rerun: bool = True
+
+
+class Reviewed(Shape):
+    """The object after a verdict or a correction, and the job that follows from it."""
+
+    group: CandidateGroup | None
+    job: Job | None
+    text: str

@@ -1,0 +1,55 @@
+"""What this app can do here, and the folders it may read."""
+
+from typing import Literal
+
+from app.schemas.base import Shape
+
+
+class Category(Shape):
+    """One line of the category table."""
+
+    name: str
+    label: str
+    joint: str  # revolute | prismatic | none
+
+
+class Backend(Shape):
+    """One way to do a stage's work."""
+
+    name: str
+    summary: str
+    licence: str
+    licence_class: Literal["open", "restricted"]
+    available: bool
+    reason: str  # why not, and the next step
+
+
+class SystemInfo(Shape):
+    """What the app can do here; limits are shown before a file is chosen."""
+
+    version: str
+    user: str
+    max_upload_bytes: int
+    free_bytes: int
+    import_roots: list[str]
+    categories: list[Category]
+    palette: list[str]  # colours by object.colour, "#rrggbb"
+    viewer: bool
+    segmenters: list[Backend]  # the first needs nothing and is the default
+
+
+class FolderEntry(Shape):
+    """One line of a folder that a recording may be taken from."""
+
+    name: str
+    path: str
+    folder: bool
+    size: int | None
+
+
+class FolderListing(Shape):
+    """A folder below an allowed root."""
+
+    path: str
+    parent: str | None
+    entries: list[FolderEntry]
