@@ -26,6 +26,8 @@ libs:
 $(STAMP): pyproject.toml constraints.txt
 	bash scripts/make-venv.sh "$(PYTHON)" "$(VENV)"
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
+	@# scene_synthesizer brings it and nothing here calls it: the C code inside is free for non-commercial use only
+	"$(BIN)/python" -m pip uninstall --quiet --yes triangle
 	touch "$(STAMP)"
 
 # torch is large: only the tests bring it

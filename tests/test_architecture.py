@@ -1,5 +1,6 @@
 """The house: contracts that import-linter cannot say, and documents that must stay true."""
 
+import importlib.util
 import subprocess
 import sys
 import tomllib
@@ -52,6 +53,11 @@ for package in (r2c2r_core, app):
 """
     done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_no_code_that_forbids_commercial_use_is_installed() -> None:
+    """The C code in `triangle` forbids it; scene_synthesizer asks for it, `make env` takes it away, nothing misses it."""
+    assert importlib.util.find_spec("triangle") is None, "take it away: pip uninstall triangle"
 
 
 def test_alembic_folder_does_not_shadow_the_library() -> None:
