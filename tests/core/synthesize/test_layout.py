@@ -46,6 +46,19 @@ def test_the_rooms_right_angle_wins_when_a_run_is_within_a_degree_of_it() -> Non
     np.testing.assert_allclose([o.outward for o in layout.objects], [[0, -1, 0]] * 5, atol=1e-9)
 
 
+def test_a_free_standing_appliance_keeps_the_way_it_was_put() -> None:
+    """Four degrees off the run it was turned on purpose; half a degree is what measuring its front can be wrong by."""
+    for turned_deg, expected_deg in ((4.0, 4.0), (0.5, 0.0)):
+        yaw = float(np.deg2rad(turned_deg))
+        units = [
+            *run_of_doors(0.0, 0.0),
+            Unit("m", "microwave", (1.0, 0.05, 1.08), (0.5, 0.36, 0.28), yaw=yaw, kind="appliance"),
+        ]
+        microwave = arranged(*units, manhattan=0.0).objects[-1]
+        found = np.arctan2(microwave.outward[0], -microwave.outward[1])
+        assert abs(np.rad2deg(found) - expected_deg) < 0.05, turned_deg
+
+
 def test_a_front_that_stands_out_by_five_centimetres_stays_out() -> None:
     units = [*run_of_doors(0.0, 0.0), Unit("tall", "cabinet", (2.52, -0.05, 0.5), (0.5, 0.58, 0.7))]
     layout = arranged(*units)
