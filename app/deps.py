@@ -1,16 +1,33 @@
-"""What a route is given."""
+"""What a route is given: the running app as the person who asks may use it. The type says which role a route needs."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated
 
 from fastapi import Depends, Request
 
+from app.security import Role
 from app.services.context import Context
 
 
-def get_context(request: Request) -> Context:
-    """The running app's engine, queue and viewer."""
+def context_for(role: Role) -> Callable[[Request], Context]:
+    """The running app's engine, queue and viewer, for someone of that role; Forbidden for anyone less."""
+
+    def get_context(request: Request) -> Context:
+        context: Context = replace(request.app.state.context, person=request.state.person)
+        context.require(role)
+        return context
+
+    return get_context
+
+
+def running_app(request: Request) -> Context:
+    """The running app, for someone who has not signed in."""
     context: Context = request.app.state.context
     return context
 
 
-Ctx = Annotated[Context, Depends(get_context)]
+OpenCtx = Annotated[Context, Depends(running_app)]
+Ctx = Annotated[Context, Depends(context_for("annotator"))]
+ReviewerCtx = Annotated[Context, Depends(context_for("reviewer"))]
+AdminCtx = Annotated[Context, Depends(context_for("admin"))]

@@ -7,6 +7,7 @@ R2C2RError (r2c2r_core.errors)
 │   ├── Unauthorised        401
 │   ├── Forbidden           403
 │   ├── TooLarge            413
+│   ├── TooMany             429   the same was tried too often
 │   ├── NotReady            409   the thing asked for is not made yet
 │   └── Unavailable         503   a helper process is down
 └── the core's own errors   422 what was given, 507/503 the machine, 500 the work
@@ -45,6 +46,14 @@ class TooLarge(AppError):
     """More bytes than the limit."""
 
 
+class TooMany(AppError):
+    """The same was tried too often; `retry_s` says when it may be tried again."""
+
+    def __init__(self, message: str, *, hint: str = "", retry_s: int = 60) -> None:
+        super().__init__(message, hint=hint)
+        self.retry_s = retry_s
+
+
 class NotReady(AppError):
     """The thing asked for is not made yet."""
 
@@ -65,6 +74,7 @@ KINDS: tuple[tuple[type[core.R2C2RError], str, int], ...] = (
     (Unauthorised, "unauthorised", 401),
     (Forbidden, "forbidden", 403),
     (TooLarge, "too-large", 413),
+    (TooMany, "too-many", 429),
     (Unavailable, "unavailable", 503),
     (NoSpace, "no-space", 507),
     (core.CaptureError, "capture", 422),

@@ -22,9 +22,10 @@ from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
 from app.jobs.plans import Commands
 from app.jobs.runner import Runner
-from app.routes import jobs, live, media, pages, projects, prompts, proposals, reviews, scenes, system, viewer
-from app.security import Guard, Keys
+from app.routes import jobs, live, media, pages, people, projects, prompts, proposals, reviews, scenes, system, viewer
+from app.security import Guard, Person
 from app.services.context import Context
+from app.services.people import People
 from app.services.prompts import tell_object
 from app.settings import Settings, shipped
 from app.viewer.client import Viewer
@@ -33,7 +34,7 @@ from r2c2r_core.errors import R2C2RError
 _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
-ROUTERS = (system, projects, prompts, proposals, jobs, reviews, scenes, media, viewer, live, pages)
+ROUTERS = (system, people, projects, prompts, proposals, jobs, reviews, scenes, media, viewer, live, pages)
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
 
@@ -59,14 +60,14 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
-        responses={code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422)},
+        responses={code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422, 429)},
     )
     for module in ROUTERS:
         app.include_router(module.router)
     app.mount("/static", RevalidatedFiles(directory=static), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
-    app.add_middleware(Guard, keys=Keys(settings.data_dir), allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)
     return app
 
 
@@ -81,7 +82,7 @@ class RevalidatedFiles(StaticFiles):
 
     async def get_response(self, path: str, scope: Scope) -> object:  # type: ignore[override]
         """Development files beside the pages are not served."""
-        if path.split("/", 1)[0] not in ("index.html", "css", "js", "icons", "favicon.svg"):
+        if path.split("/", 1)[0] not in ("index.html", "login.html", "css", "js", "icons", "favicon.svg"):
             raise HTTPException(404)
         return await super().get_response(path, scope)
 
@@ -94,7 +95,8 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
         settings=settings,
         engine=engine,
         hub=hub,
-        keys=Keys(settings.data_dir),
+        people=People(engine, settings),
+        person=Person(settings.user, "admin"),
         runner=runner,
         live=LiveSegmenters(hub, settings, commands),
         viewer=viewer_client or Viewer(settings),
@@ -104,6 +106,11 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
     if settings.run_jobs:
         runner.start()
     return context
+
+
+def _person_of(app: FastAPI, session: str) -> Person | None:
+    context: Context = app.state.context
+    return context.people.of(session)
 
 
 async def _tidy(context: Context) -> None:
@@ -132,7 +139,8 @@ def _add_error_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(R2C2RError)
     async def known(_: Request, error: R2C2RError) -> JSONResponse:
-        return JSONResponse(errors.error_body(error), errors.kind_of(error)[1])
+        headers = {"retry-after": str(error.retry_s)} if isinstance(error, errors.TooMany) else None
+        return JSONResponse(errors.error_body(error), errors.kind_of(error)[1], headers=headers)
 
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:

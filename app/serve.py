@@ -8,10 +8,11 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import uvicorn
 from sqlmodel import select
 
@@ -21,19 +22,26 @@ from app.db.tables import Project
 from app.files import project_files
 from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts
 from app.main import create_app
+from app.services import accounts
 from app.services.projects import new_project
 from app.settings import LOOPBACK, Settings
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
 
-def serve(*, host: str, port: int, data_dir: Path, open_project: str | None = None, insecure: bool = False) -> None:
-    """Run the app until it is stopped; the address with its key is printed first."""
+def serve(*, host: str, port: int, data_dir: Path, names: Sequence[str] = (), open_project: str | None = None) -> None:
+    """Run the app until it is stopped; the address is printed first, with its key when only this machine reaches it.
+
+    `names` are host names by which people reach it, where they differ from the address it listens on.
+    """
     data_dir = data_dir.expanduser().resolve()
-    settings = _settings(data_dir, host, insecure)
+    settings = _settings(data_dir, host, names)
     with _only_server(data_dir), _bound(host, port) as listening:
-        address = f"http://{_shown_host(host)}:{listening.getsockname()[1]}"
+        if settings.accounts_only:
+            _require_accounts(settings)
+        address = f"http://{names[0] if names else _shown_host(host)}:{listening.getsockname()[1]}"
         page = f"/p/{open_project}" if open_project else "/"
-        sys.stdout.write(f"r2c2r: {address}{page}?token={settings.launch_token}\n")
+        key = "" if settings.accounts_only else f"?token={settings.launch_token}"
+        sys.stdout.write(f"r2c2r: {address}{page}{key}\n")
         sys.stdout.flush()
         config = uvicorn.Config(
             create_app(settings),
@@ -76,20 +84,35 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
         engine.dispose()
 
 
-def _settings(data_dir: Path, host: str, insecure: bool) -> Settings:
+def _settings(data_dir: Path, host: str, names: Sequence[str]) -> Settings:
     try:
         data_dir.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise EnvironmentProblem(f"{data_dir}: {error.strerror}", hint="choose another folder with --data") from error
-    settings = Settings(data_dir=data_dir, host=host)
-    if _is_loopback(host):
+    settings = Settings(data_dir=data_dir, host=host, allowed_hosts=(*LOOPBACK, *(name.lower() for name in names)))
+    if _is_loopback(host) and not names:
         return settings
-    if not insecure:
-        raise EnvironmentProblem(
-            f"{host} can be reached from other machines, and this version knows no accounts",
-            hint="bind 127.0.0.1 and tunnel with ssh -L",
-        )
-    return replace(settings, allowed_hosts=(*LOOPBACK, host, socket.gethostname().lower()))
+    reached = (*settings.allowed_hosts, host, socket.gethostname().lower(), *_own_addresses())
+    return replace(settings, accounts_only=True, allowed_hosts=reached)
+
+
+def _require_accounts(settings: Settings) -> None:
+    engine = open_engine(settings.database)
+    try:
+        if not accounts.everyone(engine):
+            raise EnvironmentProblem(
+                "this address can be reached from other machines, and nobody has an account",
+                hint="make one first: r2c2r user add NAME --role admin; or bind 127.0.0.1 and tunnel with ssh -L",
+            )
+    finally:
+        engine.dispose()
+    sys.stderr.write("r2c2r: passwords and scans cross the network as they are; put it behind a proxy that speaks TLS\n")
+
+
+def _own_addresses() -> list[str]:
+    """Addresses of this machine: who listens on all of them is called by any."""
+    found = (address.address for addresses in psutil.net_if_addrs().values() for address in addresses)
+    return [address.split("%")[0].lower() for address in found if address[:1].isalnum()]
 
 
 def _is_loopback(host: str) -> bool:

@@ -20,6 +20,7 @@ class Settings:
     launch_token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     host: str = "127.0.0.1"
     allowed_hosts: tuple[str, ...] = LOOPBACK
+    accounts_only: bool = False  # others can reach it: the printed key opens nothing, people sign in
     import_roots: tuple[Path, ...] = ()
     max_upload_bytes: int = 16 * 1024 * MEBIBYTE
     max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE

@@ -5,6 +5,7 @@ stderr; a traceback only with --debug. Results go to stdout, progress to stderr.
 """
 
 import argparse
+import getpass
 import importlib
 import json
 import os
@@ -199,7 +200,23 @@ def doctor(options: argparse.Namespace) -> int:
 
 def serve(options: argparse.Namespace) -> int:
     """The web app."""
-    _web().serve(host=options.host, port=options.port, data_dir=options.data)
+    _web("serve").serve(host=options.host, port=options.port, data_dir=options.data, names=options.name)
+    return 0
+
+
+def user(options: argparse.Namespace) -> int:
+    """Accounts of the people who may sign in: add, list, role, password, remove."""
+    users, data, name = _web("users"), options.data, getattr(options, "name", "")
+    if options.what == "list":
+        print(table(("name", "role"), users.everyone(data)))
+    elif options.what == "add":
+        users.add(data, name, options.role, _password())
+    elif options.what == "role":
+        users.set_role(data, name, options.role)
+    elif options.what == "password":
+        users.set_password(data, name, _password())
+    elif options.what == "remove":
+        users.remove(data, name)
     return 0
 
 
@@ -216,15 +233,25 @@ def demo(options: argparse.Namespace) -> int:
     code = main(["run", str(scan), "--prompts", str(prompts), "-o", str(bundle), "--workdir", str(folder / "work")])
     if code or options.no_serve:
         return code
-    web = _web()
+    web = _web("serve")
     project = web.register_finished(options.data, name="Sample kitchen", source=scan, prompts=prompts, workdir=folder / "work")
     web.serve(host=options.host, port=options.port, data_dir=options.data, open_project=project)
     return 0
 
 
-def _web() -> Any:
-    """The web half, by name: the core never imports it (architecture: never r2c2r_core -> app)."""
-    return importlib.import_module("app.serve")
+def _web(module: str) -> Any:
+    """A module of the web half, by name: the core never imports it (architecture: never r2c2r_core -> app)."""
+    return importlib.import_module(f"app.{module}")
+
+
+def _password() -> str:
+    """Asked for twice on a terminal, else the first line of standard input."""
+    if not sys.stdin.isatty():
+        return sys.stdin.readline().rstrip("\n")
+    password = getpass.getpass("password: ")
+    if getpass.getpass("once more: ") != password:
+        raise InputError("the two passwords differ", hint="try again")
+    return password
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -246,9 +273,12 @@ def _parser() -> argparse.ArgumentParser:
         web.add_argument("--host", default="127.0.0.1")
         web.add_argument("--port", type=int, default=8000)
         web.add_argument("--data", type=Path, default=data, help="folder of the projects (default: %(default)s)")
+        if name == "serve":
+            web.add_argument("--name", action="append", default=[], metavar="HOST", help="another name people reach it by")
         if name == "demo":
             web.add_argument("--no-serve", action="store_true", help="stop after the bundle is written")
             _add_size(web)
+    _add_user(add("user", user), data)
     sampled = add("sample", sample)
     sampled.add_argument("out", type=Path)
     sampled.add_argument("--seed", type=int, default=0)
@@ -284,6 +314,19 @@ def _parser() -> argparse.ArgumentParser:
     machine.add_argument("--data", type=Path, default=data)
     machine.add_argument("--json", type=Path)
     return parser
+
+
+def _add_user(parser: argparse.ArgumentParser, data: Path) -> None:
+    actions = parser.add_subparsers(required=True, dest="what", metavar="add|list|role|password|remove")
+    for what in ("add", "list", "role", "password", "remove"):
+        action = actions.add_parser(what)
+        action.add_argument("--data", type=Path, default=data, help="folder of the projects (default: %(default)s)")
+        if what != "list":
+            action.add_argument("name")
+        if what == "add":
+            action.add_argument("--role", default="annotator", help="annotator, reviewer or admin (default: %(default)s)")
+        if what == "role":
+            action.add_argument("role", help="annotator, reviewer or admin")
 
 
 def _add_size(parser: argparse.ArgumentParser) -> None:

@@ -31,6 +31,44 @@ class Project(SQLModel, table=True):
     segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
 
 
+class Account(SQLModel, table=True):
+    """A person who may sign in."""
+
+    __tablename__ = "accounts"
+    __table_args__ = (UniqueConstraint("name", name="uq_accounts_name"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    name: str  # lower case
+    role: str  # annotator | reviewer | admin
+    password: str  # argon2id, with its parameters and salt
+    created: float
+
+
+class SignIn(SQLModel, table=True):
+    """One browser that is let in; without an account it is that of whoever started the server."""
+
+    __tablename__ = "sign_ins"
+
+    digest: str = Field(primary_key=True)  # SHA-256 of what the cookie holds: the file alone lets nobody in
+    account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
+    created: float
+    used: float  # to the hour
+
+
+class Upload(SQLModel, table=True):
+    """A recording on its way in; its bytes are in the uploads folder, and how many they are is read from there."""
+
+    __tablename__ = "uploads"
+
+    id: str = Field(primary_key=True)  # becomes the project's
+    file_name: str
+    name: str | None = None
+    size: int
+    modified: float | None = None  # the file's own time of change: with name and size it tells that it is the same file
+    who: str
+    created: float
+
+
 class SceneObject(SQLModel, table=True):
     """One object a person named."""
 

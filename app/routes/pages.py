@@ -1,20 +1,28 @@
-"""The pages of the front end, and the exchange of the printed token for a session."""
+"""The pages of the front end, and the exchange of the printed key for a session."""
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, RedirectResponse, Response
 
-from app.deps import Ctx
-from app.services import sessions
+from app.deps import OpenCtx
+from app.routes.people import give_cookie
 
 router = APIRouter(include_in_schema=False)
+
+REVALIDATED = {"cache-control": "no-cache"}
 
 
 @router.get("/")
 @router.get("/p/{rest:path}")
-def page(context: Ctx, request: Request, rest: str = "", token: str | None = None) -> Response:
-    """The one page; the address says what it shows. A token in the address becomes a cookie and leaves the address."""
+def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None) -> Response:
+    """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address."""
     if token is not None:
         answer: Response = RedirectResponse(request.url.remove_query_params("token").path, status_code=303)
-        sessions.start(context, token, answer)
+        give_cookie(request, answer, context.people.enter_with_key(token))
         return answer
-    return FileResponse(context.static / "index.html", headers={"cache-control": "no-cache"})
+    return FileResponse(context.static / "index.html", headers=REVALIDATED)
+
+
+@router.get("/login")
+def login_page(context: OpenCtx) -> Response:
+    """Where people sign in."""
+    return FileResponse(context.static / "login.html", headers=REVALIDATED)

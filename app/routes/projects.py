@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Request
 
 from app import schemas
-from app.deps import Ctx
+from app.deps import AdminCtx, Ctx
 from app.routes.numbers import Count, OptionalId
 from app.services import imports, projects
 
@@ -25,7 +25,7 @@ async def upload_project(context: Ctx, request: Request, filename: str, name: st
 
 
 @router.post("/import", operation_id="importProject", status_code=202)
-def import_project(context: Ctx, body: schemas.ImportPath) -> schemas.Project:
+def import_project(context: AdminCtx, body: schemas.ImportPath) -> schemas.Project:
     """A new project from a recording on the server's machine; starts the import."""
     return imports.from_path(context, body)
 
@@ -49,7 +49,7 @@ def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> sc
 
 
 @router.delete("/{project}", operation_id="deleteProject")
-def delete_project(context: Ctx, project: str) -> schemas.Deleted:
+def delete_project(context: AdminCtx, project: str) -> schemas.Deleted:
     """Delete the project and its files; a recording imported by path stays where it is."""
     return projects.delete(context, project)
 

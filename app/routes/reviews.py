@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Request
 
 from app import schemas
-from app.deps import Ctx
+from app.deps import Ctx, ReviewerCtx
 from app.routes.numbers import RowId
 from app.services import reviews
 
@@ -24,14 +24,14 @@ def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.Candida
 
 @router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201)
 async def upload_candidate(
-    context: Ctx, request: Request, project: str, object: RowId, filename: str, rerun: bool = True
+    context: ReviewerCtx, request: Request, project: str, object: RowId, filename: str, rerun: bool = True
 ) -> schemas.Reviewed:
     """A mesh (the request's body: GLB, OBJ, PLY or STL) as this object's candidate, chosen by a person."""
     return await reviews.upload(context, project, object, filename, request.stream(), rerun)
 
 
 @router.post("/objects/{object}/verdicts", operation_id="giveVerdict")
-def give_verdict(context: Ctx, project: str, object: RowId, body: schemas.VerdictIn) -> schemas.Reviewed:
+def give_verdict(context: ReviewerCtx, project: str, object: RowId, body: schemas.VerdictIn) -> schemas.Reviewed:
     """Accept, reject or clear; undo with scope `review`."""
     return reviews.give_verdict(context, project, object, body)
 
@@ -43,6 +43,6 @@ def get_override(context: Ctx, project: str, object: RowId) -> schemas.OverrideD
 
 
 @router.patch("/objects/{object}/override", operation_id="setOverride")
-def set_override(context: Ctx, project: str, object: RowId, body: schemas.OverridePatch) -> schemas.Reviewed:
+def set_override(context: ReviewerCtx, project: str, object: RowId, body: schemas.OverridePatch) -> schemas.Reviewed:
     """Correct the object; what depends on it runs again."""
     return reviews.set_override(context, project, object, body)

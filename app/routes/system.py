@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from app import schemas
-from app.deps import Ctx
+from app.deps import AdminCtx, Ctx
 from app.services import system
 
 router = APIRouter(prefix="/api", tags=["system"])
@@ -22,6 +22,6 @@ def get_system(context: Ctx) -> schemas.SystemInfo:
 
 
 @router.get("/browse", operation_id="browse")
-def browse(context: Ctx, path: str | None = None) -> schemas.FolderListing:
+def browse(context: AdminCtx, path: str | None = None) -> schemas.FolderListing:
     """A folder on the server's machine, below an allowed root; without a path, the roots."""
     return system.browse(context, path)

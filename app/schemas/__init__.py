@@ -20,6 +20,7 @@ from app.schemas.objects import (
     Undone,
     UndoRequest,
 )
+from app.schemas.people import Credentials
 from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, ProjectPatch, SampleRequest
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
 from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
@@ -35,6 +36,7 @@ __all__ = [
     "CaptureFacts",
     "Category",
     "Certificate",
+    "Credentials",
     "Deleted",
     "ErrorBody",
     "FolderEntry",

@@ -29,6 +29,8 @@ class SystemInfo(Shape):
 
     version: str
     user: str
+    role: Literal["annotator", "reviewer", "admin"]
+    account: bool  # signed in by a password: may sign out
     max_upload_bytes: int
     free_bytes: int
     import_roots: list[str]

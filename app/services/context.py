@@ -6,11 +6,13 @@ from pathlib import Path
 from sqlalchemy import Engine
 
 from app.db.tables import Project
+from app.errors import Forbidden
 from app.files import ProjectFiles, project_files
 from app.hub import Hub
 from app.jobs.live import LiveSegmenters
 from app.jobs.runner import Runner
-from app.security import Keys
+from app.security import Person, Role
+from app.services.people import People
 from app.settings import Settings
 from app.viewer.client import Viewer
 
@@ -22,11 +24,24 @@ class Context:
     settings: Settings
     engine: Engine
     hub: Hub
-    keys: Keys
+    people: People
+    person: Person  # who asks; outside a request, who started the server
     runner: Runner
     live: LiveSegmenters
     viewer: Viewer
     static: Path
+
+    @property
+    def who(self) -> str:
+        """Who asks, as the history says it."""
+        return self.person.name
+
+    def require(self, role: Role) -> None:
+        """Raise Forbidden unless who asks may do what that role may."""
+        if not self.person.may(role):
+            raise Forbidden(
+                f"{self.who} is {self.person.role}; this needs a role of {role}", hint="ask an admin of this server"
+            )
 
     def files(self, project: Project) -> ProjectFiles:
         """Where the project's files are."""

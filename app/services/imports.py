@@ -90,7 +90,7 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
 
 def queue_job(context: Context, session: Session, project: Project, kind: str, payload: dict[str, object]) -> Job:
     """Put a job into the queue."""
-    job = Job(project_id=project.id, kind=kind, state="queued", payload=payload, who=context.settings.user, created=time.time())
+    job = Job(project_id=project.id, kind=kind, state="queued", payload=payload, who=context.who, created=time.time())
     job.message = "waiting"
     session.add(job)
     session.flush()

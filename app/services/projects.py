@@ -70,7 +70,7 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
 def _note(context: Context, session: Session, row: Project, action: str, text: str, after: dict[str, str]) -> None:
     """Change fields of a project, with an event beside it."""
     now = time.time()
-    event = Event(project_id=row.id, scope="project", action=action, text=text, who=context.settings.user, at=now)
+    event = Event(project_id=row.id, scope="project", action=action, text=text, who=context.who, at=now)
     event.before, event.after = {key: getattr(row, key) for key in after}, dict(after)
     row.sqlmodel_update({**after, "updated": now})
     session.add_all([row, event])

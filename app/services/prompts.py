@@ -47,7 +47,7 @@ def create(
         session.add(item)
         session.flush()
         frame = body.points[0].frame if body.points else None
-        with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.settings.user, frame=frame):
+        with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.who, frame=frame):
             item.deleted = False
             session.add(item)
             session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
@@ -64,7 +64,7 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             raise Conflict(f"{item.name} was changed meanwhile", hint="look at what is stored now", current=current)
         wanted = _wanted(session, item, body)
         text = ", ".join(f"{key} of {item.name} → {value}" for key, value in wanted.items()) or "nothing"
-        with history.change(session, item, "prompts", "edit", text, who=context.settings.user):
+        with history.change(session, item, "prompts", "edit", text, who=context.who):
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
@@ -75,7 +75,7 @@ def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneOb
     """Take the object out; undo brings it back."""
     with writing(context.engine) as session:
         item = queries.object_row(session, project_id, object_id)
-        with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.settings.user):
+        with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.who):
             item.deleted = True
             session.add(item)
     context.live.cancel(project_id, object_id)
@@ -89,7 +89,7 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
         item = queries.object_row(session, project_id, object_id)
         _check_point(context, project, body.frame, body.x, body.y)
         text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
-        with history.change(session, item, "prompts", "add point", text, who=context.settings.user, frame=body.frame):
+        with history.change(session, item, "prompts", "add point", text, who=context.who, frame=body.frame):
             session.add(Point(object_id=item.id or 0, **body.model_dump()))
     return _after(context, project_id, object_id, infer)
 
@@ -105,7 +105,7 @@ def move_point(
         changes = body.model_dump(exclude_none=True)
         _check_point(context, project, point.frame, changes.get("x", point.x), changes.get("y", point.y))
         text = f"moved a point of {item.name}, frame {point.frame}"
-        with history.change(session, item, "prompts", "move point", text, who=context.settings.user, frame=point.frame):
+        with history.change(session, item, "prompts", "move point", text, who=context.who, frame=point.frame):
             point.sqlmodel_update(changes)
             session.add(point)
     return _after(context, project_id, object_id, infer)
@@ -117,7 +117,7 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
         item = queries.object_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         text = f"removed a point of {item.name}, frame {point.frame}"
-        with history.change(session, item, "prompts", "remove point", text, who=context.settings.user, frame=point.frame):
+        with history.change(session, item, "prompts", "remove point", text, who=context.who, frame=point.frame):
             session.delete(point)
     return _after(context, project_id, object_id, infer)
 
@@ -150,7 +150,7 @@ def import_file(context: Context, project_id: str, body: schemas.PromptsFile) ->
         for entry in body.objects:
             for point in entry.points:
                 _check_point(context, project, point.frame, point.x, point.y)
-        items = adopt_prompts(session, project, body.model_dump(), context.settings.user)
+        items = adopt_prompts(session, project, body.model_dump(), context.who)
     return [_after(context, project_id, item.id, infer=False) for item in items]
 
 
@@ -174,6 +174,8 @@ def tell_object(context: Context, project_id: str, object_id: int) -> schemas.Sc
 
 
 def _step(context: Context, project_id: str, body: schemas.UndoRequest, direction: Literal["undo", "redo"]) -> schemas.Undone:
+    if body.scope == "review":
+        context.require("reviewer")
     with writing(context.engine) as session:
         queries.project_row(session, project_id)
         number = body.object if body.object is not None else history.last_change(session, project_id, body.scope, direction)
@@ -181,7 +183,7 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
             raise Conflict(f"nothing to {direction}")
         item = queries.object_row(session, project_id, number, deleted=True)
         step = history.undo if direction == "undo" else history.redo
-        event = step(session, item, body.scope, who=context.settings.user)
+        event = step(session, item, body.scope, who=context.who)
     shape = _after(context, project_id, number, infer=body.scope == "prompts")
     if body.scope == "review":
         context.hub.publish("review", project_id, object=number)

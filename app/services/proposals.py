@@ -107,7 +107,7 @@ def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.P
 
 
 def _event(context: Context, project_id: str, action: str, text: str, frame: int | None, after: dict[str, Any] | None) -> Event:
-    event = Event(project_id=project_id, scope=_SCOPE, action=action, text=text, who=context.settings.user, at=time.time())
+    event = Event(project_id=project_id, scope=_SCOPE, action=action, text=text, who=context.who, at=time.time())
     event.frame, event.after = frame, after
     return event
 

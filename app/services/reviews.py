@@ -59,8 +59,8 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
         if body.candidate not in known | set(before.get("rejected", [])):
             raise NotFound(f"{item.name} has no candidate {body.candidate}", hint="the candidates may have been made anew")
         text = f"{body.verdict} {body.candidate} of {item.name}" + (f": {body.reason}" if body.reason else "")
-        with history.change(session, item, "review", body.verdict, text, who=context.settings.user):
-            _store_verdict(session, item, body, context.settings.user)
+        with history.change(session, item, "review", body.verdict, text, who=context.who):
+            _store_verdict(session, item, body, context.who)
             history.set_override(session, item, _override_after(before, body, facts))
         changed = history.override_data(session, item) != before
         job = _rerun(context, session, project) if body.rerun and changed else None
@@ -85,7 +85,7 @@ def set_override(context: Context, project_id: str, object_id: int, body: schema
         _check_override(context, project, item, merged)
         said = ", ".join(f"{key} {'computed again' if value is None else value}" for key, value in wanted.items())
         text = f"{item.name}: {said or 'nothing'}"
-        with history.change(session, item, "review", "correct", text, who=context.settings.user):
+        with history.change(session, item, "review", "correct", text, who=context.who):
             history.set_override(session, item, merged)
         job = _rerun(context, session, project) if body.rerun and merged != before else None
     return _reviewed(context, project_id, object_id, job, text)
@@ -228,7 +228,7 @@ def _group(context: Context, session: Session, project: Project, item: SceneObje
         category=item.category,
         chosen=chosen,
         chosen_by="person" if by_person else facts["chosen_by"],
-        reason=f"chosen by {context.settings.user}" if by_person else facts["reason"],
+        reason=f"chosen by {verdicts[accepted].who if accepted else 'a person'}" if by_person else facts["reason"],
         ranking=facts["ranking"],
         accepted=accepted,
         candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],

@@ -22,7 +22,9 @@ def describe(context: Context) -> schemas.SystemInfo:
     settings = context.settings
     return schemas.SystemInfo(
         version=__version__,
-        user=settings.user,
+        user=context.who,
+        role=context.person.role,
+        account=context.person.account,
         max_upload_bytes=settings.max_upload_bytes,
         free_bytes=free_bytes(settings.data_dir),
         import_roots=[str(root) for root in settings.roots],

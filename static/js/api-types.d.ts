@@ -118,6 +118,12 @@ export interface Certificate {
   realtime_factor: number;
 }
 
+/** A name and its password. */
+export interface Credentials {
+  name: string;
+  password: string;
+}
+
 /** What deleting freed. */
 export interface Deleted {
   freed_bytes: number;
@@ -538,6 +544,8 @@ export interface StageState {
 export interface SystemInfo {
   version: string;
   user: string;
+  role: "annotator" | "reviewer" | "admin";
+  account: boolean;
   max_upload_bytes: number;
   free_bytes: number;
   import_roots: string[];
@@ -621,6 +629,10 @@ export interface Operations {
   getJobLog: { parameters: { job: number; tail?: number }; body: undefined; answer: unknown };
   /** POST /api/jobs/{job}/retry */
   retryJob: { parameters: { job: number }; body: undefined; answer: Job };
+  /** POST /api/login */
+  signIn: { parameters: Record<string, never>; body: Credentials; answer: unknown };
+  /** POST /api/logout */
+  signOut: { parameters: Record<string, never>; body: undefined; answer: unknown };
   /** GET /api/projects */
   listProjects: { parameters: Record<string, never>; body: undefined; answer: Project[] };
   /** POST /api/projects/import */

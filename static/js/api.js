@@ -41,6 +41,8 @@ async function call(path, { method = "GET", json, body, signal } = {}) {
       hint: "is r2c2r serve running?",
     });
   }
+  if (response.status === 401 && path !== "/api/login")
+    location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
   if (!response.ok) throw new ApiError(response.status, await errorBody(response));
   return response;
 }
@@ -71,6 +73,9 @@ const send = async (method, path, json = {}) => (await call(path, { method, json
 /** @param {string} id */
 const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
 
+/** @param {string} name @param {string} password */
+export const signIn = (name, password) => call("/api/login", { method: "POST", json: { name, password } });
+export const signOut = () => call("/api/logout", { method: "POST", json: {} });
 /** @returns {Promise<SystemInfo>} */
 export const getSystem = () => get("/api/system");
 /** @param {string} path @returns {Promise<FolderListing>} */

@@ -11,6 +11,7 @@ import { ProposalList } from "./elements/proposal-list.js";
 import { SegmenterChoice } from "./elements/segmenter-choice.js";
 import { Toasts } from "./elements/toasts.js";
 import { ViewerFrame } from "./elements/viewer-frame.js";
+import { WhoIsIn } from "./elements/who.js";
 import { AnnotatePage } from "./pages/annotate.js";
 import { DownloadPage } from "./pages/download.js";
 import { OverviewPage } from "./pages/overview.js";
@@ -20,6 +21,7 @@ import { RunPage } from "./pages/run.js";
 import { startRouter } from "./router.js";
 
 customElements.define("r2c2r-toasts", Toasts);
+customElements.define("r2c2r-who", WhoIsIn);
 customElements.define("r2c2r-help", HelpOverlay);
 customElements.define("r2c2r-folder-dialog", FolderDialog);
 customElements.define("r2c2r-job", JobPanel);

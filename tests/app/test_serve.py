@@ -1,3 +1,4 @@
+import io
 import json
 import socket
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.serve import serve
+from r2c2r_core.cli import main
 from r2c2r_core.errors import EnvironmentProblem
 from tests.app.conftest import Running
 
@@ -22,10 +24,35 @@ def test_a_taken_port_is_one_line_with_the_next_step(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "example.org"])
-def test_other_machines_are_not_let_in_by_accident(tmp_path: Path, host: str) -> None:
-    with pytest.raises(EnvironmentProblem, match="other machines"):
-        serve(host=host, port=0, data_dir=tmp_path)
+@pytest.mark.parametrize(("host", "names"), [("0.0.0.0", []), ("::", []), ("127.0.0.1", ["kitchens.example"])])
+def test_other_machines_are_not_let_in_by_accident(tmp_path: Path, host: str, names: list[str]) -> None:
+    with pytest.raises(EnvironmentProblem, match="nobody has an account"):
+        serve(host=host, port=0, data_dir=tmp_path, names=names)
+
+
+def test_accounts_are_made_and_changed_from_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def user(*words: str, said: str = "") -> tuple[int, str]:
+        monkeypatch.setattr("sys.stdin", io.StringIO(said))
+        code = main(["user", *words, "--data", str(tmp_path)])
+        captured = capsys.readouterr()
+        return code, captured.out + captured.err
+
+    assert user("add", "Ann", "--role", "admin", said="three plain words\n") == (0, "")
+    assert user("role", "ann", "reviewer") == (0, "")
+    assert "ann   reviewer" in user("list")[1]
+    for words, said, part in (
+        (("add", "ann"), "three plain words", "already"),
+        (("add", "bob"), "short", "5 characters"),
+        (("add", "bob", "--role", "king"), "three plain words", "no role"),
+        (("add", "../bob"), "three plain words", "no name"),
+        (("remove", "eve"), "", "no account eve"),
+    ):
+        code, text = user(*words, said=said)
+        assert (code > 0, text.count("\n"), part in text) == (True, 1, True), text
+    assert user("remove", "ann") == (0, "")
+    assert "ann" not in user("list")[1]
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:

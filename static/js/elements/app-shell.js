@@ -6,6 +6,7 @@ import { actionOf } from "../lib/keymap.js";
 import { live } from "../live.js";
 import { HelpOverlay } from "./help-overlay.js";
 import { sayError, Toasts } from "./toasts.js";
+import { WhoIsIn } from "./who.js";
 
 /** @typedef {import("../router.js").Route} Route */
 /** @typedef {HTMLElement & { project?: string, query?: URLSearchParams }} PageElement */
@@ -43,6 +44,7 @@ export class AppShell extends LiveElement {
         this.#tabs,
         h("span", { class: "spring" }),
         this.#online,
+        new WhoIsIn(),
         help,
         theme,
       ),

@@ -1,0 +1,90 @@
+"""Who is here: the browsers that were let in, by the printed key or by a password."""
+
+import hashlib
+import hmac
+import secrets
+import time
+
+from sqlalchemy import Engine
+from sqlmodel import col, delete, select
+
+from app.db.engine import reading, writing
+from app.db.tables import Account, SignIn
+from app.errors import Unauthorised
+from app.security import Person
+from app.services import accounts
+from app.services.attempts import Attempts
+from app.settings import Settings
+
+KEPT_S = 30 * 24 * 3600.0  # since it was last used
+REMEMBERED_S = 2.0  # a person is looked up again after this: `r2c2r user` changes the file from another process
+
+
+class People:
+    """Signs in, signs out, and knows whose a session is. Every method may be called from any thread."""
+
+    def __init__(self, engine: Engine, settings: Settings) -> None:
+        self._engine, self._settings = engine, settings
+        self._attempts = Attempts()
+        self._known: dict[str, tuple[float, Person]] = {}
+
+    def of(self, session_id: str) -> Person | None:
+        """Whose session it is; None when nobody's."""
+        now = time.monotonic()
+        found = self._known.get(session_id)
+        if found is not None and now < found[0]:
+            return found[1]
+        self._known.pop(session_id, None)
+        person = self._look_up(session_id)
+        if person is not None:
+            self._known[session_id] = (now + REMEMBERED_S, person)
+        return person
+
+    def enter_with_key(self, key: str) -> str:
+        """A new session of whoever started the server; raises Unauthorised for a wrong key."""
+        if self._settings.accounts_only or not hmac.compare_digest(key.encode(), self._settings.launch_token.encode()):
+            raise Unauthorised("the key in this address is not valid any more", hint="open the address that r2c2r printed last")
+        return self._begin(None)
+
+    def sign_in(self, name: str, password: str, client: str) -> str:
+        """A new session; raises Unauthorised for a wrong name or password, TooMany after too many of them."""
+        self._attempts.check(name, client)
+        account = accounts.verified(self._engine, name, password)
+        if account is None:
+            self._attempts.failed(name, client)
+            raise Unauthorised("the name or the password is wrong", hint="an admin can set a new one: r2c2r user password NAME")
+        self._attempts.succeeded(name, client)
+        return self._begin(account.id)
+
+    def sign_out(self, session_id: str) -> None:
+        """The session is nobody's any more."""
+        self._known.pop(session_id, None)
+        with writing(self._engine) as session:
+            session.exec(delete(SignIn).where(col(SignIn.digest) == _digest(session_id)))
+
+    def _begin(self, account_id: int | None) -> str:
+        session_id, now = secrets.token_urlsafe(32), time.time()
+        with writing(self._engine) as session:
+            session.exec(delete(SignIn).where(col(SignIn.used) < now - KEPT_S))
+            session.add(SignIn(digest=_digest(session_id), account_id=account_id, created=now, used=now))
+        return session_id
+
+    def _look_up(self, session_id: str) -> Person | None:
+        now = time.time()
+        with reading(self._engine) as session:
+            query = select(SignIn, Account).join(Account, isouter=True).where(SignIn.digest == _digest(session_id))
+            found = session.exec(query).first()
+        if found is None or found[0].used < now - KEPT_S:
+            return None
+        sign_in, account = found
+        if account is None and self._settings.accounts_only:
+            return None
+        if now - sign_in.used > 3600.0:
+            with writing(self._engine) as session:
+                sign_in.used = now
+                session.merge(sign_in)
+        return accounts.person(account) if account else Person(self._settings.user, "admin")
+
+
+def _digest(session_id: str) -> str:
+    return hashlib.sha256(session_id.encode()).hexdigest()

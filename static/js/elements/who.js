@@ -1,0 +1,23 @@
+/** Who is signed in, and the way out; nothing for who opened the printed address. */
+
+import { getSystem, signOut } from "../api.js";
+import { h, LiveElement } from "../dom.js";
+import { sayError } from "./toasts.js";
+
+export class WhoIsIn extends LiveElement {
+  async connected() {
+    try {
+      const { user, role, account } = await getSystem();
+      if (!account) return;
+      const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave() }, "Sign out");
+      this.replaceChildren(h("span", { class: "muted" }, `${user} · ${role}`), leave);
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  async #leave() {
+    await signOut().catch(sayError);
+    location.assign("/login");
+  }
+}

@@ -1,0 +1,188 @@
+"""Who may come in, and what each may do."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from argon2 import PasswordHasher
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from app.errors import TooMany
+from app.security import COOKIE
+from app.services import accounts
+from app.services.attempts import WINDOW_S, Attempts
+from tests.app.conftest import ORIGIN, SOCKETS, Running, running
+
+PASSWORD = "correct horse battery"
+REVIEWER = {"uploadCandidate", "giveVerdict", "setOverride"}
+ADMIN = {"importProject", "deleteProject", "browse"}
+OPEN = {"health", "signIn"}
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A server that others can reach, and three accounts whose passwords are hashed quickly."""
+    quick = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1)
+    data = tmp_path_factory.mktemp("people") / "data"
+    with pytest.MonkeyPatch.context() as patch, running(data, accounts_only=True) as web:
+        patch.setattr(accounts, "_hasher", lambda: quick)
+        for role in ("annotator", "reviewer", "admin"):
+            accounts.add(web.context.engine, f"the-{role}", role, PASSWORD)
+        yield web
+
+
+@contextmanager
+def signed_in(web: Running, name: str) -> Iterator[TestClient]:
+    client = browser(web)
+    assert client.post("/api/login", json={"name": name, "password": PASSWORD}).status_code == 204
+    yield client
+    client.post("/api/logout")
+
+
+def browser(web: Running) -> TestClient:
+    headers = {"X-Requested-With": "tests"}
+    return TestClient(web.app, base_url=ORIGIN, headers=headers, raise_server_exceptions=False)
+
+
+def operations(web: Running) -> list[tuple[str, str, str]]:
+    """(operation, method, a path of it)."""
+    paths = web.app.openapi()["paths"]
+    found = []
+    for path, methods in paths.items():
+        filled = re.sub(r"\{(object|job|point|frame|version)\}", "1", path)
+        filled = re.sub(r"\{side\}", "plan", filled)
+        filled = re.sub(r"\{\w+\}", "none", filled)
+        found += [(said["operationId"], method.upper(), filled) for method, said in methods.items()]
+    return found
+
+
+def test_every_operation_needs_a_session(shared: Running) -> None:
+    stranger = browser(shared)
+    found = operations(shared)
+    assert len(found) > 50
+    for operation, method, path in found:
+        if operation not in OPEN:
+            assert stranger.request(method, path, json={}).status_code == 401, operation
+
+
+@pytest.mark.parametrize(("role", "forbidden"), [("annotator", REVIEWER | ADMIN), ("reviewer", ADMIN), ("admin", set())])
+def test_every_operation_knows_who_may(shared: Running, role: str, forbidden: set[str]) -> None:
+    found = operations(shared)
+    assert {operation for operation, _, _ in found} >= REVIEWER | ADMIN | OPEN
+    with signed_in(shared, f"the-{role}") as client:
+        for operation, method, path in found:
+            if operation in ("signIn", "signOut", "sampleProject"):
+                continue
+            refused = client.request(method, path, json={}, params={"filename": "x"}).status_code == 403
+            assert refused == (operation in forbidden), operation
+
+
+def test_undoing_a_review_is_reviewing(shared: Running) -> None:
+    with signed_in(shared, "the-annotator") as client:
+        assert client.post("/api/projects/x/undo", json={"scope": "review"}).status_code == 403
+        assert client.post("/api/projects/x/undo", json={"scope": "prompts"}).status_code == 404
+
+
+def test_the_history_says_who_did_what(shared: Running) -> None:
+    with signed_in(shared, "the-reviewer") as client:
+        project = client.post("/api/projects/sample", json={}).json()["id"]
+        Running.until(lambda: client.get(f"/api/projects/{project}").json()["status"] == "ready")
+        assert client.patch(f"/api/projects/{project}", json={"name": "Ours"}).status_code == 200
+        assert client.get(f"/api/projects/{project}/history").json()[0]["who"] == "the-reviewer"
+        system = client.get("/api/system").json()
+        assert (system["user"], system["role"], system["account"]) == ("the-reviewer", "reviewer", True)
+
+
+def test_the_printed_key_opens_nothing_where_others_can_reach_it(shared: Running) -> None:
+    stranger = browser(shared)
+    assert stranger.get(f"/?token={shared.settings.launch_token}", follow_redirects=False).status_code == 401
+    assert COOKIE not in stranger.cookies
+
+
+def test_the_sign_in_page_is_shown_to_strangers(shared: Running) -> None:
+    stranger = browser(shared)
+    page = stranger.get("/p/x/annotate?frame=3")
+    assert page.status_code == 200
+    assert page.url.path == "/login"
+    for asset in re.findall(r'(?:href|src)="(/static/[^"]+)"', page.text):
+        assert stranger.get(asset).status_code == 200, asset
+
+
+def test_signing_out_ends_the_session_at_once(shared: Running) -> None:
+    with signed_in(shared, "the-admin") as client:
+        cookie = client.cookies[COOKIE]
+    other = browser(shared)
+    other.cookies.set(COOKIE, cookie)
+    assert other.get("/api/projects").status_code == 401
+
+
+def test_each_sign_in_is_a_session_of_its_own(shared: Running) -> None:
+    with signed_in(shared, "the-admin") as one, signed_in(shared, "the-admin") as two:
+        assert one.cookies[COOKIE] != two.cookies[COOKIE]
+
+
+@pytest.mark.parametrize("body", [{"name": "nobody", "password": PASSWORD}, {"name": "the-admin", "password": "wrong"}])
+def test_a_wrong_name_and_a_wrong_password_look_the_same(shared: Running, body: dict[str, str]) -> None:
+    answer = browser(shared).post("/api/login", json=body)
+    assert (answer.status_code, answer.json()["message"]) == (401, "the name or the password is wrong")
+    assert "set-cookie" not in answer.headers
+
+
+def test_signing_in_from_another_site_is_refused(shared: Running) -> None:
+    body = {"name": "the-admin", "password": PASSWORD}
+    stranger = browser(shared)
+    assert stranger.post("/api/login", json=body, headers={"origin": "http://evil.example"}).status_code == 403
+    del stranger.headers["X-Requested-With"]
+    assert stranger.post("/api/login", json=body).status_code == 403
+
+
+def test_guessing_ends_after_five_and_says_when_to_go_on(shared: Running) -> None:
+    accounts.add(shared.context.engine, "guessed", "annotator", PASSWORD)
+    stranger = browser(shared)
+    for _ in range(5):
+        assert stranger.post("/api/login", json={"name": "guessed", "password": "x"}).status_code == 401
+    answer = stranger.post("/api/login", json={"name": "guessed", "password": PASSWORD})
+    assert (answer.status_code, answer.json()["kind"]) == (429, "too-many")
+    assert 0 < int(answer.headers["retry-after"]) <= WINDOW_S + 1
+
+
+def test_guesses_are_forgotten_after_a_while() -> None:
+    now = [0.0]
+    attempts = Attempts(lambda: now[0])
+    for _ in range(5):
+        attempts.check("ann", "10.0.0.1")
+        attempts.failed("Ann", "10.0.0.1")
+    with pytest.raises(TooMany):
+        attempts.check("ann", "10.0.0.1")
+    attempts.check("ann", "10.0.0.2")
+    attempts.check("bob", "10.0.0.1")
+    now[0] = WINDOW_S + 1
+    attempts.check("ann", "10.0.0.1")
+
+
+def test_a_new_password_and_a_removed_account_end_sessions(shared: Running) -> None:
+    engine = shared.context.engine
+    accounts.add(engine, "leaving", "annotator", PASSWORD)
+    client = browser(shared)
+    client.post("/api/login", json={"name": "leaving", "password": PASSWORD})
+    assert client.get("/api/projects").status_code == 200
+    accounts.set_password(engine, "leaving", PASSWORD + "!")
+    Running.until(lambda: client.get("/api/projects").status_code == 401)
+    assert client.post("/api/login", json={"name": "leaving", "password": PASSWORD + "!"}).status_code == 204
+    accounts.remove(engine, "leaving")
+    Running.until(lambda: client.get("/api/projects").status_code == 401)
+
+
+def test_a_local_session_is_worth_nothing_once_others_can_reach_the_server(start: Callable[..., Any]) -> None:
+    with start() as web:
+        cookie = web.client.cookies[COOKIE]
+    with start(accounts_only=True) as web:
+        other = browser(web)
+        other.cookies.set(COOKIE, cookie)
+        assert other.get("/api/projects").status_code == 401
+        refused = pytest.raises(WebSocketDisconnect, check=lambda error: error.code == 4401)
+        with refused, other.websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN}):
+            pass
