@@ -20,7 +20,7 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import Source
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack
 from r2c2r_core.synthesize.fixtures.spec import FixtureSpec
-from r2c2r_core.synthesize.handles import handle_of_mesh
+from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
 
 _SAMPLES = 6000
@@ -39,6 +39,7 @@ class MeasuredObject:
     dimensions_m: Vector3
     sources: tuple[Source, Source, Source]
     handle: FrontHandle | None
+    handles: tuple[FrontHandle, ...] = ()  # all of them, where several fronts may be one object
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
@@ -96,6 +97,7 @@ def measure_object(
         dimensions_m=high - low,
         sources=(sources[0], sources[1], sources[2]),
         handle=handle,
+        handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
@@ -103,7 +105,7 @@ def measure_object(
         placed_pose=pose,
         warnings=tuple(warnings),
     )
-    return _corrected(measured, override)
+    return _corrected(replace(measured, spec=spec.at_width(float(measured.dimensions_m[0]))), override)
 
 
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:

@@ -8,10 +8,19 @@ from r2c2r_core.synthesize.surface import SurfaceSamples
 
 _STANDS_OUT_M = (0.008, 0.10)  # nearer is the front's own relief, farther is another object
 _CELL_M = 0.02
+_FEWEST_POINTS = 12
+_LARGEST_SHARE = 0.35  # of the front
 
 
 def handle_of_mesh(samples: SurfaceSamples, world_from_axes: np.ndarray, low: Vector3, high: Vector3) -> FrontHandle | None:
-    """The largest connected group of surface points in front of the front face, as a box in the front frame.
+    """The largest of `handles_of_mesh`."""
+    return max(handles_of_mesh(samples, world_from_axes, low, high), key=_area, default=None)
+
+
+def handles_of_mesh(
+    samples: SurfaceSamples, world_from_axes: np.ndarray, low: Vector3, high: Vector3
+) -> tuple[FrontHandle, ...]:
+    """Each connected group of surface points in front of the front face, as a box in the front frame.
 
     `low` and `high` are the object's ends along the columns of `world_from_axes`, the front at low y.
     """
@@ -20,32 +29,34 @@ def handle_of_mesh(samples: SurfaceSamples, world_from_axes: np.ndarray, low: Ve
     out = -points[:, 1]
     near = (out > _STANDS_OUT_M[0]) & (out < _STANDS_OUT_M[1])
     near &= (np.abs(points[:, 0]) < half[0] + 0.01) & (np.abs(points[:, 2]) < half[2] + 0.01)
-    group = _largest_group(points[near])
-    if len(group) < 12:
-        return None
-    left, right = group[:, 0].min(), group[:, 0].max()
-    bottom, top = group[:, 2].min(), group[:, 2].max()
-    if (right - left) * (top - bottom) > 0.35 * 4 * half[0] * half[2]:  # a second front, not a handle
-        return None
+    boxes = [_box_of(group) for group in _groups(points[near]) if len(group) >= _FEWEST_POINTS]
+    return tuple(box for box in boxes if _area(box) <= _LARGEST_SHARE * 4 * half[0] * half[2])  # else a second front
+
+
+def _box_of(group: np.ndarray) -> FrontHandle:
     return FrontHandle(
-        left_m=float(left),
-        right_m=float(right),
-        bottom_m=float(bottom),
-        top_m=float(top),
+        left_m=float(group[:, 0].min()),
+        right_m=float(group[:, 0].max()),
+        bottom_m=float(group[:, 2].min()),
+        top_m=float(group[:, 2].max()),
         protrusion_m=float(np.quantile(-group[:, 1], 0.95)),
         confidence=0.5,
     )
 
 
-def _largest_group(points: np.ndarray) -> np.ndarray:
-    """The points of the largest 8-connected patch of 2 cm cells in the front plane."""
+def _area(handle: FrontHandle) -> float:
+    return (handle.right_m - handle.left_m) * (handle.top_m - handle.bottom_m)
+
+
+def _groups(points: np.ndarray) -> list[np.ndarray]:
+    """The points of each 8-connected patch of 2 cm cells in the front plane."""
     from scipy.ndimage import label
 
     if len(points) == 0:
-        return points
+        return []
     cells = np.floor((points[:, [0, 2]] - points[:, [0, 2]].min(axis=0)) / _CELL_M).astype(np.int64)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
     grid[tuple(cells.T)] = True
-    labels, _ = label(grid, structure=np.ones((3, 3)))
+    labels, count = label(grid, structure=np.ones((3, 3)))
     of_point = labels[tuple(cells.T)]
-    return np.asarray(points[of_point == np.argmax(np.bincount(of_point))])
+    return [points[of_point == number] for number in range(1, count + 1)]

@@ -81,14 +81,14 @@ def build_scene(
 def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride) -> SceneObject:
     """A fixture of the table as links and joints."""
     assert item.spec.build is not None  # things are built from their mesh
-    order = Order(dimensions_m=item.dimensions_m, hinge=hinge.side if hinge else None, handle=item.handle)
+    order = Order(dimensions_m=item.dimensions_m, hinge=hinge.side if hinge else None, handle=item.handle, handles=item.handles)
     build = item.spec.build(order)
     base, *movers = build.parts
     motions = {motion.part: motion for motion in build.motions}
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
     joints = [_joint(item, motion, hinge, override) for motion in build.motions]
-    warnings = list(item.warnings)
+    warnings = [*item.warnings, *build.notes]
     if hinge is not None and hinge.source == "default":
         warnings.append(f"hinge on the {hinge.side} by default: {hinge.reason}")
     return SceneObject(

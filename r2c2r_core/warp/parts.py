@@ -16,6 +16,7 @@ from r2c2r_core.model.scene import Box, Link, SceneObject
 from r2c2r_core.warp.solids import Paint, box_solid, joined, mesh_of, plain_box, solid_of
 
 _FAR_M = 10.0
+_INNER = ("tray", "shelf", "separator")  # names of boxes inside a fixture
 _BESIDE_M = 0.0015  # between a moving front and what stays beside it
 _BEHIND_M = 0.002  # between a moving front and the carcass behind it
 
@@ -45,7 +46,8 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
     low, high = cavity(item)
     if (high > low).all():
         rest = rest - box_solid(low, high, paint.inside_uv)
-    visuals[item.links[0].name] = mesh_of(rest, paint.texture)
+    base = item.links[0]
+    visuals[base.name] = joined([mesh_of(rest, paint.texture), *_inner_boxes(item, base, paint)])
     return visuals
 
 
@@ -82,8 +84,8 @@ def _widened(region: Region) -> Region:
 
 
 def _inner_boxes(item: SceneObject, link: Link, paint: Paint) -> list[TexturedMesh]:
-    """A drawer's floor, sides and back, which no camera saw: as panels."""
-    return [_placed(box, link, paint) for box in link.boxes if box.name.startswith("tray")]
+    """What no camera saw, as panels: a drawer's floor, sides and back; shelves and floors inside a carcass."""
+    return [_placed(box, link, paint) for box in link.boxes if box.name.startswith(_INNER)]
 
 
 def _placed(box: Box, link: Link, paint: Paint) -> TexturedMesh:

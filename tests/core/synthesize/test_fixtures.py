@@ -1,0 +1,190 @@
+"""Every line of the fixture table, all the way: built, written as URDF, MJCF and USD, linted, loaded and opened."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from r2c2r_core.export.lint import lint
+from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.model.track import FrontHandle
+from r2c2r_core.synthesize.fixtures.seams import seams_between
+from r2c2r_core.synthesize.fixtures.spec import Order
+from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
+from r2c2r_core.synthesize.handles import handles_of_mesh
+from r2c2r_core.synthesize.surface import sampled
+from tests.core.export.conftest import write_folder
+from tests.core.synthesize.kitchen_units import Unit
+from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
+from tests.core.synthesize.test_build_scene import built
+
+BUILT = [spec for spec in FIXTURES if spec.build is not None]
+PARTS = {
+    "drawer": {"drawer"},
+    "drawer_stack": {"drawer_1", "drawer_2", "drawer_3"},
+    "double_door_cabinet": {"left_door", "right_door"},
+    "double_sink_cabinet": {"left_door", "right_door"},
+    "side_by_side_refrigerator": {"left_door", "right_door"},
+    "fridge_freezer": {"upper_door", "lower_door"},
+    **{name: set() for name in ("counter", "hood", "open_shelf", "fixed_panel")},
+}
+
+
+@pytest.fixture(scope="module")
+def every_fixture() -> ArticulatedScene:
+    """Two metres apart, each at its usual size, standing on the floor."""
+    return built(
+        *(
+            Unit(s.name, s.name, (2.0 * k, 0, s.dimensions_m[2] / 2), s.dimensions_m, kind="appliance")
+            for k, s in enumerate(BUILT)
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(every_fixture: ArticulatedScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_folder(every_fixture, tmp_path_factory.mktemp("fixtures") / "bundle")
+
+
+def test_every_fixture_moves_what_its_name_says(every_fixture: ArticulatedScene) -> None:
+    for item in every_fixture.objects:
+        assert item.fixture == item.category
+        moving = {joint.child.removeprefix(f"{item.name}_") for joint in item.joints}
+        assert moving == PARTS.get(item.fixture, {"door"}), item.name
+
+
+def test_every_fixture_opens_in_the_written_mjcf(folder: Path, every_fixture: ArticulatedScene) -> None:
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    joints = {joint.name for item in every_fixture.objects for joint in item.joints}
+    assert {model.joint(k).name for k in range(model.njnt)} == joints
+    shares = reached(every_fixture, model, seconds=3.0)
+    assert min(shares.values()) >= 0.98, shares
+
+
+def test_every_fixture_is_written_without_a_finding(folder: Path) -> None:
+    assert [f for f in lint(folder) if "preview" not in f.message] == []
+
+
+def test_nothing_of_a_fixture_touches_at_rest_or_on_its_way(every_fixture: ArticulatedScene) -> None:
+    model = compile_scene(every_fixture)
+    assert deepest_contact(model) < 5e-4
+    assert max(sweep(every_fixture, model).values()) < 1e-3
+
+
+def the(scene: ArticulatedScene, name: str) -> SceneObject:
+    return next(item for item in scene.objects if item.name == name)
+
+
+@pytest.mark.parametrize(
+    "name", ["cabinet", "wall_cabinet", "double_door_cabinet", "refrigerator", "freezer", "fridge_freezer", "open_shelf"]
+)
+def test_what_one_puts_things_into_has_shelves(every_fixture: ArticulatedScene, name: str) -> None:
+    base = the(every_fixture, name).links[0]
+    shelves = [box for box in base.boxes if box.name.startswith("shelf")]
+    assert shelves
+    half = the(every_fixture, name).dimensions_m / 2
+    for box in shelves:
+        assert (np.abs(box.link_from_box.translation) + box.size_m / 2 < half - 0.005).all()
+        assert box.size_m[2] >= 0.01
+
+
+def test_a_drawers_boards_are_as_thick_as_boards(every_fixture: ArticulatedScene) -> None:
+    tray = [box for box in the(every_fixture, "drawer").links[1].boxes if box.name.startswith("tray")]
+    assert min(box.size_m.min() for box in tray) >= 0.012
+
+
+def test_a_sink_cabinet_is_open_at_the_top(every_fixture: ArticulatedScene) -> None:
+    boxes = the(every_fixture, "sink_cabinet").links[0].boxes
+    over_the_middle = [
+        b
+        for b in boxes
+        if (np.abs(b.link_from_box.translation[:2]) < b.size_m[:2] / 2).all() and b.link_from_box.translation[2] > 0
+    ]
+    assert over_the_middle == []
+
+
+@pytest.mark.parametrize(
+    ("category", "width", "fixture", "doors"),
+    [
+        ("sink cabinet", 0.6, "sink_cabinet", 1),
+        ("sink cabinet", 0.8, "double_sink_cabinet", 2),
+        ("fridge", 0.7, "refrigerator", 1),
+        ("fridge", 0.91, "side_by_side_refrigerator", 2),
+    ],
+)
+def test_a_wide_unit_gets_two_doors(category: str, width: float, fixture: str, doors: int) -> None:
+    item = built(Unit("a", category, (0, 0, 0.9), (width, 0.6, 0.8), kind="appliance")).objects[0]
+    assert (item.fixture, len(item.joints)) == (fixture, doors)
+
+
+def handle_at(z: float, *, x: float = 0.0) -> FrontHandle:
+    return FrontHandle(left_m=x - 0.08, right_m=x + 0.08, bottom_m=z - 0.01, top_m=z + 0.01, protrusion_m=0.03, confidence=0.9)
+
+
+def order_with(fixture: str, *handles: FrontHandle) -> Order:
+    return Order(
+        dimensions_m=np.array(fixture_for(fixture)[0].dimensions_m), hinge="left", handle=handles[0], handles=tuple(handles)
+    )
+
+
+@pytest.mark.parametrize("heights", [(0.24, 0.24, 0.24), (0.14, 0.29, 0.29), (0.13, 0.19, 0.19, 0.21)])
+def test_seams_are_told_by_handles_in_the_middle_of_each_front(heights: tuple[float, ...]) -> None:
+    tops = 0.36 - np.cumsum([0, *heights])
+    middles = (tops[1:] + tops[:-1]) / 2
+    np.testing.assert_allclose(seams_between(list(middles), 0.72) or [], tops[1:-1], atol=1e-9)
+
+
+def test_seams_are_told_by_handles_near_the_upper_edges() -> None:
+    tops = 0.36 - np.cumsum([0, 0.14, 0.29, 0.29])
+    np.testing.assert_allclose(seams_between(list(tops[:-1] - 0.04), 0.72) or [], tops[1:-1], atol=1e-9)
+
+
+def test_a_stack_has_a_drawer_for_each_row_of_handles() -> None:
+    spec = fixture_for("chest of drawers")[0]
+    assert spec.build is not None
+    build = spec.build(
+        order_with("drawer_stack", handle_at(0.29), *(handle_at(z, x=x) for z in (0.075, -0.215) for x in (-0.1, 0.1)))
+    )
+    fronts = [part.boxes[0] for part in build.parts[1:]]
+    np.testing.assert_allclose([box.size_m[2] for box in fronts], [0.14, 0.29, 0.29], atol=0.004)
+    held = [[box.name for box in part.boxes if box.name.startswith("handle")] for part in build.parts[1:]]
+    assert [len(names) for names in held] == [3, 6, 6]
+    assert build.notes == ()
+
+
+def test_a_stack_whose_handles_were_missed_is_not_one_huge_drawer() -> None:
+    spec = fixture_for("drawer_stack")[0]
+    assert spec.build is not None
+    build = spec.build(order_with("drawer_stack", handle_at(0.0)))
+    assert len(build.motions) == 3
+    assert "by default" in build.notes[0]
+
+
+def test_the_doors_of_a_fridge_freezer_meet_between_their_handles() -> None:
+    spec = fixture_for("fridge_freezer")[0]
+    assert spec.build is not None
+    build = spec.build(order_with("fridge_freezer", handle_at(0.4), handle_at(0.2)))
+    upper, lower = (part.boxes[0] for part in build.parts[1:])
+    assert upper.link_from_box.translation[2] - upper.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
+    assert lower.link_from_box.translation[2] + lower.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
+
+
+def test_a_flap_or_a_door_opens_about_the_side_that_is_asked_for() -> None:
+    for side, axis in (("left", (0, 0, -1)), ("right", (0, 0, 1)), ("top", (-1, 0, 0)), ("bottom", (1, 0, 0))):
+        for name in ("cabinet", "wall_cabinet", "sink_cabinet"):
+            spec = fixture_for(name)[0]
+            assert spec.build is not None
+            order = Order(dimensions_m=np.array(spec.dimensions_m), hinge=side, handle=None)  # type: ignore[arg-type]  # of the table
+            assert tuple(spec.build(order).motions[0].axis_object) == axis
+
+
+def test_each_bar_that_stands_out_of_a_mesh_is_a_handle() -> None:
+    boxes = [box_mesh(np.array([-0.3, -0.29, -0.36]), np.array([0.3, 0.29, 0.36]))]
+    boxes += [box_mesh(np.array([-0.1, -0.325, z - 0.01]), np.array([0.1, -0.29, z + 0.01])) for z in (0.29, 0.07, -0.21)]
+    vertices = np.concatenate([v for v, _ in boxes])
+    faces = np.concatenate([f + 8 * k for k, (_, f) in enumerate(boxes)])
+    half = np.array([0.3, 0.29, 0.36])
+    handles = handles_of_mesh(sampled(vertices, faces, 6000, 0), np.eye(3), -half, half)
+    np.testing.assert_allclose(sorted(h.centre[1] for h in handles), [-0.21, 0.07, 0.29], atol=0.004)
