@@ -22,7 +22,7 @@ from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
 from app.jobs.plans import Commands
 from app.jobs.runner import Runner
-from app.routes import jobs, live, media, pages, people, projects, prompts, proposals, reviews, scenes, system, viewer
+from app.routes import jobs, live, media, pages, people, projects, prompts, proposals, reviews, scenes, states, system, viewer
 from app.security import Guard, Person
 from app.services.context import Context
 from app.services.people import People
@@ -34,7 +34,7 @@ from r2c2r_core.errors import R2C2RError
 _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
-ROUTERS = (system, people, projects, prompts, proposals, jobs, reviews, scenes, media, viewer, live, pages)
+ROUTERS = (system, people, projects, prompts, proposals, jobs, reviews, states, scenes, media, viewer, live, pages)
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
 

@@ -6,6 +6,9 @@ from sqlmodel import Session
 
 from app.db import history
 from app.db.queries import live_objects, points_of, project_row
+from app.db.tables import Project
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.workspace import content_key
 
 
@@ -41,5 +44,14 @@ def overrides_entry(stored: dict[str, Any]) -> dict[str, Any]:
 
 def inputs_key(session: Session, project_id: str) -> str:
     """Key of everything a person gave: a result is current while its key is this one."""
-    segmenter = project_row(session, project_id).segmenter
-    return content_key(prompts_document(session, project_id), overrides_document(session, project_id), segmenter)
+    project = project_row(session, project_id)
+    others = [f"{seam} {name}" for seam, name in _chosen(project).items()]
+    return content_key(
+        prompts_document(session, project_id), overrides_document(session, project_id), project.segmenter, *others
+    )
+
+
+def _chosen(project: Project) -> dict[str, str]:
+    """Backends that are not the default, by seam: results from before they could be chosen stay current."""
+    usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default}
+    return {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}

@@ -134,6 +134,12 @@ def restore(session: Session, item: SceneObject, scope: Scope, state: State) -> 
     session.flush()
 
 
+def require_open(project: Project) -> None:
+    """Raise Conflict when the project was approved: what a reviewer signed stays what it was."""
+    if project.review_state == "approved":
+        raise Conflict(f"{project.name} is approved", hint="a reviewer can reopen it on the review page")
+
+
 def set_override(session: Session, item: SceneObject, data: dict[str, Any]) -> None:
     """Store what was corrected about the object."""
     found = _override(session, item) or Override(project_id=item.project_id, object_id=item.id)
@@ -169,13 +175,15 @@ def _record(
     after: State,
     target: int | None = None,
 ) -> None:
+    project = session.get(Project, item.project_id)
+    if project is not None:
+        require_open(project)
     now = time.time()
     item.version += 1
     session.add(item)
     event = Event(project_id=item.project_id, object_id=item.id, scope=scope, action=action, text=text, who=who, at=now)
     event.frame, event.before, event.after, event.target = frame, before, after, target
     session.add(event)
-    project = session.get(Project, item.project_id)
     if project is not None:
         project.updated = now
         session.add(project)

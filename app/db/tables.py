@@ -8,6 +8,8 @@ from typing import Any
 from sqlalchemy import JSON, Column, Index, UniqueConstraint
 from sqlmodel import Field, SQLModel
 
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.segment.stage import SEGMENTERS
 
 
@@ -29,6 +31,9 @@ class Project(SQLModel, table=True):
     notices: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
     error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
     segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
+    generator: str = Field(default=GENERATORS.default, sa_column_kwargs={"server_default": GENERATORS.default})
+    matcher: str = Field(default=MATCHERS.default, sa_column_kwargs={"server_default": MATCHERS.default})
+    review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py
 
 
 class Account(SQLModel, table=True):
@@ -125,6 +130,26 @@ class Verdict(SQLModel, table=True):
     at: float
 
 
+class Comment(SQLModel, table=True):
+    """What somebody said about a pixel of a frame, a point of the scene, an object, or the project."""
+
+    __tablename__ = "comments"
+    __table_args__ = (Index("ix_comments_project", "project_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    object_id: int | None = Field(default=None, foreign_key="objects.id", ondelete="CASCADE")
+    frame: int | None = None
+    x: float | None = None
+    y: float | None = None
+    point_world: list[float] | None = Field(default=None, sa_column=Column(JSON))
+    text: str
+    who: str
+    at: float
+    resolved_by: str = ""
+    resolved_at: float | None = None
+
+
 class Event(SQLModel, table=True):
     """Who changed what, when, from what to what. Append-only: undo and redo are events too."""
 
@@ -134,7 +159,7 @@ class Event(SQLModel, table=True):
     id: int | None = Field(default=None, primary_key=True)
     project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
     object_id: int | None = None
-    scope: str  # prompts | review | proposals | project
+    scope: str  # prompts | review | proposals | project | state | comments
     action: str  # add point, rename … | undo | redo
     text: str  # one line for a person
     frame: int | None = None

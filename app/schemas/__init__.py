@@ -25,6 +25,7 @@ from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, Pr
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
 from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
 from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
+from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
 from app.schemas.system import Backend, Category, FolderEntry, FolderListing, SystemInfo
 from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerShown
 
@@ -36,9 +37,13 @@ __all__ = [
     "CaptureFacts",
     "Category",
     "Certificate",
+    "Comment",
+    "CommentIn",
+    "CommentPatch",
     "Credentials",
     "Deleted",
     "ErrorBody",
+    "Figures",
     "FolderEntry",
     "FolderListing",
     "FrameInfo",
@@ -70,6 +75,9 @@ __all__ = [
     "Proposal",
     "ProposalIds",
     "Proposals",
+    "ReviewMove",
+    "ReviewStatus",
+    "ReviewStep",
     "Reviewed",
     "RunRequest",
     "SampleRequest",

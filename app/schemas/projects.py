@@ -8,6 +8,7 @@ from app.schemas.base import ErrorBody, Shape
 from app.schemas.bundles import Bundle
 from app.schemas.captures import CaptureFacts
 from app.schemas.jobs import Job
+from app.schemas.states import ReviewState
 
 
 class ProjectCounts(Shape):
@@ -17,6 +18,7 @@ class ProjectCounts(Shape):
     points: int = 0
     accepted: int = 0
     rejected: int = 0
+    open_comments: int = 0
 
 
 class Project(Shape):
@@ -39,13 +41,18 @@ class Project(Shape):
     thumbnail: str | None
     size_bytes: int
     segmenter: str  # draws the masks
+    generator: str  # makes the candidates
+    matcher: str  # aligns them
+    review_state: ReviewState
 
 
 class ProjectPatch(Shape):
-    """What changes: its name, or which segmenter draws its masks."""
+    """What changes: its name, or which backends do its stages."""
 
     name: str | None = Field(default=None, min_length=1, max_length=120)
     segmenter: str | None = Field(default=None, max_length=60)
+    generator: str | None = Field(default=None, max_length=60)
+    matcher: str | None = Field(default=None, max_length=60)
 
 
 class ImportPath(Shape):

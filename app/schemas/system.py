@@ -37,7 +37,9 @@ class SystemInfo(Shape):
     categories: list[Category]
     palette: list[str]  # colours by object.colour, "#rrggbb"
     viewer: bool
-    segmenters: list[Backend]  # the first needs nothing and is the default
+    segmenters: list[Backend]  # of each seam the first needs nothing and is the default
+    generators: list[Backend]
+    matchers: list[Backend]
 
 
 class FolderEntry(Shape):

@@ -5,7 +5,7 @@ from pathlib import Path
 from sqlmodel import Session, col, select
 
 from app import schemas
-from app.db import queries
+from app.db import history, queries
 from app.db.documents import inputs_key, prompts_document
 from app.db.engine import reading, writing
 from app.db.tables import Job, JobEvent, Project
@@ -14,7 +14,6 @@ from app.services import projects
 from app.services.context import Context
 from app.services.imports import queue_job
 from r2c2r_core.errors import PromptError
-from r2c2r_core.segment.stage import SEGMENTERS
 
 
 def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.Job:
@@ -35,8 +34,11 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     if not prompts_document(session, project.id)["objects"]:
         raise PromptError("no object has a click on it", hint="click at least one object on the annotate page")
-    SEGMENTERS.require(body.segmenter or project.segmenter)
-    wishes = {**body.model_dump(), "segmenter": body.segmenter or project.segmenter}
+    history.require_open(project)
+    chosen = {seam: getattr(body, seam) or getattr(project, seam) for seam in projects.SEAMS}
+    for seam, registry in projects.SEAMS.items():
+        registry.require(chosen[seam])
+    wishes = {**body.model_dump(), **chosen}
     payload = {**wishes, "inputs": inputs_key(session, project.id)}
     active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
     for job in session.exec(active):
@@ -117,9 +119,6 @@ def log(context: Context, job_id: int, tail: int) -> str:
 
 def _check_backends(body: schemas.RunRequest) -> None:
     """An unknown backend is refused before anything is queued."""
-    from r2c2r_core.align.protocol import MATCHERS
-    from r2c2r_core.generate.stage import GENERATORS
-
-    for registry, name in ((SEGMENTERS, body.segmenter), (GENERATORS, body.generator), (MATCHERS, body.matcher)):
-        if name is not None:
+    for seam, registry in projects.SEAMS.items():
+        if (name := getattr(body, seam)) is not None:
             registry.get(name)

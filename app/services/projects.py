@@ -15,12 +15,17 @@ from app.db import history as events
 from app.db import queries
 from app.db.documents import inputs_key
 from app.db.engine import reading, writing
-from app.db.tables import Event, Job, Point, Project, SceneObject, Verdict
+from app.db.tables import Comment, Event, Job, Point, Project, SceneObject, Verdict
 from app.errors import Conflict, NotReady
 from app.files import ProjectFiles, delete_folder, folder_bytes
 from app.services import masks
 from app.services.context import Context
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.errors import BackendUnavailable
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.segment.stage import SEGMENTERS
+
+SEAMS = {"segmenter": SEGMENTERS, "generator": GENERATORS, "matcher": MATCHERS}  # what a person may choose for a project
 
 
 def list_projects(context: Context) -> list[schemas.Project]:
@@ -48,17 +53,24 @@ def new_project(session: Session, name: str, source_name: str, source_path: Path
 
 
 def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> schemas.Project:
-    """A new name, or another segmenter: it starts on every object, and what the other one drew is kept for when it returns."""
-    if body.segmenter is not None:
-        SEGMENTERS.require(body.segmenter)
+    """A new name, or other backends. A new segmenter starts on every object; what the other drew is kept for its return."""
+    for seam, registry in SEAMS.items():
+        if (wanted := getattr(body, seam)) is not None:
+            registry.require(wanted)
+            ready, reason = registry.available(wanted)
+            if not ready:
+                raise BackendUnavailable(f"{wanted}: {reason}", hint="or choose another one")
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
         name = body.name.strip() if body.name is not None else row.name
         if name != row.name:
             _note(context, session, row, "rename", f"renamed to {name}", {"name": name})
-        if body.segmenter is not None and body.segmenter != row.segmenter:
-            text = f"masks by {body.segmenter} instead of {row.segmenter}"
-            _note(context, session, row, "segmenter", text, {"segmenter": body.segmenter})
+        changed = [seam for seam in SEAMS if getattr(body, seam) not in (None, getattr(row, seam))]
+        for seam in changed:
+            events.require_open(row)
+            text = f"{seam} {getattr(body, seam)} instead of {getattr(row, seam)}"
+            _note(context, session, row, seam, text, {seam: getattr(body, seam)})
+        if "segmenter" in changed:
             context.live.close(project_id)
         objects = [item.id or 0 for item in queries.live_objects(session, project_id)] if body.segmenter else []
     for number in objects:
@@ -163,6 +175,9 @@ def shape(context: Context, session: Session, row: Project) -> schemas.Project:
         thumbnail=f"/media/{row.id}/thumbnail.jpg?v={row.media_version}" if ready else None,
         size_bytes=_size(context.files(row).root, int(row.updated)),
         segmenter=row.segmenter,
+        generator=row.generator,
+        matcher=row.matcher,
+        review_state=row.review_state,  # type: ignore[arg-type]
     )
 
 
@@ -194,8 +209,13 @@ def _counts(session: Session, project_id: str) -> schemas.ProjectCounts:
         select(Verdict.verdict, func.count()).select_from(Verdict).join(SceneObject).where(*mine).group_by(col(Verdict.verdict))
     )
     verdicts = dict(session.exec(said).all())
+    open_comments = select(func.count()).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
     return schemas.ProjectCounts(
-        objects=objects, points=points, accepted=verdicts.get("accepted", 0), rejected=verdicts.get("rejected", 0)
+        objects=objects,
+        points=points,
+        accepted=verdicts.get("accepted", 0),
+        rejected=verdicts.get("rejected", 0),
+        open_comments=session.exec(open_comments).one(),
     )
 
 

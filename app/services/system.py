@@ -8,6 +8,8 @@ from app.errors import Forbidden, NotFound
 from app.files import free_bytes
 from app.services.context import Context
 from r2c2r_core import __version__
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Backend, Registry
 from r2c2r_core.segment.stage import SEGMENTERS
 
@@ -31,7 +33,9 @@ def describe(context: Context) -> schemas.SystemInfo:
         categories=_categories(),
         palette=PALETTE,
         viewer=context.viewer.enabled,
-        segmenters=[_backend(SEGMENTERS, backend) for backend in SEGMENTERS.backends],
+        segmenters=_backends(SEGMENTERS),
+        generators=_backends(GENERATORS),
+        matchers=_backends(MATCHERS),
     )
 
 
@@ -85,6 +89,10 @@ def _entry(path: Path) -> schemas.FolderEntry | None:
     if stat.S_ISREG(found.st_mode):
         return schemas.FolderEntry(name=path.name, path=str(path), folder=False, size=found.st_size)
     return None
+
+
+def _backends(registry: Registry) -> list[schemas.Backend]:
+    return [_backend(registry, backend) for backend in registry.backends]
 
 
 def _backend(registry: Registry, backend: Backend) -> schemas.Backend:

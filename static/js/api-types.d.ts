@@ -118,6 +118,36 @@ export interface Certificate {
   realtime_factor: number;
 }
 
+/** What somebody said, where, and whether it is settled. */
+export interface Comment {
+  object: number | null;
+  frame: number | null;
+  x: number | null;
+  y: number | null;
+  point_world: [number, number, number] | null;
+  id: number;
+  text: string;
+  who: string;
+  at: number;
+  resolved_by: string;
+  resolved_at: number | null;
+}
+
+/** A new comment. */
+export interface CommentIn {
+  object?: number | null;
+  frame?: number | null;
+  x?: number | null;
+  y?: number | null;
+  point_world?: [number, number, number] | null;
+  text: string;
+}
+
+/** Resolve a comment, or open it again. */
+export interface CommentPatch {
+  resolved: boolean;
+}
+
 /** A name and its password. */
 export interface Credentials {
   name: string;
@@ -135,6 +165,17 @@ export interface ErrorBody {
   message: string;
   hint: string;
   current: unknown;
+}
+
+/** What the project cost its people so far; times in seconds. */
+export interface Figures {
+  objects: number;
+  clicks: number;
+  clicks_per_object: number | null;
+  verdicts: number;
+  automatic_kept: number | null;
+  upload_to_approval_s: number | null;
+  age_s: number;
 }
 
 /** One thing the linter or the simulation has to say. */
@@ -383,6 +424,9 @@ export interface Project {
   thumbnail: string | null;
   size_bytes: number;
   segmenter: string;
+  generator: string;
+  matcher: string;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
 }
 
 /** What is in a project. */
@@ -391,12 +435,15 @@ export interface ProjectCounts {
   points: number;
   accepted: number;
   rejected: number;
+  open_comments: number;
 }
 
-/** What changes: its name, or which segmenter draws its masks. */
+/** What changes: its name, or which backends do its stages. */
 export interface ProjectPatch {
   name?: string | null;
   segmenter?: string | null;
+  generator?: string | null;
+  matcher?: string | null;
 }
 
 /** prompts.json. */
@@ -445,6 +492,31 @@ export interface Proposals {
   fraction: number;
   items: Proposal[];
   dismissed: number;
+}
+
+/** One legal step from here; with something unmet it needs a written reason, which the history keeps. */
+export interface ReviewMove {
+  to: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  text: string;
+  role: "annotator" | "reviewer";
+  unmet: string[];
+  needs_reason: boolean;
+}
+
+/** The state, who brought it there, and where it may go. */
+export interface ReviewStatus {
+  state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  who: string;
+  at: number | null;
+  reason: string;
+  moves: ReviewMove[];
+}
+
+/** A wanted step; refused when the project has left `from_state` meanwhile. */
+export interface ReviewStep {
+  from_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  to: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  reason?: string;
 }
 
 /** The object after a verdict or a correction, and the job that follows from it. */
@@ -553,6 +625,8 @@ export interface SystemInfo {
   palette: string[];
   viewer: boolean;
   segmenters: Backend[];
+  generators: Backend[];
+  matchers: Backend[];
 }
 
 /** What to undo or redo: the last change of this object, or of any object when None. */
@@ -653,6 +727,14 @@ export interface Operations {
   listCandidates: { parameters: { project: string }; body: undefined; answer: CandidateGroup[] };
   /** GET /api/projects/{project}/certificate */
   getCertificate: { parameters: { project: string }; body: undefined; answer: Certificate };
+  /** GET /api/projects/{project}/comments */
+  listComments: { parameters: { project: string }; body: undefined; answer: Comment[] };
+  /** POST /api/projects/{project}/comments */
+  addComment: { parameters: { project: string }; body: CommentIn; answer: Comment };
+  /** PATCH /api/projects/{project}/comments/{comment} */
+  changeComment: { parameters: { project: string; comment: number }; body: CommentPatch; answer: Comment };
+  /** GET /api/projects/{project}/figures */
+  getFigures: { parameters: { project: string }; body: undefined; answer: Figures };
   /** GET /api/projects/{project}/frames */
   listFrames: { parameters: { project: string }; body: undefined; answer: FrameInfo[] };
   /** GET /api/projects/{project}/history */
@@ -707,6 +789,10 @@ export interface Operations {
   restoreProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
   /** POST /api/projects/{project}/redo */
   redo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
+  /** GET /api/projects/{project}/review */
+  getReview: { parameters: { project: string }; body: undefined; answer: ReviewStatus };
+  /** POST /api/projects/{project}/review */
+  stepReview: { parameters: { project: string }; body: ReviewStep; answer: ReviewStatus };
   /** POST /api/projects/{project}/run */
   runProject: { parameters: { project: string }; body: RunRequest; answer: Job };
   /** GET /api/projects/{project}/scene */

@@ -169,7 +169,13 @@ def test_renaming_is_kept_in_the_history(web: Running) -> None:
 def test_a_sample_comes_with_its_clicks(web: Running) -> None:
     project = web.sample()
     assert [o["name"] for o in web.get(f"/api/projects/{project}/objects")] == ["drawer_1", "mug_1"]
-    assert web.get(f"/api/projects/{project}")["counts"] == {"objects": 2, "points": 2, "accepted": 0, "rejected": 0}
+    assert web.get(f"/api/projects/{project}")["counts"] == {
+        "objects": 2,
+        "points": 2,
+        "accepted": 0,
+        "rejected": 0,
+        "open_comments": 0,
+    }
 
 
 def test_an_upload_whose_sender_leaves_is_forgotten(web: Running) -> None:

@@ -1,0 +1,46 @@
+"""Review states, comments, and what a project cost."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.routes.numbers import RowId
+from app.services import comments, states
+
+router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
+
+
+@router.get("/review", operation_id="getReview")
+def get_review(context: Ctx, project: str) -> schemas.ReviewStatus:
+    """Where the project stands, and its legal next steps with what each still lacks."""
+    return states.status(context, project)
+
+
+@router.post("/review", operation_id="stepReview")
+def step_review(context: Ctx, project: str, body: schemas.ReviewStep) -> schemas.ReviewStatus:
+    """Take one legal step; 409 for any other, and where something is unmet and no reason is given."""
+    return states.step(context, project, body)
+
+
+@router.get("/figures", operation_id="getFigures")
+def get_figures(context: Ctx, project: str) -> schemas.Figures:
+    """Clicks an object, automatic choices kept, time from upload to approval."""
+    return states.figures(context, project)
+
+
+@router.get("/comments", operation_id="listComments")
+def list_comments(context: Ctx, project: str) -> list[schemas.Comment]:
+    """All comments, oldest first."""
+    return comments.list_comments(context, project)
+
+
+@router.post("/comments", operation_id="addComment", status_code=201)
+def add_comment(context: Ctx, project: str, body: schemas.CommentIn) -> schemas.Comment:
+    """Say something about the project, an object, a pixel of a frame or a point of the scene."""
+    return comments.add(context, project, body)
+
+
+@router.patch("/comments/{comment}", operation_id="changeComment")
+def change_comment(context: Ctx, project: str, comment: RowId, body: schemas.CommentPatch) -> schemas.Comment:
+    """Resolve a comment, or open it again."""
+    return comments.change(context, project, comment, body)

@@ -1,0 +1,92 @@
+"""Where a project stands between its annotator and its reviewer, what they say to each other, and what it cost."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from app.schemas.base import Shape
+
+ReviewState = Literal["draft", "ready", "in review", "changes requested", "approved"]
+
+
+class ReviewMove(Shape):
+    """One legal step from here; with something unmet it needs a written reason, which the history keeps."""
+
+    to: ReviewState
+    text: str  # what its button says
+    role: Literal["annotator", "reviewer"]
+    unmet: list[str]
+    needs_reason: bool
+
+
+class ReviewStatus(Shape):
+    """The state, who brought it there, and where it may go."""
+
+    state: ReviewState
+    who: str
+    at: float | None
+    reason: str
+    moves: list[ReviewMove]
+
+
+class ReviewStep(Shape):
+    """A wanted step; refused when the project has left `from_state` meanwhile."""
+
+    from_state: ReviewState
+    to: ReviewState
+    reason: str = Field(default="", max_length=1000)
+
+
+class CommentPin(Shape):
+    """What a comment is about: a pixel of a frame, a point of the scene (world, metres), or neither."""
+
+    object: int | None = Field(default=None, ge=0, lt=2**63)
+    frame: int | None = Field(default=None, ge=0, lt=2**31)
+    x: float | None = Field(default=None, allow_inf_nan=False)
+    y: float | None = Field(default=None, allow_inf_nan=False)
+    point_world: tuple[float, float, float] | None = None
+
+
+class CommentIn(CommentPin):
+    """A new comment."""
+
+    text: str = Field(min_length=1, max_length=2000)
+
+    @model_validator(mode="after")
+    def _pinned_whole(self) -> Self:
+        """A pixel has a frame and both coordinates."""
+        given = [value is not None for value in (self.frame, self.x, self.y)]
+        if any(given) and not all(given):
+            raise ValueError("a pin on a frame needs frame, x and y")
+        if self.point_world is not None and not all(abs(value) < 1e6 for value in self.point_world):
+            raise ValueError("a pin in the scene needs three finite metres")
+        return self
+
+
+class CommentPatch(Shape):
+    """Resolve a comment, or open it again."""
+
+    resolved: bool
+
+
+class Comment(CommentPin):
+    """What somebody said, where, and whether it is settled."""
+
+    id: int
+    text: str
+    who: str
+    at: float
+    resolved_by: str
+    resolved_at: float | None
+
+
+class Figures(Shape):
+    """What the project cost its people so far; times in seconds."""
+
+    objects: int
+    clicks: int  # points set, moved and removed, objects confirmed, edited and deleted, undos
+    clicks_per_object: float | None
+    verdicts: int  # verdicts and corrections
+    automatic_kept: float | None  # share of accepted candidates that were the automatic choice
+    upload_to_approval_s: float | None
+    age_s: float

@@ -1,0 +1,75 @@
+"""What people say about a spot, and whether it is settled."""
+
+import time
+from typing import Any
+
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading, writing
+from app.db.tables import Comment, Event
+from app.errors import Conflict, NotFound
+from app.services import projects
+from app.services.context import Context
+
+SCOPE = "comments"
+
+
+def list_comments(context: Context, project_id: str) -> list[schemas.Comment]:
+    """All comments, oldest first."""
+    with reading(context.engine) as session:
+        queries.project_row(session, project_id)
+        rows = session.exec(select(Comment).where(Comment.project_id == project_id).order_by(col(Comment.id)))
+        return [_shape(row) for row in rows]
+
+
+def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.Comment:
+    """Say something about the project, an object, a pixel or a point."""
+    with writing(context.engine) as session:
+        queries.project_row(session, project_id)
+        if body.object is not None:
+            queries.object_row(session, project_id, body.object)
+        fields = body.model_dump(exclude={"object", "point_world"})
+        row = Comment(project_id=project_id, object_id=body.object, who=context.who, at=time.time(), **fields)
+        row.point_world = list(body.point_world) if body.point_world else None
+        session.add(row)
+        session.flush()
+        _note(context, session, row, "comment", f"commented: {body.text}", {"comment": row.id})
+        shape = _shape(row)
+    _tell(context, project_id)
+    return shape
+
+
+def change(context: Context, project_id: str, comment_id: int, body: schemas.CommentPatch) -> schemas.Comment:
+    """Resolve it, or open it again."""
+    with writing(context.engine) as session:
+        queries.project_row(session, project_id)
+        row = session.get(Comment, comment_id)
+        if row is None or row.project_id != project_id:
+            raise NotFound(f"no comment {comment_id} in this project")
+        if body.resolved == (row.resolved_at is not None):
+            state = "resolved" if body.resolved else "open"
+            raise Conflict(f"the comment is {state} already", current=_shape(row).model_dump())
+        row.resolved_by, row.resolved_at = (context.who, time.time()) if body.resolved else ("", None)
+        session.add(row)
+        what = "resolved" if body.resolved else "opened again"
+        _note(context, session, row, "resolve" if body.resolved else "reopen", f"{what}: {row.text}", {"comment": row.id})
+        shape = _shape(row)
+    _tell(context, project_id)
+    return shape
+
+
+def _note(context: Context, session: Session, row: Comment, action: str, text: str, after: dict[str, Any]) -> None:
+    event = Event(project_id=row.project_id, scope=SCOPE, action=action, text=text, who=context.who, at=time.time())
+    event.object_id, event.frame, event.after = row.object_id, row.frame, after
+    session.add(event)
+
+
+def _tell(context: Context, project_id: str) -> None:
+    context.hub.publish("comments", project_id)
+    projects.tell(context, project_id)
+
+
+def _shape(row: Comment) -> schemas.Comment:
+    return schemas.Comment.model_validate({**row.model_dump(exclude={"project_id", "object_id"}), "object": row.object_id})
