@@ -10,7 +10,8 @@ from r2c2r_core.align.protocol import Features, Matcher
 from r2c2r_core.align.render import MeshView
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import unproject
-from r2c2r_core.geometry.registration import SimilarityFit, refit, similarity_ransac
+from r2c2r_core.geometry.consensus import similarity_consensus
+from r2c2r_core.geometry.registration import SimilarityFit, refit
 from r2c2r_core.geometry.transforms import Similarity3
 
 _RELATIVE = 0.05  # of the scaled mesh size: with an absolute limit alone a tiny scale wins
@@ -39,14 +40,13 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
     by_frame: dict[int, int] = {}
     for m in lifted:
         by_frame[m.frame_index] = 0
-        own = similarity_ransac(
+        own = similarity_consensus(
             m.points_mesh,
             m.points_world,
             threshold=3.0 * m.noise_m,
             rng=rng,
             scale_range=scale_range,
             relative_threshold=_RELATIVE,
-            rounds=12,
         )
         if own is None:
             continue

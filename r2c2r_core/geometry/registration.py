@@ -1,4 +1,4 @@
-"""Similarity transforms between point sets: closed form, against outliers, and by closest points."""
+"""Similarity transforms between point sets: closed form, refitted, and by closest points; against outliers: consensus.py."""
 
 from typing import NamedTuple
 
@@ -69,44 +69,6 @@ def umeyama_batch(source: np.ndarray, target: np.ndarray, weights: np.ndarray | 
     return scales, rotations, target_mean - scales[:, None] * np.einsum("kij,kj->ki", rotations, source_mean)
 
 
-def similarity_ransac(
-    source: Points,
-    target: Points,
-    *,
-    threshold: float | np.ndarray,
-    rng: np.random.Generator,
-    scale_range: tuple[float, float] = (1e-3, 1e3),
-    relative_threshold: float = np.inf,
-    minimum_inliers: int = 4,
-    rounds: int = 160,
-) -> SimilarityFit | None:
-    """The similarity most correspondences agree with, refitted on them; None when fewer than `minimum_inliers` do.
-
-    `threshold` is in target units, one number or one a correspondence (depth noise grows with distance).
-    `relative_threshold` is a fraction of the scaled size of `source`: with an absolute threshold alone a tiny scale
-    maps everything beside one cluster and wins. Joint in scale, rotation and translation, from three points a sample
-    (method.md rows 3 and 5).
-    """
-    count = len(source)
-    limit = np.broadcast_to(np.asarray(threshold, dtype=np.float64), (count,))
-    if count < max(minimum_inliers, 3):
-        return None
-    size = float(np.linalg.norm(np.ptp(source, axis=0)))
-    best_count, best = 0, np.zeros(count, dtype=bool)
-    for round_index in range(rounds):
-        scales, rotations, shifts = _similar_triangles(source, target, limit, size, scale_range, rng)
-        if len(scales):
-            best_count, best = _best_of(
-                source, target, scales, rotations, shifts, limit, relative_threshold * size, best_count, best, rng
-            )
-        tried = (round_index + 1) * _BATCH
-        if best_count and (1.0 - (best_count / count) ** 3) ** tried < 1e-4:
-            break
-    if best_count < minimum_inliers:
-        return None
-    return refit(source, target, best, limit, relative_threshold * size, minimum_inliers)
-
-
 def refit(
     source: Points, target: Points, inliers: np.ndarray, limit: np.ndarray, relative_limit: float, minimum_inliers: int
 ) -> SimilarityFit | None:
@@ -120,7 +82,9 @@ def refit(
         except DegenerateFitError:
             return None
         residual = np.linalg.norm(fit.apply(source) - target, axis=1)
-        inliers = residual < np.minimum(limit, relative_limit * fit.scale)
+        before, inliers = inliers, residual < np.minimum(limit, relative_limit * fit.scale)
+        if (before == inliers).all():
+            break
     if fit is None or np.count_nonzero(inliers) < minimum_inliers:
         return None
     return SimilarityFit(fit, inliers)
@@ -155,72 +119,7 @@ def icp(
     return IcpFit(pose, distance * pose.scale, used)
 
 
-_BATCH = 5000
-
-
 def _moved(before: Similarity3, after: Similarity3, at: Points) -> float:
     """How far the first points move between two poses of the same model."""
     sample = before.inverse.apply(at[:50])
     return float(np.abs(after.apply(sample) - at[:50]).max())
-
-
-def _similar_triangles(
-    source: Points,
-    target: Points,
-    limit: np.ndarray,
-    size: float,
-    scale_range: tuple[float, float],
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, ...]:
-    """Transforms of random triples whose triangles are similar within the noise: scales, rotations, translations."""
-    triple = rng.integers(0, len(source), (_BATCH, 3))
-    p, q = source[triple], target[triple]
-    side_p, side_q = _sides(p), _sides(q)
-    noise = 2.0 * limit[triple].max(axis=1, keepdims=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = side_q / side_p
-        stretch = np.log(ratio.max(axis=1) / ratio.min(axis=1))
-        tolerance = (noise / side_q).max(axis=1)
-    usable = (side_p.min(axis=1) > 0.05 * size) & (side_q.min(axis=1) > noise[:, 0])
-    usable &= (stretch < tolerance) & (ratio.min(axis=1) > scale_range[0] / 1.2) & (ratio.max(axis=1) < scale_range[1] * 1.2)
-    p, q = p[usable], q[usable]
-    if not len(p):
-        return np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3))
-    scales, rotations, shifts = umeyama_batch(p, q)
-    fine = (scales > scale_range[0]) & (scales < scale_range[1])
-    return scales[fine], rotations[fine], shifts[fine]
-
-
-def _sides(triangles: np.ndarray) -> np.ndarray:
-    """Side lengths (k, 3) of triangles (k, 3, 3)."""
-    return np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2)
-
-
-def _best_of(
-    source: Points,
-    target: Points,
-    scales: np.ndarray,
-    rotations: np.ndarray,
-    shifts: np.ndarray,
-    limit: np.ndarray,
-    relative_limit: float,
-    best_count: int,
-    best: np.ndarray,
-    rng: np.random.Generator,
-) -> tuple[int, np.ndarray]:
-    """The larger of the best so far and the best of these, counted first on a sample, then on everything."""
-    sample = rng.permutation(len(source))[:120]
-    counts = np.zeros(len(scales), dtype=np.int64)
-    for start in range(0, len(scales), 1024):
-        part = slice(start, start + 1024)
-        turned = (rotations[part] * scales[part, None, None]) @ source[sample].T  # (k, 3, n)
-        squared = ((turned + shifts[part, :, None] - target[sample].T) ** 2).sum(axis=1)
-        allowed = np.minimum(limit[sample][None], relative_limit * scales[part, None])
-        counts[part] = (squared < allowed**2).sum(axis=1)
-    for k in np.argsort(-counts, kind="stable")[:30]:
-        residual = np.linalg.norm(scales[k] * source @ rotations[k].T + shifts[k] - target, axis=1)
-        agrees = residual < np.minimum(limit, relative_limit * scales[k])
-        found = int(np.count_nonzero(agrees))
-        if found > best_count:
-            best_count, best = found, agrees
-    return best_count, best

@@ -7,8 +7,9 @@ import numpy as np
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import sample_nearest, unproject
+from r2c2r_core.geometry.consensus import similarity_consensus
 from r2c2r_core.geometry.descriptors import mutual_pairs
-from r2c2r_core.geometry.registration import DegenerateFitError, similarity_ransac, umeyama
+from r2c2r_core.geometry.registration import DegenerateFitError, umeyama
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
 
@@ -54,14 +55,13 @@ def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator
     if len(there) < _LEAST:
         return None
     noise_m = 0.01 + 0.006 * first.points[there, 2] ** 2  # of one depth pixel of a Kinect, with the key point a pixel off
-    fit = similarity_ransac(
+    fit = similarity_consensus(
         second.points[here],
         first.points[there],
         threshold=noise_m,
         rng=rng,
         scale_range=(0.97, 1.03),
         minimum_inliers=_LEAST,
-        rounds=2,
     )
     if fit is None:
         return None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from r2c2r_core.geometry.registration import DegenerateFitError, icp, similarity_ransac, umeyama, umeyama_batch
+from r2c2r_core.geometry.registration import DegenerateFitError, icp, umeyama, umeyama_batch
 from r2c2r_core.geometry.transforms import Similarity3
 
 
@@ -100,57 +100,6 @@ def box_surface(count: int, rng: np.random.Generator) -> np.ndarray:
     axis = rng.integers(0, 3, count)
     points[np.arange(count), axis] = np.sign(points[np.arange(count), axis]) * 0.5
     return points * [0.6, 0.54, 0.84]
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("flat", [False, True])
-def test_ransac_survives_ninety_percent_outliers(seed: int, flat: bool) -> None:
-    rng = np.random.default_rng(seed)
-    truth = random_similarity(seed)
-    world = box_surface(600, rng) * ([1, 1, 1e-9] if flat else [1, 1, 1])
-    source = truth.inverse.apply(world)
-    target = world + rng.normal(0, 0.004, world.shape)
-    wrong = rng.permutation(600)[:540]
-    target[wrong] = rng.uniform(target.min(axis=0), target.max(axis=0), (540, 3))
-    for a, b, wanted, limit in ((source, target, truth, 0.015), (target, source, truth.inverse, 0.015 / truth.scale)):
-        fit = similarity_ransac(a, b, threshold=limit, rng=np.random.default_rng(seed))
-        assert fit is not None
-        assert angle_deg(fit.target_from_source.rotation, wanted.rotation) < 3.0
-        assert fit.target_from_source.scale == pytest.approx(wanted.scale, rel=0.02)
-
-
-def test_a_tiny_scale_cannot_win_by_collapsing_onto_a_cluster() -> None:
-    rng = np.random.default_rng(8)
-    source = box_surface(300, rng)
-    target = source * 2.0 + rng.normal(0, 0.004, source.shape)
-    target[:270] = rng.normal(0, 0.05, (270, 3))  # wrong matches pile up on one spot
-    limits = {"threshold": 0.05, "scale_range": (0.01, 10.0)}
-    absolute = similarity_ransac(source, target, rng=np.random.default_rng(0), **limits)
-    relative = similarity_ransac(source, target, rng=np.random.default_rng(0), relative_threshold=0.05, **limits)
-    assert absolute is not None
-    assert absolute.target_from_source.scale < 0.5
-    assert relative is not None
-    assert relative.target_from_source.scale == pytest.approx(2.0, rel=0.02)
-
-
-def test_unrelated_points_give_nothing() -> None:
-    rng = np.random.default_rng(9)
-    assert (
-        similarity_ransac(
-            rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), threshold=0.01, rng=rng, minimum_inliers=8, rounds=5
-        )
-        is None
-    )
-
-
-def test_ransac_does_the_same_twice() -> None:
-    rng = np.random.default_rng(10)
-    source = rng.normal(size=(50, 3))
-    target = source + rng.normal(0, 0.01, source.shape)
-    first, second = (similarity_ransac(source, target, threshold=0.05, rng=np.random.default_rng(1)) for _ in range(2))
-    assert first is not None
-    assert second is not None
-    np.testing.assert_array_equal(first.target_from_source.matrix, second.target_from_source.matrix)
 
 
 @pytest.mark.parametrize("free_scale", [False, True])
