@@ -1,31 +1,58 @@
 """How much of what a joint opens is really free: a door before a solid block opens onto nothing."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from r2c2r_core.arrays import Points
+from r2c2r_core.arrays import Points, Vector3
 
 _WALL_M = 0.03  # walls, fronts and floors of furniture and of ovens end within this of the outside
 _STEP_M = 0.02
 _LEAST_INSIDE_M = 0.06
+_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+
+
+class _Solid(NamedTuple):
+    """A convex collider in the leaf's frame."""
+
+    corners: Points
+    planes: np.ndarray  # (n, 4), outward
 
 
 def cavity_open(model: Any, joint: str) -> float | None:
-    """Share (0..1) of the space inside that no collider fills; None where nothing is big enough to hold anything.
+    """Share (0..1) of the space behind a leaf that no collider fills; None where nothing is big enough to hold anything.
 
-    A hinge opens the body it hangs on, a slide carries its own tray.
+    A hinge opens the body it hangs on, a slide carries its own tray. The leaf is the mover's front board: what stands
+    beside it, such as a microwave's electronics, is no part of the space it opens.
     """
     import mujoco
 
     entry = model.joint(joint)
     moving = int(entry.bodyid[0])
-    body = moving if int(entry.type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE) else int(model.body_parentid[moving])
-    solids = [_corners_and_planes(model, g) for g in range(model.ngeom) if int(model.geom_bodyid[g]) == body and body != 0]
-    if not solids:
+    slides = int(entry.type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    body = moving if slides else int(model.body_parentid[moving])
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    axis_world = data.xaxis[int(entry.id)]
+    leaf = _leaf(model, data, moving, axis_world if slides else None)
+    if leaf is None or body == 0:
         return None
-    corners = np.concatenate([corners for corners, _ in solids])
-    low, high = corners.min(axis=0) + _WALL_M, corners.max(axis=0) - _WALL_M
+    solids = [_solid(model, data, g, leaf) for g in range(model.ngeom) if int(model.geom_bodyid[g]) == body and g != leaf]
+    centre, half = model.geom_aabb[leaf][:3], model.geom_aabb[leaf][3:]
+    outward = data.geom_xmat[leaf].reshape(3, 3).T @ axis_world
+    inner = [solid for solid in solids if not (slides and _before(solid, centre, outward))]
+    if not inner:
+        return None
+    front = [centre + _SIGNS * half] if slides else []  # a tray is open above its sides, up to its front's top
+    corners = np.concatenate([*front, *(solid.corners for solid in inner)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    across = np.arange(3) != int(np.argmin(half))
+    low[across] = np.maximum(low, centre - half)[across]
+    high[across] = np.minimum(high, centre + half)[across]
+    return _free_share(low + _WALL_M, high - _WALL_M, inner)
+
+
+def _free_share(low: Vector3, high: Vector3, solids: list[_Solid]) -> float | None:
     if (high - low < _LEAST_INSIDE_M).any():
         return None
     ranges = [np.arange(a, b, _STEP_M) for a, b in zip(low, high, strict=True)]
@@ -36,8 +63,26 @@ def cavity_open(model: Any, joint: str) -> float | None:
     return float(1.0 - filled.mean())
 
 
-def _corners_and_planes(model: Any, geom: int) -> tuple[Points, np.ndarray]:
-    """Corners and outward planes (n, 4) of a convex collider, in its body's frame."""
+def _leaf(model: Any, data: Any, moving: int, outward_world: Vector3 | None) -> int | None:
+    """The collider of a moving body with the largest face; of a drawer, the largest seen from where it slides to."""
+
+    def face(geom: int) -> float:
+        size = model.geom_aabb[geom][3:]
+        if outward_world is None:
+            return float(np.prod(np.sort(size)[1:]))
+        along = np.argmax(np.abs(data.geom_xmat[geom].reshape(3, 3).T @ outward_world))
+        return float(np.prod(np.delete(size, along)))
+
+    return max((g for g in range(model.ngeom) if int(model.geom_bodyid[g]) == moving), key=face, default=None)
+
+
+def _before(solid: _Solid, middle: Vector3, outward: Vector3) -> bool:
+    """Whether a part lies on the outer side of the leaf: a handle."""
+    return bool(((solid.corners - middle) @ outward > 0).all())
+
+
+def _solid(model: Any, data: Any, geom: int, leaf: int) -> _Solid:
+    """A collider's corners and planes in the leaf's frame."""
     import mujoco
     from scipy.spatial import ConvexHull
 
@@ -46,9 +91,7 @@ def _corners_and_planes(model: Any, geom: int) -> tuple[Points, np.ndarray]:
         start = int(model.mesh_vertadr[mesh])
         own = model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(np.float64)
     else:
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        own = signs * model.geom_size[geom]
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    corners = own @ turn.reshape(3, 3).T + model.geom_pos[geom]
-    return corners, ConvexHull(corners).equations
+        own = _SIGNS * model.geom_size[geom]
+    world = own @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    corners = (world - data.geom_xpos[leaf]) @ data.geom_xmat[leaf].reshape(3, 3)
+    return _Solid(corners, ConvexHull(corners).equations)

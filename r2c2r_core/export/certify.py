@@ -6,15 +6,17 @@ from typing import Any
 
 from r2c2r_core.export.lint import lint
 from r2c2r_core.export.loaders import EVERY_LOADER, try_loaders
-from r2c2r_core.export.reading import read_urdf
-from r2c2r_core.export.rules.table import UNSAFE
+from r2c2r_core.export.openings import NEEDED_OPENING, opening_free
+from r2c2r_core.export.reading import Urdf, read_urdf
+from r2c2r_core.export.rules.files import BundleFiles
+from r2c2r_core.export.rules.table import UNSAFE, finding
 from r2c2r_core.export.simulate import Simulation, simulate
-from r2c2r_core.model.report import Certificate, LoaderResult
+from r2c2r_core.model.report import Blocker, Certificate, Finding, LoaderResult, ThingResult
 from r2c2r_core.progress import SILENT, Progress
 
 CERTIFICATE_VERSION = 1
 
-_NOT_SIMULATED = Simulation(findings=(), joints=(), rest_penetration_m=math.nan, drift_m=math.nan, realtime_factor=math.nan)
+_NOT_SIMULATED = Simulation()
 
 
 def certify(folder: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
@@ -25,6 +27,7 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
     """
     progress.at(0.0, "reading the bundle")
     findings = lint(folder)
+    things: tuple[ThingResult, ...] = ()
     if any(finding.rule in UNSAFE for finding in findings):
         refused = "not given to it: the bundle names files outside itself"
         loaders = tuple(LoaderResult(loader=name, state="not tried", detail=refused) for name in EVERY_LOADER)
@@ -34,7 +37,8 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
         loaders = try_loaders(folder, urdf, sapien_python, progress=progress.part(0.05, 0.4))
         mjcf = folder / "scene.xml"
         simulation = simulate(mjcf, progress=progress.part(0.4, 1.0)) if mjcf.is_file() else _NOT_SIMULATED
-    findings = (*findings, *simulation.findings)
+        things = _things(urdf, BundleFiles(folder=folder), simulation)
+    findings = (*findings, *simulation.findings, *_closed_openings(things))
     failed = any(f.severity == "error" for f in findings) or any(loader.state == "failed" for loader in loaders)
     progress.at(1.0, "certificate passed" if not failed else "certificate failed")
     return Certificate(
@@ -43,8 +47,10 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
         loaders=loaders,
         joints=simulation.joints,
         rest_penetration_m=simulation.rest_penetration_m,
-        drift_m=simulation.drift_m,
+        drift_m=simulation.most_drift_m,
         realtime_factor=simulation.realtime_factor,
+        things=things,
+        together_penetration_m=simulation.together_penetration_m,
     )
 
 
@@ -62,14 +68,50 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
                 "joint": j.joint,
                 "deepest_penetration_m": _number(j.deepest_penetration_m),
                 "travel_reached": _number(j.travel_reached),
-                "cavity_open": None if j.cavity_open is None else _number(j.cavity_open),
+                "cavity_open": _optional(j.cavity_open),
+                "blocked_by": [blocker_to_json(blocker) for blocker in j.blocked_by],
             }
             for j in certificate.joints
         ],
+        "things": [
+            {"name": t.name, "drift_m": _number(t.drift_m), "opening_free": _optional(t.opening_free)}
+            for t in certificate.things
+        ],
         "rest_penetration_m": _number(certificate.rest_penetration_m),
+        "together_penetration_m": _number(certificate.together_penetration_m),
         "drift_m": _number(certificate.drift_m),
         "realtime_factor": _number(certificate.realtime_factor, digits=1),
     }
+
+
+def blocker_to_json(blocker: Blocker) -> dict[str, Any]:
+    """What keeps a joint from opening, as JSON."""
+    return {"name": blocker.name, "kind": blocker.kind, "position": _number(blocker.position)}
+
+
+def _things(urdf: Urdf, files: BundleFiles, simulation: Simulation) -> tuple[ThingResult, ...]:
+    """Every free-standing body that was simulated."""
+    links = {link.name: link for link in urdf.links}
+    return tuple(
+        ThingResult(
+            name=name,
+            drift_m=simulation.drift_m.get(name, math.nan),
+            opening_free=opening_free(links[name], files) if name in links else None,
+        )
+        for name in simulation.free
+    )
+
+
+def _closed_openings(things: tuple[ThingResult, ...]) -> tuple[Finding, ...]:
+    return tuple(
+        finding("opening", thing.name, f"{100 * thing.opening_free:.0f} % of its hollow is free of its colliders")
+        for thing in things
+        if thing.opening_free is not None and thing.opening_free < NEEDED_OPENING
+    )
+
+
+def _optional(value: float | None) -> float | None:
+    return None if value is None else _number(value)
 
 
 def _number(value: float, digits: int = 6) -> float | None:

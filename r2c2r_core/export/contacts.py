@@ -1,5 +1,6 @@
 """Bodies that overlap in a MuJoCo model, with its joints at given positions."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +15,13 @@ class Touch:
     depth_m: float
     names: str
 
+    def between(self, some: set[int], others: set[int]) -> bool:
+        """Whether one body is of the first set and the other of the second."""
+        a, b = self.bodies
+        return (a in some and b in others) or (b in some and a in others)
 
-def touches(model: Any, positions: dict[str, float]) -> list[Touch]:
+
+def touches(model: Any, positions: Mapping[str, float]) -> list[Touch]:
     """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero."""
     import mujoco
 
@@ -40,13 +46,21 @@ def joint_names(model: Any) -> list[str]:
     return [name for name in names if float(model.joint(name).range[1]) > float(model.joint(name).range[0])]
 
 
-def subtree(model: Any, root: int) -> set[int]:
-    found = {root}
-    for body in range(root + 1, model.nbody):  # parents come before children
+def movers_of(model: Any, joint: str) -> set[int]:
+    """The bodies a joint moves."""
+    found = {int(model.joint(joint).bodyid[0])}
+    for body in range(min(found) + 1, model.nbody):  # parents come before children
         if int(model.body_parentid[body]) in found:
             found.add(body)
     return found
 
 
+def free_bodies(model: Any) -> set[int]:
+    """Bodies of things that stand freely."""
+    roots = {int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0}
+    return {body for body in range(model.nbody) if int(model.body_rootid[body]) in roots}
+
+
 def body_name(model: Any, body: int) -> str:
+    """The body's name; the world is the floor."""
     return "floor" if body == 0 else str(model.body(body).name)

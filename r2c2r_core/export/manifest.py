@@ -10,6 +10,7 @@ from r2c2r_core.export.plan import Body, Plan
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.reconstruction import Reconstruction
+from r2c2r_core.model.report import JointResult
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.model.track import MaskTrack
 
@@ -38,6 +39,23 @@ def manifest_of(reconstruction: Reconstruction, plan: Plan, created: str | None)
     }
 
 
+def with_blockers(manifest: dict[str, Any], plan: Plan, joints: tuple[JointResult, ...]) -> dict[str, Any]:
+    """The manifest with what the sweeps found in each joint's way; loose things by their object's name."""
+    owners = {body.name: body.object_name for body in plan.bodies}
+    found = {
+        result.joint: [
+            {"name": owners.get(b.name, b.name), "kind": b.kind, "position": _plain(b.position)} for b in result.blocked_by
+        ]
+        for result in joints
+    }
+
+    def entry(item: dict[str, Any]) -> dict[str, Any]:
+        listed = [joint | {"blocked_by": found.get(joint["name"], [])} for joint in item["joints"]]
+        return item | {"joints": listed, "joint": listed[0] if listed else None}
+
+    return manifest | {"objects": [entry(item) for item in manifest["objects"]]}
+
+
 def tool_version() -> str:
     """The installed version of r2c2r, or "unknown" when it runs without being installed."""
     try:
@@ -57,7 +75,7 @@ def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject)
         "category": item.category,
         "fixture": item.fixture,
         "dimensions_m": _plain(item.dimensions_m),
-        "world_from_object": _plain(item.world_from_object.matrix),
+        "world_from_object": _plain((bodies[0].world_from_body @ bodies[0].link.object_from_link.inverse).matrix),
         "joint": joints[0] if joints else None,
         "joints": joints,  # a double door has two
         "movable": item.movable,

@@ -3,10 +3,11 @@
 import html
 from typing import Any
 
+from r2c2r_core.export.alone import ALLOWED_DRIFT_M
 from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
 from r2c2r_core.export.rules.table import RULES, SIMULATION_RULES
-from r2c2r_core.export.simulate import ALLOWED_DRIFT_M, NEEDED_TRAVEL
+from r2c2r_core.export.sweeps import NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import FORMATS
 from r2c2r_core.model.report import Certificate
 

@@ -13,7 +13,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.disk import explained_io
 from r2c2r_core.export.archive import building_folder, opened_bundle, replace_folder, write_zip
 from r2c2r_core.export.certify import certificate_to_json, certify
-from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.manifest import manifest_of, with_blockers
 from r2c2r_core.export.pictures import write_pictures
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.preview import preview_png
@@ -69,6 +69,8 @@ def write_bundle(
         (folder / "preview.png").write_bytes(preview_png(plan, _filmed_from(reconstruction.capture)))
         pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4)) if config.pictures else {}
         certificate = certify(folder, progress=progress.part(0.4, 0.9))
+        manifest = with_blockers(manifest, plan, certificate.joints)
+        _write_json(folder / "manifest.json", manifest)
         _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
         review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
         (folder / "review.html").write_text(review, encoding="utf-8")

@@ -1,7 +1,8 @@
-"""What a free-standing thing stands on when nobody named it: a plate of its own foot's size, so that it does not fall.
+"""What a free-standing thing stands on: what carries it, or a plate of its own foot's size, so that it does not fall.
 
-A mug on a counter that is no object of the scene would drop to the floor in the first second. The scan saw it rest there, so
-the plate stands in for the surface; the manifest says so.
+A scan leaves millimetres between a bottle and its worktop: it is let down, or lifted out, by exactly those. A mug on a counter
+that is no object of the scene would drop to the floor in the first second. The scan saw it rest there, so a plate stands in
+for the surface; the manifest says so.
 """
 
 from collections.abc import Sequence
@@ -16,37 +17,57 @@ from r2c2r_core.model.scene import Box, Inertial, Link
 
 PLATE_M = 0.01
 _FOOT_M = 0.02  # colliders are looked at this far above the lowest point
-_GAP_M = 5e-4  # no contact at rest, no visible fall
-_HIGHER_M, _LOWER_M = 0.004, 0.012  # what counts as standing on it: a support this far above or below the foot
+_GAP_M = 1e-4  # no contact at rest, no visible fall
+_HIGHER_M, _LOWER_M = 0.02, 0.012  # what counts as standing on it: a support this far above or below the foot
 _SHARE = 0.3  # of the foot's corners
 _DENSITY_KG_M3 = 680.0
 
 
 def supported(plan: Plan) -> Plan:
-    """The plan with a plate under every free thing that nothing carries, where a plate has room."""
-    bodies, plates = plan.bodies, []
-    for thing in (body for body in bodies if body.free):
-        points = np.concatenate(collider_corners_world(thing) or [np.zeros((0, 3))])
-        others = [c for body in bodies if body.object_name != thing.object_name for c in collider_corners_world(body)]
-        if len(points) and not _carried(points, others, plan.floor_z_m):
-            plate = _plate(thing, points)
-            if not _in_the_way(plate, [c for b in bodies if _moves(b) for c in collider_corners_world(b)]):
-                plates.append(plate)
-    return replace(plan, bodies=(*bodies, *plates))
+    """The plan with every free thing standing on what carries it, or on a plate where nothing does and one has room."""
+    bodies, plates = {body.name: body for body in plan.bodies}, []
+    lowest_first = sorted((b for b in plan.bodies if b.free and _colliders(b).size), key=lambda b: _colliders(b)[:, 2].min())
+    for name in [body.name for body in lowest_first]:
+        thing = bodies[name]
+        points = _colliders(thing)
+        others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
+        under_m = _carried_at(points, others, plan.floor_z_m)
+        if under_m is not None:
+            lift = under_m + _GAP_M - float(points[:, 2].min())
+            bodies |= {body.name: _lifted(body, lift) for body in bodies.values() if body.object_name == thing.object_name}
+            continue
+        plate = _plate(thing, points)
+        if not _in_the_way(plate, [c for b in bodies.values() if _moves(b) for c in collider_corners_world(b)]):
+            plates.append(plate)
+    return replace(plan, bodies=(*bodies.values(), *plates))
 
 
-def _carried(points: Points, others: Sequence[Points], floor_z_m: float) -> bool:
-    """Whether the floor or a collider's top lies under the foot, or under the middle, at its height."""
+def _carried_at(points: Points, others: Sequence[Points], floor_z_m: float) -> float | None:
+    """Height of the floor or of a collider's top that lies under the foot, or under the middle, about where it ends."""
     bottom = float(points[:, 2].min())
-    if abs(bottom - floor_z_m) <= _LOWER_M:
-        return True
+    heights = [floor_z_m] if abs(bottom - floor_z_m) <= _LOWER_M else []
     foot = points[points[:, 2] < bottom + _FOOT_M, :2]
     probes = np.concatenate([foot, points[:, :2].mean(axis=0, keepdims=True)])
     under = np.zeros(len(probes), dtype=bool)
+    tops = []
     for corners in others:
-        if -_LOWER_M <= corners[:, 2].max() - bottom <= _HIGHER_M:
-            under |= _inside_plan(probes, corners[:, :2])
-    return bool(under[-1] or under[:-1].mean() > _SHARE)
+        top = float(corners[:, 2].max())
+        if -_LOWER_M <= top - bottom <= _HIGHER_M and (below := _inside_plan(probes, corners[:, :2])).any():
+            under |= below
+            tops.append(top)
+    if under[-1] or under[:-1].mean() > _SHARE:
+        heights += tops
+    return max(heights, default=None)
+
+
+def _lifted(body: Body, lift_m: float) -> Body:
+    """The body of a thing that was moved along the vertical."""
+    raised = Rigid3(np.eye(3), np.array([0.0, 0.0, lift_m])) @ body.world_from_body
+    return replace(body, world_from_body=raised, parent_from_body=raised if body.parent == WORLD else body.parent_from_body)
+
+
+def _colliders(body: Body) -> Points:
+    return np.concatenate(collider_corners_world(body) or [np.zeros((0, 3))])
 
 
 def _inside_plan(probes: np.ndarray, outline: np.ndarray) -> np.ndarray:

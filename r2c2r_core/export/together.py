@@ -1,39 +1,77 @@
 """Joints whose parts meet when both are open: true of many real kitchens, and worth knowing before a robot finds out."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, joint_names, subtree, touches
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, joint_names, movers_of, touches
 from r2c2r_core.export.rules.table import finding
-from r2c2r_core.model.report import Finding
+from r2c2r_core.model.report import Blocker, Finding
 
 _POSITIONS = 6  # of each of the two joints: every 15 to 20 degrees
+_ALL_POSITIONS = 21
 
 
-def meetings(model: Any) -> Iterator[Finding]:
-    """A warning for every pair of joints that cannot both stand open everywhere, with the deepest overlap found."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Meeting:
+    """Two joints that cannot both stand open everywhere."""
+
+    joints: tuple[str, str]
+    depth_m: float  # deepest overlap
+    first_at: tuple[float, float]  # of each joint, the least position at which they meet
+
+    @property
+    def finding(self) -> Finding:
+        """It in words."""
+        first, second = self.joints
+        message = f"meets {second} when both are open (by up to {1000 * self.depth_m:.0f} mm): open one at a time"
+        return finding("together", first, message)
+
+    def blocker_of(self, joint: str) -> Blocker | None:
+        """What the meeting means for one joint."""
+        if joint not in self.joints:
+            return None
+        own = self.joints.index(joint)
+        return Blocker(name=self.joints[1 - own], kind="joint", position=self.first_at[own])
+
+
+def meetings(model: Any) -> list[Meeting]:
+    """Every pair of joints whose parts overlap somewhere when both are open."""
     names = joint_names(model)
     reach = {name: _swept_box(model, name) for name in names}
+    found = []
     for first, second in combinations(names, 2):
         (low_a, high_a), (low_b, high_b) = reach[first], reach[second]
         if (low_a > high_b).any() or (low_b > high_a).any():
             continue
-        depth_m = max(_overlaps(model, first, second), default=0.0)
-        if depth_m > ALLOWED_PENETRATION_M:
-            message = f"meets {second} when both are open (by up to {1000 * depth_m:.0f} mm): open one at a time"
-            yield finding("together", first, message)
+        overlaps = [hit for hit in _overlaps(model, first, second) if hit[2] > ALLOWED_PENETRATION_M]
+        if overlaps:
+            a, b, depth = zip(*overlaps, strict=True)
+            found.append(Meeting(joints=(first, second), depth_m=max(depth), first_at=(min(a), min(b))))
+    return found
 
 
-def _overlaps(model: Any, first: str, second: str) -> Iterator[float]:
-    movers = [subtree(model, int(model.joint(name).bodyid[0])) for name in (first, second)]
+def all_together(model: Any) -> float:
+    """Deepest overlap in metres while every joint opens at the same share of its range."""
+    ranges = {name: model.joint(name).range for name in joint_names(model)}
+    deepest = 0.0
+    for share in np.linspace(0.0, 1.0, _ALL_POSITIONS):
+        positions = {name: float(lower + share * (upper - lower)) for name, (lower, upper) in ranges.items()}
+        deepest = max([deepest, *(touch.depth_m for touch in touches(model, positions))])
+    return deepest
+
+
+def _overlaps(model: Any, first: str, second: str) -> Iterator[tuple[float, float, float]]:
+    """Positions of both joints and the overlap there, in metres."""
+    some, others = movers_of(model, first), movers_of(model, second)
     for a in _positions(model, first)[1:]:
         for b in _positions(model, second)[1:]:
             for touch in touches(model, {first: float(a), second: float(b)}):
-                if any(one in movers[0] and other in movers[1] for one, other in (touch.bodies, touch.bodies[::-1])):
-                    yield touch.depth_m
+                if touch.between(some, others):
+                    yield float(a), float(b), touch.depth_m
 
 
 def _positions(model: Any, name: str) -> np.ndarray:
@@ -46,7 +84,7 @@ def _swept_box(model: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
     import mujoco
 
     data = mujoco.MjData(model)
-    movers = subtree(model, int(model.joint(name).bodyid[0]))
+    movers = movers_of(model, name)
     geoms = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in movers]
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for position in _positions(model, name):

@@ -24,6 +24,15 @@ class LoaderResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Blocker:
+    """What keeps a joint from opening all the way: a loose thing, or what another joint moves when that is open too."""
+
+    name: str  # of the thing's object, or of the other joint
+    kind: Literal["thing", "joint"]
+    position: float  # of the blocked joint, rad or m: the first of the sweep at which they overlap
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointResult:
     """One joint's sweep and drive test."""
 
@@ -31,6 +40,16 @@ class JointResult:
     deepest_penetration_m: float  # over the kinematic sweep, 21 positions
     travel_reached: float  # 0..1 of the range under the stated force
     cavity_open: float | None = None  # 0..1 of the space it opens that no collider fills; None: no such space
+    blocked_by: tuple[Blocker, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThingResult:
+    """A free-standing thing: whether it stays where it stands, and whether its opening is open to an engine."""
+
+    name: str
+    drift_m: float
+    opening_free: float | None = None  # 0..1 of the hollow of its mesh that no collider fills; None: it has no hollow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +62,9 @@ class Certificate:
     joints: tuple[JointResult, ...]
     rest_penetration_m: float
     drift_m: float
-    realtime_factor: float
+    realtime_factor: float  # simulated seconds per second of one processor core
+    things: tuple[ThingResult, ...] = ()
+    together_penetration_m: float = float("nan")  # deepest overlap when all joints open at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -67,6 +67,7 @@ SIMULATION_RULES: dict[str, Rule] = {
     "penetration-rest": Rule("error", "bodies overlap while everything is closed: they fly apart or stick"),
     "penetration-sweep": Rule("error", "a joint moves its part into something"),
     "cavity": Rule("error", "a door or a tray of solid colliders: nothing fits in"),
+    "opening": Rule("warning", "a mug or a bowl whose colliders fill its hollow: nothing can be put into it"),
     "together": Rule("warning", "parts of two joints meet when both are open, as in many real kitchens"),
     "travel": Rule("error", "a joint jams under a hand's force"),
     "drift": Rule("error", "something left alone falls or creeps"),

@@ -193,7 +193,7 @@ def counter(name: str) -> SceneObject:
     return _object(name, "counter", size, _at([0.15, 0.0, 0.825 + 0.02]), (slab,), ())
 
 
-def bottle(name: str, *, x: float = 0.2, bottom_z: float = 0.8655) -> SceneObject:
+def bottle(name: str, *, x: float = 0.2, bottom_z: float = 0.8651) -> SceneObject:
     """A free-standing thing with one convex collider and a texture of its own."""
     size = np.array([0.08, 0.08, 0.26])
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)

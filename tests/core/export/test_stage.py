@@ -89,7 +89,9 @@ def test_the_manifest_follows_its_schema(written: tuple[Path, Certificate]) -> N
     door = document["objects"][0]
     keys = "name category dimensions_m world_from_object joint dimension_source mask candidates chosen placement warp meshes"
     assert set(keys.split()) | {"mass_kg", "warnings"} <= set(door)
-    assert set(door["joint"]) == {"name", "type", "axis", "origin", "lower", "upper", "source"}
+    assert set(door["joint"]) == {"name", "type", "axis", "origin", "lower", "upper", "source", "blocked_by"}
+    assert door["joint"]["blocked_by"] == []
+    assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]
     assert door["joint"]["source"] == {"axis": "inferred", "origin": "inferred", "limits": "default"}
     np.testing.assert_allclose(door["joint"]["axis"], [0, 0, -1], atol=1e-9)
     np.testing.assert_allclose(door["joint"]["origin"], [-0.6 - 0.597 / 2, -0.28, 0.1 + 0.36], atol=1e-9)
@@ -196,7 +198,9 @@ def test_the_certificate_as_json_is_versioned_and_complete(written: tuple[Path, 
         "findings",
         "loaders",
         "joints",
+        "things",
         "rest_penetration_m",
+        "together_penetration_m",
         "drift_m",
         "realtime_factor",
     }

@@ -1,0 +1,61 @@
+"""Everything left alone: how far anything moves, and how fast the scene runs."""
+
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.export.contacts import body_name
+from r2c2r_core.export.rules.table import finding
+from r2c2r_core.model.report import Finding
+
+REST_SECONDS = 5.0
+ALLOWED_DRIFT_M = 0.001  # a thing neither sinks, slides nor rolls
+
+
+class Left(NamedTuple):
+    """What leaving a scene alone showed."""
+
+    drift_m: dict[str, float]  # by body
+    realtime_factor: float  # simulated seconds per second of one core
+    findings: list[Finding]
+
+
+def leave_alone(model: Any) -> Left:
+    """Simulate REST_SECONDS with nobody touching anything."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    start = data.geom_xpos.copy()
+    moved = np.zeros(model.ngeom)
+    started = time.thread_time()  # of this core: another process's work is no fault of the scene
+    for step in range(int(REST_SECONDS / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        if step % 50 == 49:
+            moved = np.maximum(moved, np.linalg.norm(data.geom_xpos - start, axis=1))
+    seconds = max(time.thread_time() - started, 1e-9)
+    drift_m = _by_body(model, moved)
+    notes = [
+        finding("drift", name, f"moves {1000 * distance:.1f} mm in {REST_SECONDS:.0f} s with nobody touching it")
+        for name, distance in drift_m.items()
+        if not distance <= ALLOWED_DRIFT_M
+    ]
+    if any(data.warning[int(w)].number for w in _divergences()):
+        notes.append(finding("unstable", "scene.xml", f"MuJoCo reset the state within {REST_SECONDS:.0f} s"))
+    return Left(drift_m, REST_SECONDS / seconds, notes)
+
+
+def _by_body(model: Any, moved: np.ndarray) -> dict[str, float]:
+    worst: dict[str, float] = {}
+    for geom, distance in enumerate(moved):
+        name = body_name(model, int(model.geom_bodyid[geom]))
+        worst[name] = max(worst.get(name, 0.0), float(distance))
+    return worst
+
+
+def _divergences() -> tuple[Any, ...]:
+    import mujoco
+
+    kinds = mujoco.mjtWarning
+    return kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC

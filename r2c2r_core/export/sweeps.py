@@ -1,0 +1,82 @@
+"""One joint at a time: swept for overlaps, pushed for travel, and what stands in its way named."""
+
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.cavities import cavity_open
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, body_name, free_bodies, movers_of, touches
+from r2c2r_core.export.rules.table import finding
+from r2c2r_core.model.report import Blocker, Finding, JointResult
+
+POSITIONS = 21
+DRIVE_FORCE_N, DRIVE_TORQUE_NM = 30.0, 10.0  # about what one hand gives a drawer or a door
+DRIVE_SECONDS = 6.0
+NEEDED_TRAVEL = 0.98
+NEEDED_CAVITY = 0.9  # walls apart: shelves and linings take the rest
+
+
+def examine_joint(strict: Any, solid: Any, name: str) -> tuple[JointResult, list[Finding]]:
+    """Sweep and push one joint, all others closed; `solid` is the `strict` model with free-standing things in it."""
+    deepest, notes = _swept(strict, name)
+    blockers = things_in_the_way(solid, name)
+    notes += [finding("blocked-by", name, f"{blocker.name} stands in its way") for blocker in blockers]
+    travel = push_open(strict, name)
+    if travel < NEEDED_TRAVEL:
+        unit = f"{DRIVE_FORCE_N:.0f} N" if strict.joint(name).type[0] == 2 else f"{DRIVE_TORQUE_NM:.0f} N m"
+        notes.append(finding("travel", name, f"opens {100 * travel:.0f} % of its range under {unit}"))
+    inside = cavity_open(strict, name)
+    if inside is not None and inside < NEEDED_CAVITY:
+        notes.append(finding("cavity", name, f"only {100 * inside:.0f} % of the space it opens is free"))
+    result = JointResult(
+        joint=name, deepest_penetration_m=deepest, travel_reached=travel, cavity_open=inside, blocked_by=tuple(blockers)
+    )
+    return result, notes
+
+
+def push_open(model: Any, joint: str) -> float:
+    """Fraction of its range that a joint reaches, pushed steadily from closed by DRIVE_FORCE_N or DRIVE_TORQUE_NM."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    entry = model.joint(joint)
+    address, dof, upper = int(entry.qposadr[0]), int(entry.dofadr[0]), float(entry.range[1])
+    force = DRIVE_FORCE_N if entry.type[0] == mujoco.mjtJoint.mjJNT_SLIDE else DRIVE_TORQUE_NM
+    reached = 0.0
+    for _ in range(int(DRIVE_SECONDS / model.opt.timestep)):
+        data.qfrc_applied[dof] = force
+        mujoco.mj_step(model, data)
+        reached = max(reached, float(data.qpos[address]) / upper)
+        if reached >= 1.0 or not np.isfinite(data.qpos[address]):
+            break
+    return min(reached, 1.0)
+
+
+def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
+    """Free-standing things that the joint's part runs into, each with where in the sweep it first does."""
+    movers, free = movers_of(solid, name), free_bodies(solid)
+    first: dict[str, float] = {}
+    for position in _positions(solid, name) if free else ():
+        for touch in touches(solid, {name: position}):
+            if touch.depth_m > ALLOWED_PENETRATION_M and touch.between(movers, free):
+                thing = body_name(solid, next(body for body in touch.bodies if body in free))
+                first.setdefault(thing, position)
+    return [Blocker(name=thing, kind="thing", position=position) for thing, position in sorted(first.items())]
+
+
+def _swept(strict: Any, name: str) -> tuple[float, list[Finding]]:
+    """The deepest overlap over the joint's sweep, and a finding where it is too deep."""
+    movers = movers_of(strict, name)
+    deepest, at, worst = 0.0, 0.0, ""
+    for position in _positions(strict, name):
+        for touch in touches(strict, {name: position}):
+            if movers & set(touch.bodies) and touch.depth_m > deepest:
+                deepest, at, worst = touch.depth_m, position, touch.names
+    if deepest <= ALLOWED_PENETRATION_M:
+        return deepest, []
+    return deepest, [finding("penetration-sweep", name, f"{worst} overlap by {1000 * deepest:.1f} mm at {at:.3g}")]
+
+
+def _positions(model: Any, name: str) -> list[float]:
+    lower, upper = (float(value) for value in model.joint(name).range)
+    return [float(position) for position in np.linspace(lower, upper, POSITIONS)]
