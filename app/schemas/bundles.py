@@ -33,6 +33,14 @@ class LoaderVerdict(Shape):
     detail: str
 
 
+class BlockerVerdict(Shape):
+    """What keeps a joint from opening all the way: a loose thing, or the part of another joint that stands open."""
+
+    name: str
+    kind: str
+    position: float | None  # of the blocked joint
+
+
 class JointVerdict(Shape):
     """One joint's sweep and drive test."""
 
@@ -40,6 +48,15 @@ class JointVerdict(Shape):
     deepest_penetration_m: float
     travel_reached: float
     cavity_open: float | None = None  # share of the space it opens that is free
+    blocked_by: list[BlockerVerdict] = []
+
+
+class ThingVerdict(Shape):
+    """One free-standing thing, left alone."""
+
+    name: str
+    drift_m: float | None
+    opening_free: float | None = None  # share of its hollow that no collider fills
 
 
 class Certificate(Shape):
@@ -53,3 +70,5 @@ class Certificate(Shape):
     rest_penetration_m: float
     drift_m: float
     realtime_factor: float
+    things: list[ThingVerdict] = []
+    together_penetration_m: float | None = None  # deepest overlap when all joints open at once

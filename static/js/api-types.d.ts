@@ -10,6 +10,13 @@ export interface Backend {
   reason: string;
 }
 
+/** What keeps a joint from opening all the way: a loose thing, or the part of another joint that stands open. */
+export interface BlockerVerdict {
+  name: string;
+  kind: string;
+  position: number | null;
+}
+
 /** One finished bundle. */
 export interface Bundle {
   version: number;
@@ -116,6 +123,8 @@ export interface Certificate {
   rest_penetration_m: number;
   drift_m: number;
   realtime_factor: number;
+  things: ThingVerdict[];
+  together_penetration_m: number | null;
 }
 
 /** What somebody said, where, and whether it is settled. */
@@ -283,6 +292,7 @@ export interface JointVerdict {
   deepest_penetration_m: number;
   travel_reached: number;
   cavity_open: number | null;
+  blocked_by: BlockerVerdict[];
 }
 
 /** Where an object is seen. */
@@ -627,6 +637,13 @@ export interface SystemInfo {
   segmenters: Backend[];
   generators: Backend[];
   matchers: Backend[];
+}
+
+/** One free-standing thing, left alone. */
+export interface ThingVerdict {
+  name: string;
+  drift_m: number | null;
+  opening_free: number | null;
 }
 
 /** What to undo or redo: the last change of this object, or of any object when None. */
