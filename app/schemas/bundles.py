@@ -48,7 +48,7 @@ class JointVerdict(Shape):
     deepest_penetration_m: float
     travel_reached: float
     cavity_open: float | None = None  # share of the space it opens that is free
-    blocked_by: list[BlockerVerdict] = []
+    blocked_by: tuple[BlockerVerdict, ...] = ()
 
 
 class ThingVerdict(Shape):
@@ -70,5 +70,5 @@ class Certificate(Shape):
     rest_penetration_m: float
     drift_m: float
     realtime_factor: float
-    things: list[ThingVerdict] = []
+    things: tuple[ThingVerdict, ...] = ()
     together_penetration_m: float | None = None  # deepest overlap when all joints open at once
