@@ -1,6 +1,5 @@
-"""Archives that people send: looked at before anything in them is believed, unpacked only inside their folder."""
+"""Archives that people send: looked at before anything in them is believed. Nothing is ever unpacked onto the disk."""
 
-import shutil
 import stat
 import zipfile
 from pathlib import Path, PurePosixPath
@@ -12,57 +11,20 @@ MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and dept
 MIN_SUSPICIOUS = 64 * 1024 * 1024  # bytes unpacked below which no ratio is suspicious
 
 
-def check_archive(path: Path, *, max_bytes: int, max_files: int) -> None:
-    """Raise CaptureError, in one line, unless the file is a complete zip that is safe to read."""
+def check_archive(path: Path, name: str, *, max_bytes: int, max_files: int) -> None:
+    """Raise CaptureError, in one line, unless the file is a complete zip that is safe to read; it is called `name`."""
     with path.open("rb") as handle:
         if handle.read(4) != b"PK\x03\x04":
             raise CaptureError(
-                f"{path.name} is not a zip or an .r3d", hint="send an .r3d from Record3D, or a zip of a recording's folder"
+                f"{name} is not a zip or an .r3d", hint="send an .r3d from Record3D, or a zip of a recording's folder"
             )
     _refuse_large_directory(path, max_files)
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
     except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError, OverflowError) as error:
-        raise CaptureError(f"{path.name} is damaged or cut short ({error})", hint="copy it from the phone again") from error
+        raise CaptureError(f"{name} is damaged or cut short ({error})", hint="copy it from the phone again") from error
     _refuse_unsafe(members, path.stat().st_size, max_bytes, max_files)
-
-
-def is_r3d(path: Path) -> bool:
-    """Whether the archive is a Record3D recording, which the core reads as it is."""
-    with zipfile.ZipFile(path) as archive:
-        return "metadata" in archive.namelist()
-
-
-def unpack(path: Path, folder: Path, *, max_bytes: int, max_files: int) -> Path:
-    """Unpack a checked archive; the folder that holds the recording, without lone outer folders."""
-    check_archive(path, max_bytes=max_bytes, max_files=max_files)
-    shutil.rmtree(folder, ignore_errors=True)
-    left = max_bytes
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for member in archive.infolist():
-                if not member.is_dir():
-                    left = _unpack_member(archive, member, folder, left)
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise CaptureError(f"the archive is damaged ({error})", hint="pack it again") from error
-    inner = folder
-    while len(entries := list(inner.iterdir())) == 1 and entries[0].is_dir():
-        inner = entries[0]
-    return inner
-
-
-def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, left: int) -> int:
-    target = folder.joinpath(*PurePosixPath(member.filename).parts)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with archive.open(member) as source, target.open("wb") as out:
-        while chunk := source.read(1 << 20):
-            left -= len(chunk)
-            if left < 0:  # its header lied
-                raise ValueError("more bytes than it declares")
-            out.write(chunk)
-    return left
 
 
 def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, max_files: int) -> None:
@@ -82,13 +44,13 @@ def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, 
             f"the archive unpacks to {total / max(packed, 1):.0f} times its size", hint="this is not a recording"
         )
     for member in members:
-        name = member.filename
-        parts = PurePosixPath(name.replace("\\", "/")).parts
-        if name.startswith(("/", "\\")) or ".." in parts or (parts and ":" in parts[0]) or "\x00" in name:
-            raise CaptureError(f"the archive holds the path {name[:80]!r}", hint="pack the folder with relative paths")
+        inner = member.filename
+        parts = PurePosixPath(inner.replace("\\", "/")).parts
+        if inner.startswith(("/", "\\")) or ".." in parts or (parts and ":" in parts[0]) or "\x00" in inner:
+            raise CaptureError(f"the archive holds the path {inner[:80]!r}", hint="pack the folder with relative paths")
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-            raise CaptureError(f"the archive holds a link or a device ({name[:80]!r})", hint="pack plain files only")
+            raise CaptureError(f"the archive holds a link or a device ({inner[:80]!r})", hint="pack plain files only")
         if member.flag_bits & 0x1:
             raise CaptureError("the archive is encrypted", hint="pack it without a password")
 

@@ -22,11 +22,27 @@ from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
 from app.jobs.plans import Commands
 from app.jobs.runner import Runner
-from app.routes import jobs, live, media, pages, people, projects, prompts, proposals, reviews, scenes, states, system, viewer
+from app.routes import (
+    jobs,
+    live,
+    media,
+    pages,
+    people,
+    projects,
+    prompts,
+    proposals,
+    reviews,
+    scenes,
+    states,
+    system,
+    uploads,
+    viewer,
+)
 from app.security import Guard, Person
 from app.services.context import Context
 from app.services.people import People
 from app.services.prompts import tell_object
+from app.services.uploads import tidy as tidy_uploads
 from app.settings import Settings, shipped
 from app.viewer.client import Viewer
 from r2c2r_core.errors import R2C2RError
@@ -34,7 +50,7 @@ from r2c2r_core.errors import R2C2RError
 _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
-ROUTERS = (system, people, projects, prompts, proposals, jobs, reviews, states, scenes, media, viewer, live, pages)
+ROUTERS = (system, people, projects, uploads, prompts, proposals, jobs, reviews, states, scenes, media, viewer, live, pages)
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
 
@@ -118,6 +134,7 @@ async def _tidy(context: Context) -> None:
     while True:
         await asyncio.sleep(TIDY_S)
         await anyio.to_thread.run_sync(context.viewer.close_idle)
+        await anyio.to_thread.run_sync(tidy_uploads, context)
 
 
 def _tell(context: Context, project: str, number: int) -> None:

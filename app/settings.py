@@ -23,6 +23,7 @@ class Settings:
     accounts_only: bool = False  # others can reach it: the printed key opens nothing, people sign in
     import_roots: tuple[Path, ...] = ()
     max_upload_bytes: int = 16 * 1024 * MEBIBYTE
+    upload_kept_s: float = 7 * 24 * 3600.0  # an upload that stopped may go on for this long
     max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE
     max_unpacked_files: int = 200_000
     min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
@@ -39,6 +40,11 @@ class Settings:
     def database(self) -> Path:
         """The SQLite file."""
         return self.data_dir / "r2c2r.db"
+
+    @property
+    def uploads(self) -> Path:
+        """Recordings on their way in."""
+        return self.data_dir / "uploads"
 
     @property
     def roots(self) -> tuple[Path, ...]:

@@ -54,6 +54,7 @@ def _prepare(connection: sqlite3.Connection, _record: Any) -> None:
     connection.execute("PRAGMA synchronous=FULL")  # a click that was acknowledged survives a power cut
     connection.execute("PRAGMA foreign_keys=ON")
     connection.execute("PRAGMA busy_timeout=10000")
+    connection.execute("PRAGMA secure_delete=ON")  # what was deleted is overwritten
 
 
 def _begin(connection: Any) -> None:

@@ -1,6 +1,6 @@
 """Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR`.
 
-A zipped folder is unpacked first. Beside the workspace it writes what the web process needs at hand without loading the
+Beside the workspace it writes what the web process needs at hand without loading the
 recording: frames.json (the frame table), facts.json (what the recording is, and its problems) and pictures of the scan.
 """
 
@@ -16,12 +16,16 @@ import cv2
 import numpy as np
 
 from app import archives
+from app.jobs.limits import limit_this_process
 from app.jobs.messages import run_stage
 from app.settings import Settings
 from r2c2r_core.errors import PromptError
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.progress import Progress
 from r2c2r_core.workspace import Workspace, write_atomically
+
+CPU_S = 4 * 3600  # a recording of an hour takes a tenth of that
+FILE_BYTES = 8 << 30
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -30,6 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("workdir", type=Path)
     parser.add_argument("folder", type=Path)
     options = parser.parse_args(arguments)
+    limit_this_process(cpu_s=CPU_S, file_bytes=FILE_BYTES)
     return run_stage("ingest", lambda progress: ingest(options.workdir, options.folder, progress))
 
 
@@ -40,8 +45,7 @@ def ingest(workdir: Path, folder: Path, progress: Progress) -> None:
 
     request_path = workdir / "request.json"
     document = json.loads(request_path.read_text())
-    source = _plain_source(Path(document["source"]), folder, progress)
-    write_atomically(request_path, json.dumps({**document, "source": str(source)}, indent=1).encode())
+    source = _checked_source(Path(document["source"]))
     work = Workspace(workdir)
     with suppress(PromptError):  # nobody has clicked yet; the recording is read before that is noticed
         reconstruct(read_request(workdir), work, until="ingest", progress=progress)
@@ -112,17 +116,11 @@ def capture_facts(capture: Capture, source: Path | None) -> dict[str, Any]:
     }
 
 
-def _plain_source(source: Path, folder: Path, progress: Progress) -> Path:
-    """The recording as the core reads it: a zipped folder is unpacked, anything else stays as it is."""
-    if not source.is_file():
-        return source
-    limits = Settings(data_dir=folder)
-    if source.suffix.lower() in (".zip", ".r3d"):
-        archives.check_archive(source, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)
-        if source.suffix.lower() == ".zip" and not archives.is_r3d(source):
-            progress.at(0.0, "unpacking")
-            unpacked = folder / "unpacked"
-            return archives.unpack(source, unpacked, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)
+def _checked_source(source: Path) -> Path:
+    """The recording, once an archive was found safe to read."""
+    if source.is_file() and source.suffix.lower() in (".zip", ".r3d"):
+        limits = Settings(data_dir=source.parent)
+        archives.check_archive(source, source.name, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)
     return source
 
 

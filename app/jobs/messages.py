@@ -22,6 +22,16 @@ def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
     except R2C2RError as error:
         say(error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
         return 130 if isinstance(error, Cancelled) else error.exit_code
+    except MemoryError:
+        traceback.print_exc()
+        say(
+            error={
+                "kind": "EnvironmentProblem",
+                "message": f"{stage}: out of memory",
+                "hint": "close other programs, then retry",
+            }
+        )
+        return 1
     except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the person
         traceback.print_exc()
         say(error={"kind": "internal", "message": f"unexpected: {error}", "hint": "see the job's log"})

@@ -30,6 +30,7 @@ class Commands:
     """The programs a job may start; tests put their own in their place."""
 
     worker: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.worker"))
+    probe: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.probe"))
     ingest: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.ingest"))
     sample: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.sample"))
     live: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.live_segment"))

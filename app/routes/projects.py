@@ -5,7 +5,7 @@ from fastapi import APIRouter, Request
 from app import schemas
 from app.deps import AdminCtx, Ctx
 from app.routes.numbers import Count, OptionalId
-from app.services import imports, projects
+from app.services import imports, projects, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
@@ -21,7 +21,7 @@ async def upload_project(context: Ctx, request: Request, filename: str, name: st
     """A new project from the request's body (the raw bytes of an .r3d or a zip); starts the import."""
     length = request.headers.get("content-length")
     size = int(length) if length and length.isdigit() else None
-    return await imports.from_upload(context, filename, name, size, request.stream())
+    return await uploads.whole(context, filename, name, size, request.stream())
 
 
 @router.post("/import", operation_id="importProject", status_code=202)

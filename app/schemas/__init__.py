@@ -27,6 +27,7 @@ from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, Overrid
 from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
 from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
 from app.schemas.system import Backend, Category, FolderEntry, FolderListing, SystemInfo
+from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerShown
 
 __all__ = [
@@ -91,6 +92,8 @@ __all__ = [
     "SystemInfo",
     "UndoRequest",
     "Undone",
+    "Upload",
+    "UploadIn",
     "VerdictIn",
     "ViewerSession",
     "ViewerShow",

@@ -41,10 +41,17 @@ def get_project(context: Context, project_id: str) -> schemas.Project:
         return shape(context, session, queries.project_row(session, project_id))
 
 
-def new_project(session: Session, name: str, source_name: str, source_path: Path | None, work: Path | None = None) -> Project:
+def new_project(
+    session: Session,
+    name: str,
+    source_name: str,
+    source_path: Path | None,
+    work: Path | None = None,
+    project_id: str | None = None,
+) -> Project:
     """A project's row, still importing."""
-    now = time.time()
-    project = Project(id=secrets.token_hex(6), name=name, status="importing", created=now, updated=now, source_name=source_name)
+    now, number = time.time(), project_id or secrets.token_hex(6)
+    project = Project(id=number, name=name, status="importing", created=now, updated=now, source_name=source_name)
     project.source_path = str(source_path) if source_path else None
     project.work_path = str(work) if work else None
     session.add(project)

@@ -659,6 +659,24 @@ export interface Undone {
   frame: number | null;
 }
 
+/** A recording on its way in; what comes next starts at `offset`. */
+export interface Upload {
+  id: string;
+  file_name: string;
+  size: number;
+  modified: number | null;
+  offset: number;
+  created: number;
+}
+
+/** The file that will come, as its sender knows it. */
+export interface UploadIn {
+  file_name: string;
+  size: number;
+  name?: string | null;
+  modified?: number | null;
+}
+
 /** What a reviewer says. Rejecting makes new candidates; accepting another one aligns it anew. */
 export interface VerdictIn {
   candidate: string;
@@ -824,6 +842,18 @@ export interface Operations {
   showInViewer: { parameters: { project: string }; body: ViewerShow; answer: ViewerShown };
   /** GET /api/system */
   getSystem: { parameters: Record<string, never>; body: undefined; answer: SystemInfo };
+  /** GET /api/uploads */
+  listUploads: { parameters: Record<string, never>; body: undefined; answer: Upload[] };
+  /** POST /api/uploads */
+  beginUpload: { parameters: Record<string, never>; body: UploadIn; answer: Upload };
+  /** DELETE /api/uploads/{upload} */
+  cancelUpload: { parameters: { upload: string }; body: undefined; answer: unknown };
+  /** HEAD /api/uploads/{upload} */
+  uploadOffset: { parameters: { upload: string }; body: undefined; answer: unknown };
+  /** PATCH /api/uploads/{upload} */
+  continueUpload: { parameters: { upload: string }; body: undefined; answer: unknown };
+  /** POST /api/uploads/{upload}/finish */
+  finishUpload: { parameters: { upload: string }; body: undefined; answer: Project };
   /** GET /media/{project}/bundles/{version}.zip */
   downloadBundle: { parameters: { project: string; version: number }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.glb */

@@ -3,8 +3,11 @@
 /** @import {
  *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
- *   Bundle, ViewerSession, ViewerShown, ViewerShow, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest
+ *   Bundle, ViewerSession, ViewerShown, ViewerShow, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest,
+ *   Upload
  * } from "./api-types" */
+
+import { sendRest, stoppedUpload } from "./lib/resumable.js";
 
 export class ApiError extends Error {
   /**
@@ -22,11 +25,11 @@ export class ApiError extends Error {
 
 /**
  * @param {string} path
- * @param {{ method?: string, json?: unknown, body?: BodyInit, signal?: AbortSignal }} [options]
+ * @param {{ method?: string, json?: unknown, body?: BodyInit, signal?: AbortSignal, headers?: Record<string, string> }} [options]
  */
-async function call(path, { method = "GET", json, body, signal } = {}) {
+async function call(path, { method = "GET", json, body, signal, headers: more = {} } = {}) {
   /** @type {Record<string, string>} */
-  const headers = method === "GET" ? {} : { "X-Requested-With": "r2c2r" };
+  const headers = method === "GET" ? {} : { "X-Requested-With": "r2c2r", ...more };
   if (json !== undefined) headers["Content-Type"] = "application/json";
   else if (body !== undefined) headers["Content-Type"] = "application/octet-stream";
   /** @type {Response} */
@@ -98,44 +101,36 @@ export const listFrames = (id) => get(`${of(id)}/frames`);
 /** @param {string} id @returns {Promise<HistoryEntry[]>} */
 export const getHistory = (id) => get(`${of(id)}/history?limit=100`);
 
-/**
- * Upload a recording; `onProgress` hears 0..1. Aborting the signal stops it.
- * @param {File} file
- * @param {(fraction: number) => void} onProgress
- * @param {AbortSignal} signal
- * @returns {Promise<Project>}
- */
-export function uploadRecording(file, onProgress, signal) {
-  return new Promise((resolve, reject) => {
-    const request = new XMLHttpRequest(); // fetch cannot report how much was sent
-    request.open("POST", `/api/projects/upload?${new URLSearchParams({ filename: file.name })}`);
-    request.setRequestHeader("X-Requested-With", "r2c2r");
-    request.setRequestHeader("Content-Type", "application/octet-stream");
-    request.upload.addEventListener("progress", (event) => onProgress(event.loaded / Math.max(event.total, 1)));
-    request.addEventListener("load", () => {
-      if (request.status < 300) resolve(JSON.parse(request.responseText));
-      else reject(new ApiError(request.status, parsedError(request)));
-    });
-    const hint = "nothing was kept; try again";
-    request.addEventListener("error", () =>
-      reject(new ApiError(0, { kind: "offline", message: "the upload broke off", hint })),
-    );
-    signal.addEventListener("abort", () => request.abort());
-    request.addEventListener("abort", () => reject(new DOMException("cancelled", "AbortError")));
-    request.send(file);
-  });
-}
+/** @returns {Promise<Upload[]>} */
+export const listUploads = () => get("/api/uploads");
+/** @param {string} id */
+export const cancelUpload = (id) => call(`/api/uploads/${id}`, { method: "DELETE" });
 
 /**
- * @param {XMLHttpRequest} request
- * @returns {ConstructorParameters<typeof ApiError>[1]}
+ * Upload a recording in pieces, from where an earlier upload of the same file stopped; a lost connection is waited out.
+ * @param {File} file
+ * @param {(fraction: number, waiting: boolean) => void} onProgress
+ * @param {AbortSignal} signal ends it; what arrived stays, to go on with
+ * @returns {Promise<Project>}
  */
-function parsedError(request) {
-  try {
-    return JSON.parse(request.responseText);
-  } catch {
-    return { kind: "internal", message: `the server answered ${request.status}`, hint: "see its log" };
-  }
+export async function uploadRecording(file, onProgress, signal) {
+  const wish = { file_name: file.name, size: file.size, modified: file.lastModified / 1000 };
+  const upload = stoppedUpload(file, await listUploads()) ?? (await send("POST", "/api/uploads", wish));
+  const path = `/api/uploads/${upload.id}`;
+  /** @param {Response} response */
+  const offsetOf = (response) => Number(response.headers.get("Upload-Offset"));
+  await sendRest(file, upload.offset, {
+    send: async (offset, piece) =>
+      offsetOf(
+        await call(path, { method: "PATCH", body: piece, signal, headers: { "Upload-Offset": String(offset) } }),
+      ),
+    ask: async () => offsetOf(await call(path, { method: "HEAD", signal })),
+    mayPass: (error) =>
+      error instanceof ApiError && (error.status === 0 || error.status === 409 || error.status === 503),
+    onProgress: (sent, waiting) => onProgress(sent / file.size, waiting),
+    wait: (ms) => new Promise((resolve) => setTimeout(resolve, ms)),
+  });
+  return send("POST", `${path}/finish`);
 }
 
 /** @param {string} id @returns {Promise<SceneObject[]>} */

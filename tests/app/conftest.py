@@ -29,7 +29,11 @@ def fake(name: str, *options: str) -> tuple[str, ...]:
 
 BARE = "-IS"  # no site packages: starts in a third of the time
 FAKE_COMMANDS = Commands(
-    worker=fake("worker", BARE), ingest=fake("ingest", BARE), sample=fake("sample", BARE), live=fake("live")
+    probe=fake("probe", BARE),
+    worker=fake("worker", BARE),
+    ingest=fake("ingest", BARE),
+    sample=fake("sample", BARE),
+    live=fake("live"),
 )
 
 

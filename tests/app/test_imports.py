@@ -29,7 +29,8 @@ def upload(web: Running, content: bytes, name: str = "scan.r3d", status: int = 2
 
 
 def left_behind(web: Running) -> list[Path]:
-    return [p for p in (web.settings.data_dir / "projects").rglob("*") if p.is_file()]
+    folders = (web.settings.data_dir / "projects", web.settings.uploads)
+    return [p for folder in folders for p in folder.rglob("*") if p.is_file()]
 
 
 def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> None:
@@ -178,13 +179,19 @@ def test_a_sample_comes_with_its_clicks(web: Running) -> None:
     }
 
 
-def test_an_upload_whose_sender_leaves_is_forgotten(web: Running) -> None:
-    told = [{"type": "http.request", "body": R3D[:200], "more_body": True}, {"type": "http.disconnect"}]
+def break_off(web: Running, method: str, path: str, content: bytes, query: str = "", headers: Any = None) -> list[Any]:
+    """Send a request whose sender leaves after `content`; what the app answered."""
+    told = [{"type": "http.request", "body": content, "more_body": True}, {"type": "http.disconnect"}]
     said: list[Any] = []
-    cookie = f"{COOKIE}={web.client.cookies[COOKIE]}".encode()
-    headers = [(b"host", b"127.0.0.1"), (b"cookie", cookie), (b"x-requested-with", b"tests")]
-    scope = {"type": "http", "method": "POST", "path": "/api/projects/upload", "query_string": b"filename=scan.r3d"}
-    scope |= {"headers": headers, "http_version": "1.1", "scheme": "http", "server": ("127.0.0.1", 80), "app": web.app}
+    sent = {
+        "host": "127.0.0.1",
+        "cookie": f"{COOKIE}={web.client.cookies[COOKIE]}",
+        "x-requested-with": "tests",
+        **(headers or {}),
+    }
+    scope = {"type": "http", "method": method, "path": path, "query_string": query.encode(), "app": web.app}
+    scope |= {"headers": [(name.encode(), value.encode()) for name, value in sent.items()]}
+    scope |= {"http_version": "1.1", "scheme": "http", "server": ("127.0.0.1", 80)}
 
     async def receive() -> Any:
         return told.pop(0)
@@ -193,6 +200,12 @@ def test_an_upload_whose_sender_leaves_is_forgotten(web: Running) -> None:
         said.append(message)
 
     web.client.portal.call(web.app, scope, receive, send)  # type: ignore[union-attr]  # open while the client is
+    return said
+
+
+def test_an_upload_in_one_piece_whose_sender_leaves_is_forgotten(web: Running) -> None:
+    said = break_off(web, "POST", "/api/projects/upload", R3D[:200], query="filename=scan.r3d")
     assert said[0]["status"] == 422
     assert left_behind(web) == []
     assert web.get("/api/projects") == []
+    assert web.get("/api/uploads") == []

@@ -6,6 +6,7 @@ import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { strips } from "../../static/js/lib/strips.js";
 import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
+import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
 const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
 
@@ -101,4 +102,46 @@ test("frames that stand out are marked in the strips", () => {
     assert.match(summary, /^1 of 5 frames/);
     assert.ok(bars.every((bar) => bar.height >= 0 && bar.height <= 1));
   }
+});
+
+const file = new Blob([new Uint8Array(2 * PIECE + 10)]);
+
+/** A server that keeps half of a piece and then cannot be reached, so often. */
+function faultyServer(failures) {
+  const kept = { bytes: 0, failures };
+  return {
+    kept,
+    send: async (offset, piece) => {
+      assert.equal(offset, kept.bytes);
+      if (kept.failures-- > 0) {
+        kept.bytes += piece.size >> 1;
+        throw new Error("lost");
+      }
+      return (kept.bytes += piece.size);
+    },
+    ask: async () => kept.bytes,
+    mayPass: (error) => error.message === "lost",
+    onProgress: () => {},
+    wait: async () => {},
+  };
+}
+
+test("an upload goes on where the server's copy ends, however often the connection is lost", async () => {
+  for (const failures of [0, 1, 5]) {
+    const server = faultyServer(failures);
+    await sendRest(file, 0, server);
+    assert.equal(server.kept.bytes, file.size);
+  }
+});
+
+test("an upload that is refused is given up", async () => {
+  const refusing = { ...faultyServer(0), send: async () => Promise.reject(new Error("too large")) };
+  await assert.rejects(sendRest(file, 0, refusing), /too large/);
+});
+
+test("only the same file goes on with a stopped upload", () => {
+  const stopped = { file_name: "a.r3d", size: 9, modified: 1.5, offset: 3 };
+  assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500 }, [stopped]), stopped);
+  for (const other of [{ name: "b.r3d" }, { size: 8 }, { lastModified: 1501 }])
+    assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500, ...other }, [stopped]), undefined);
 });

@@ -1,11 +1,13 @@
 /** All projects; import by upload, drop or path; the sample kitchen. */
 
 import {
+  cancelUpload,
   changeProject,
   deleteProject,
   getSystem,
   importPath,
   listProjects,
+  listUploads,
   makeSample,
   uploadRecording,
 } from "../api.js";
@@ -21,6 +23,7 @@ import { go } from "../router.js";
 export class ProjectsPage extends LiveElement {
   #cards = h("ul", { class: "cards" });
   #upload = h("div", { class: "card", hidden: true });
+  #stopped = h("ul", { class: "cards stopped", "aria-label": "Uploads that stopped" });
   #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
   #folders = new FolderDialog();
   #limit = Infinity;
@@ -44,6 +47,7 @@ export class ProjectsPage extends LiveElement {
           ),
         ),
         this.#upload,
+        this.#stopped,
         this.#cards,
       ),
       this.#picker,
@@ -58,6 +62,7 @@ export class ProjectsPage extends LiveElement {
     for (const type of ["projects", "project", "job"]) live.addEventListener(type, () => this.#load(), { signal });
     getSystem().then((system) => (this.#limit = system.max_upload_bytes), sayError);
     this.#load();
+    this.#showStopped();
   }
 
   async #load() {
@@ -175,18 +180,62 @@ export class ProjectsPage extends LiveElement {
     }
     const controller = new AbortController();
     const bar = h("progress", { value: 0, max: 1, "aria-label": `Uploading ${file.name}` });
-    const cancel = h("button", { type: "button", onClick: () => controller.abort() }, "Cancel");
+    const state = h("span", { class: "muted", role: "status" });
+    const stop = h("button", { type: "button", onClick: () => controller.abort() }, "Stop");
     this.#upload.replaceChildren(
-      h("div", { class: "row" }, `Uploading ${file.name}, ${bytes(file.size)}`, cancel),
+      h("div", { class: "row" }, `Uploading ${file.name}, ${bytes(file.size)}`, state, stop),
       bar,
     );
     this.#upload.hidden = false;
+    this.#stopped.replaceChildren();
+    /** @param {number} fraction @param {boolean} waiting */
+    const show = (fraction, waiting) => {
+      bar.value = fraction;
+      state.textContent = waiting ? "no connection: it goes on by itself" : fraction === 1 ? "looking at it…" : "";
+    };
     try {
-      go(`/p/${(await uploadRecording(file, (fraction) => (bar.value = fraction), controller.signal)).id}`);
+      go(`/p/${(await uploadRecording(file, show, controller.signal)).id}`);
+    } catch (error) {
+      if (!controller.signal.aborted) sayError(error);
+    }
+    this.#upload.hidden = true;
+    this.#showStopped();
+  }
+
+  /** Uploads that stopped: choosing the same file goes on with it. */
+  async #showStopped() {
+    try {
+      const uploads = await listUploads();
+      this.#stopped.replaceChildren(...uploads.map((upload) => this.#stoppedCard(upload)));
     } catch (error) {
       sayError(error);
     }
-    this.#upload.hidden = true;
+  }
+
+  /** @param {import("../api-types").Upload} upload */
+  #stoppedCard(upload) {
+    const forget = async () => {
+      await cancelUpload(upload.id).catch(sayError);
+      this.#showStopped();
+    };
+    const arrived = `${bytes(upload.offset)} of ${bytes(upload.size)} arrived`;
+    return h(
+      "li",
+      { class: "card" },
+      h(
+        "div",
+        { class: "body" },
+        h("h2", {}, upload.file_name),
+        h("p", { class: "muted" }, `${arrived}. Choose the same file again: only the rest is sent.`),
+        h("progress", { value: upload.offset, max: upload.size, "aria-label": arrived }),
+        h(
+          "div",
+          { class: "row" },
+          h("button", { type: "button", onClick: () => this.#picker.click() }, "Choose the file"),
+          h("button", { type: "button", class: "quiet danger", onClick: forget }, icon("trash"), "Give up"),
+        ),
+      ),
+    );
   }
 
   /** @param {Project} project */

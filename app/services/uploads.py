@@ -1,0 +1,238 @@
+"""Recordings on their way in: their bytes may stop and go on, also after the server was restarted.
+
+How many bytes arrived is the size of the file they are in, so nothing can disagree about it. The upload's id becomes the
+project's: finishing twice, or again after a crash, is finishing once.
+"""
+
+import contextlib
+import queue
+import secrets
+import threading
+import time
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import anyio
+from sqlmodel import Session, col, select
+from starlette.requests import ClientDisconnect
+
+from app import archives, schemas
+from app.db.engine import reading, writing
+from app.db.tables import Project, Upload
+from app.errors import KINDS, Conflict, NotFound, TooLarge, Unavailable
+from app.files import project_files, require_free, safe_name
+from app.process import Worker
+from app.services import imports
+from app.services.context import Context
+from r2c2r_core.errors import CaptureError, R2C2RError
+
+SPARE = 2.5  # a recording needs its own size again when it is read, and some more
+PROBE_S = 120.0
+_writing: set[str] = set()  # uploads that are being written to
+_lock = threading.Lock()
+_probing = threading.BoundedSemaphore(2)
+
+
+def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
+    """Announce a file; refused at once when it is too large for the limit or the disk."""
+    _refuse_size(context, body.size)
+    require_free(context.settings.data_dir, int(body.size * SPARE), context.settings.min_free_bytes)
+    row = Upload(id=secrets.token_hex(6), who=context.who, created=time.time(), **body.model_dump())
+    path = _path(context, row.id)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
+    with writing(context.engine) as session:
+        session.add(row)
+    return _shape(context, row)
+
+
+def unfinished(context: Context) -> list[schemas.Upload]:
+    """Uploads of this person that stopped, newest first."""
+    with reading(context.engine) as session:
+        query = select(Upload).where(Upload.who == context.who).order_by(col(Upload.created).desc())
+        return [_shape(context, row) for row in session.exec(query)]
+
+
+def state(context: Context, upload_id: str) -> schemas.Upload:
+    """How much of it is here."""
+    with reading(context.engine) as session:
+        return _shape(context, _row(context, session, upload_id))
+
+
+async def append(context: Context, upload_id: str, offset: int, stream: AsyncIterator[bytes]) -> int:
+    """Store what comes from `offset` on; the new offset. What arrived stays when the sender leaves."""
+    found = await anyio.to_thread.run_sync(state, context, upload_id)
+    with _alone(upload_id):
+        at = _path(context, upload_id).stat().st_size
+        if offset != at:
+            raise Conflict(f"{at} bytes are here, and these start at {offset}", hint="go on at `current`", current=at)
+        with contextlib.suppress(ClientDisconnect):
+            at = await _store(context, upload_id, at, found.size, stream)
+    return at
+
+
+def finish(context: Context, upload_id: str) -> schemas.Project:
+    """The project of an upload that is complete; one that cannot be read is refused, and nothing of it stays."""
+    from app.services import projects
+
+    with reading(context.engine) as session:
+        if session.get(Project, upload_id) is not None:  # asked twice
+            return projects.get_project(context, upload_id)
+        row = _row(context, session, upload_id)
+    with _alone(upload_id):
+        found = _shape(context, row)
+        if found.offset != row.size:
+            raise Conflict(f"{found.offset} of {row.size} bytes are here", hint="send the rest first", current=found.offset)
+        try:
+            _check(context, _present(context, row), row.file_name)
+        except CaptureError:
+            forget(context, upload_id)
+            raise
+        return imports.from_finished_upload(context, row, _path(context, upload_id))
+
+
+def forget(context: Context, upload_id: str) -> None:
+    """Delete an upload and its bytes."""
+    with writing(context.engine) as session:
+        session.delete(_row(context, session, upload_id))
+    _path(context, upload_id).unlink(missing_ok=True)
+
+
+async def whole(
+    context: Context, filename: str, name: str | None, size: int | None, stream: AsyncIterator[bytes]
+) -> schemas.Project:
+    """A project from one request; nothing stays when it breaks off or is refused."""
+    _refuse_size(context, size or 0)
+    wish = schemas.UploadIn(file_name=filename[:300] or "recording", size=size or 1, name=(name or "")[:120] or None)
+    upload = await anyio.to_thread.run_sync(begin, context, wish)
+    try:
+        received = await _store(context, upload.id, 0, size or context.settings.max_upload_bytes, stream)
+        if received == 0:
+            raise CaptureError("the upload is empty", hint="choose an .r3d file or a zip")
+        if size is not None and received != size:
+            raise CaptureError(f"{received} of {size} bytes arrived", hint="upload it again")
+        await anyio.to_thread.run_sync(_set_size, context, upload.id, received)
+        return await anyio.to_thread.run_sync(finish, context, upload.id)
+    except BaseException as error:
+        with anyio.CancelScope(shield=True), contextlib.suppress(NotFound):  # refused ones are gone already
+            await anyio.to_thread.run_sync(forget, context, upload.id)
+        if isinstance(error, ClientDisconnect):
+            raise CaptureError("the sender left before the last byte", hint="upload it again") from error
+        raise
+
+
+def tidy(context: Context) -> None:
+    """Forget uploads that did not go on for long, and bytes that belong to none."""
+    limit = time.time() - context.settings.upload_kept_s
+    with writing(context.engine) as session:
+        known = set()
+        for row in session.exec(select(Upload)):
+            known.add(row.id)
+            if _touched(_path(context, row.id), row.created) < limit:
+                session.delete(row)
+                known.discard(row.id)
+    with _lock:
+        strays = [path for path in context.settings.uploads.glob("*") if path.stem not in known | _writing]
+    for path in strays:
+        if _touched(path, time.time()) < time.time() - 3600:  # one that begins just now has no row yet
+            path.unlink(missing_ok=True)
+
+
+async def _store(context: Context, upload_id: str, at: int, size: int, stream: AsyncIterator[bytes]) -> int:
+    """Append the stream to the file, up to `size` bytes; where it ends."""
+    async with await anyio.open_file(_path(context, upload_id), "ab") as out:
+        async for chunk in stream:
+            if at + len(chunk) > size:
+                _refuse_size(context, at + len(chunk))
+                raise TooLarge(f"more than the {size} bytes that were announced", hint="begin the upload anew")
+            if (at + len(chunk)) % (64 << 20) < len(chunk):
+                reserve = context.settings.min_free_bytes
+                await anyio.to_thread.run_sync(require_free, context.settings.data_dir, 0, reserve)
+            await out.write(chunk)
+            await out.flush()
+            at += len(chunk)
+    return at
+
+
+def _check(context: Context, path: Path, file_name: str) -> None:
+    """Raise CaptureError, in one line, for what the import could not read."""
+    settings, name = context.settings, safe_name(file_name)
+    archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
+    log = path.with_suffix(".log")
+    with _probing:
+        worker = Worker((*context.runner.commands.probe, str(path), name), log)
+        try:
+            line = worker.next_line(timeout=PROBE_S)
+        except queue.Empty:
+            line = None
+        worker.close()
+    log.unlink(missing_ok=True)
+    if line is None:
+        raise CaptureError(f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
+    if "error" in line:
+        raise _said(name, line["error"])
+
+
+def _said(name: str, error: dict[str, str]) -> R2C2RError:
+    """What the probe said; whatever else went wrong in it, the file is the cause."""
+    message = " ".join(str(error["message"]).split())[:500]
+    if error["kind"] in {cls.__name__ for cls, _, _ in KINDS}:
+        return CaptureError(message, hint=error["hint"])
+    return CaptureError(f"{name} cannot be read ({message[:200]})", hint="export it again from the app that made it")
+
+
+@contextlib.contextmanager
+def _alone(upload_id: str) -> Iterator[None]:
+    """Only one request at a time writes or finishes an upload."""
+    with _lock:
+        if upload_id in _writing:
+            raise Unavailable("another request is still sending this file", hint="wait a moment, then ask for its offset")
+        _writing.add(upload_id)
+    try:
+        yield
+    finally:
+        _writing.discard(upload_id)
+
+
+def _row(context: Context, session: Session, upload_id: str) -> Upload:
+    found = session.get(Upload, upload_id)
+    if found is None or (found.who != context.who and not context.person.may("admin")):
+        raise NotFound("no such upload", hint="begin it anew")
+    return found
+
+
+def _set_size(context: Context, upload_id: str, size: int) -> None:
+    with writing(context.engine) as session:
+        row = _row(context, session, upload_id)
+        row.size = size
+        session.add(row)
+
+
+def _shape(context: Context, row: Upload) -> schemas.Upload:
+    offset = _present(context, row).stat().st_size
+    return schemas.Upload(offset=offset, **row.model_dump(include={"id", "file_name", "size", "modified", "created"}))
+
+
+def _present(context: Context, row: Upload) -> Path:
+    """Where its bytes are: already the project's when finishing was interrupted."""
+    kept = project_files(context.settings.data_dir, row.id).source / safe_name(row.file_name)
+    return kept if kept.exists() else _path(context, row.id)
+
+
+def _touched(path: Path, otherwise: float) -> float:
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:
+        return otherwise
+
+
+def _path(context: Context, upload_id: str) -> Path:
+    return context.settings.uploads / f"{upload_id}.part"
+
+
+def _refuse_size(context: Context, size: int) -> None:
+    limit = context.settings.max_upload_bytes
+    if size > limit:
+        raise TooLarge(
+            f"the file is larger than {limit / 1e9:.1f} GB", hint="import it by its path on this machine, or raise the limit"
+        )

@@ -1,0 +1,53 @@
+/** Sending a file in pieces that survive a lost connection. No DOM: the ways to the server are given. */
+
+export const PIECE = 4 << 20;
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 10_000;
+
+/**
+ * Send what is missing; resolves when the server has it all. A failure that `mayPass` is waited out, and the server is asked
+ * how much it has before going on.
+ * @param {Blob} file
+ * @param {number} offset where the server's copy ends
+ * @param {{
+ *   send: (offset: number, piece: Blob) => Promise<number>,
+ *   ask: () => Promise<number>,
+ *   mayPass: (error: unknown) => boolean,
+ *   onProgress: (sent: number, waiting: boolean) => void,
+ *   wait: (ms: number) => Promise<void>,
+ * }} ways
+ */
+export async function sendRest(file, offset, ways) {
+  let pause = FIRST_WAIT_MS;
+  let known = true;
+  while (!known || offset < file.size) {
+    try {
+      if (!known) offset = await ways.ask();
+      known = true;
+      ways.onProgress(offset, false);
+      if (offset < file.size) offset = await ways.send(offset, file.slice(offset, offset + PIECE));
+      ways.onProgress(offset, false);
+      pause = FIRST_WAIT_MS;
+    } catch (error) {
+      if (!ways.mayPass(error)) throw error;
+      known = false;
+      ways.onProgress(offset, true);
+      await ways.wait(pause);
+      pause = Math.min(pause * 2, LONGEST_WAIT_MS);
+    }
+  }
+}
+
+/**
+ * The upload of this very file that stopped, if there is one.
+ * @template {{ file_name: string, size: number, modified: number | null, offset: number }} T
+ * @param {{ name: string, size: number, lastModified: number }} file
+ * @param {T[]} uploads
+ * @returns {T | undefined}
+ */
+export function stoppedUpload(file, uploads) {
+  return uploads.find(
+    (upload) =>
+      upload.file_name === file.name && upload.size === file.size && upload.modified === file.lastModified / 1000,
+  );
+}

@@ -1,0 +1,120 @@
+"""Uploads stop and go on."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from starlette.testclient import TestClient
+
+from app.services import accounts, uploads
+from tests.app.conftest import ORIGIN, Running
+from tests.app.test_imports import R3D, archive, break_off, left_behind
+
+
+def begin(web: Running, content: bytes = R3D, **more: Any) -> str:
+    return str(web.post("/api/uploads", {"file_name": "Kitchen.r3d", "size": len(content), **more}, 201)["id"])
+
+
+def send(client: TestClient, upload: str, offset: int, content: Any) -> Any:
+    return client.patch(f"/api/uploads/{upload}", content=content, headers={"Upload-Offset": str(offset)})
+
+
+def finish(web: Running, upload: str, status: int = 202) -> Any:
+    return web.post(f"/api/uploads/{upload}/finish", status=status)
+
+
+def test_pieces_become_a_project_also_when_the_server_stops_between_them(start: Callable[..., Any]) -> None:
+    with start() as web:
+        upload = begin(web, name="Aunt's", modified=12.5)
+        assert send(web.client, upload, 0, R3D[:100]).headers["upload-offset"] == "100"
+    with start() as web:
+        head = web.client.head(f"/api/uploads/{upload}")
+        assert (head.headers["upload-offset"], head.headers["upload-length"]) == ("100", str(len(R3D)))
+        assert head.headers["cache-control"] == "no-store"
+        (found,) = web.get("/api/uploads")
+        assert (found["file_name"], found["offset"], found["modified"]) == ("Kitchen.r3d", 100, 12.5)
+        assert finish(web, upload, 409)["current"] == 100
+        assert send(web.client, upload, 100, R3D[100:]).status_code == 204
+        project = finish(web, upload)
+        assert (project["id"], project["name"]) == (upload, "Aunt's")
+        web.until(lambda: web.get(f"/api/projects/{upload}")["status"] == "ready")
+        assert web.get("/api/uploads") == []
+        assert finish(web, upload)["id"] == upload
+        stored = web.settings.data_dir / "projects" / upload / "source" / "Kitchen.r3d"
+        assert stored.read_bytes() == R3D
+        assert list(web.settings.uploads.iterdir()) == []
+
+
+def test_bytes_that_do_not_fit_are_refused_with_the_offset_that_does(web: Running) -> None:
+    upload = begin(web)
+    send(web.client, upload, 0, R3D[:50])
+    for wrong in (0, 49, 51, 10**9):
+        answer = send(web.client, upload, wrong, b"x")
+        assert (answer.status_code, answer.json()["current"]) == (409, 50)
+    assert send(web.client, upload, 50, R3D[50:] + b"too much").status_code == 413
+    for value in ("-1", "x", "1e3", str(2**60)):
+        assert web.client.patch(f"/api/uploads/{upload}", headers={"Upload-Offset": value}).status_code == 422
+    assert web.client.patch(f"/api/uploads/{upload}").status_code == 422
+
+
+def test_a_sender_that_leaves_in_the_middle_goes_on_where_it_stopped(web: Running) -> None:
+    upload = begin(web)
+    break_off(web, "PATCH", f"/api/uploads/{upload}", R3D[:100], headers={"upload-offset": "0"})
+    assert web.client.head(f"/api/uploads/{upload}").headers["upload-offset"] == "100"
+    assert send(web.client, upload, 100, R3D[100:]).status_code == 204
+    assert finish(web, upload)["id"] == upload
+
+
+def test_what_cannot_be_read_is_refused_when_it_is_complete_and_leaves_nothing(web: Running) -> None:
+    for content, words in ((b"not a zip" * 9, "not a zip"), (archive(("unreadable", b"x")), "no frame can be read")):
+        upload = begin(web, content)
+        send(web.client, upload, 0, content)
+        error = finish(web, upload, 422)
+        assert words in error["message"]
+        assert "Kitchen.r3d" in error["message"]
+        assert str(web.settings.data_dir) not in error["message"]
+        assert web.get("/api/uploads") == []
+        assert web.get("/api/projects") == []
+        assert left_behind(web) == []
+
+
+def test_a_file_that_will_not_fit_is_refused_before_it_is_sent(start: Callable[..., Any]) -> None:
+    with start(max_upload_bytes=100) as web:
+        assert web.post("/api/uploads", {"file_name": "a", "size": 101}, 413)["kind"] == "too-large"
+    with start(min_free_bytes=1 << 60) as web:
+        assert web.post("/api/uploads", {"file_name": "a", "size": 1}, 507)["kind"] == "no-space"
+
+
+def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
+    with start() as web:
+        accounts.add(web.context.engine, "eve", "reviewer", "three plain words")
+        upload = begin(web)
+        eve = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"})
+        eve.post("/api/login", json={"name": "eve", "password": "three plain words"})
+        assert eve.get("/api/uploads").json() == []
+        assert send(eve, upload, 0, b"x").status_code == 404
+        assert eve.delete(f"/api/uploads/{upload}").status_code == 404
+        assert web.client.delete(f"/api/uploads/{upload}").status_code == 204
+        assert web.client.head(f"/api/uploads/{upload}").status_code == 404
+
+
+def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
+    old, new = begin(web), begin(web)
+    stray = web.settings.uploads / "stray.part"
+    stray.touch()
+    for path in (web.settings.uploads / f"{old}.part", stray):
+        os.utime(path, (1, 1))
+    uploads.tidy(web.context)
+    assert [found["id"] for found in web.get("/api/uploads")] == [new]
+    assert [path.name for path in Path(web.settings.uploads).iterdir()] == [f"{new}.part"]
+
+
+def test_a_crash_while_finishing_is_made_good_by_finishing_again(web: Running) -> None:
+    upload = begin(web)
+    send(web.client, upload, 0, R3D)
+    source = web.settings.data_dir / "projects" / upload / "source"
+    source.mkdir(parents=True)
+    (web.settings.uploads / f"{upload}.part").rename(source / "Kitchen.r3d")  # and the server is killed here
+    assert int(web.client.head(f"/api/uploads/{upload}").headers["upload-offset"]) == len(R3D)
+    assert finish(web, upload)["id"] == upload
