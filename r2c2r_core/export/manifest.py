@@ -80,6 +80,7 @@ def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject)
         "joints": joints,  # a double door has two
         "movable": item.movable,
         "dimension_source": list(item.dimension_sources),
+        "layout_move_m": _plain(reconstruction.scene.layout_moves_m.get(item.name)),
         "mask": None if track is None else _mask_entry(reconstruction, track),
         "candidates": [] if candidates is None else _candidate_entries(candidates),
         "chosen": None if candidates is None else {"candidate": candidates.chosen_id, "by": candidates.chosen_by, "at": None},
@@ -105,6 +106,7 @@ def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
         "lower": _plain(joint.lower),
         "upper": _plain(joint.upper),
         "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
+        "confidence": _plain(joint.confidence),
     }
 
 

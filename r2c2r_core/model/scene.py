@@ -67,6 +67,7 @@ class Joint:
     damping: float
     friction: float
     sources: dict[str, Source]  # axis, origin, limits
+    confidence: float | None = None  # in the side it is hinged on, 0..1; None where the category leaves no choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

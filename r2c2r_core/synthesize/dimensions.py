@@ -40,6 +40,7 @@ class MeasuredObject:
     sources: tuple[Source, Source, Source]
     handle: FrontHandle | None
     handles: tuple[FrontHandle, ...] = ()  # all of them, where several fronts may be one object
+    opened_m: float | None = None  # how far its front was drawn out while filming; None: never seen open
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
@@ -98,6 +99,7 @@ def measure_object(
         sources=(sources[0], sources[1], sources[2]),
         handle=handle,
         handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
+        opened_m=_drawn_out(track),
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
@@ -106,6 +108,11 @@ def measure_object(
         warnings=tuple(warnings),
     )
     return _corrected(replace(measured, spec=spec.at_width(float(measured.dimensions_m[0]))), override)
+
+
+def _drawn_out(track: MaskTrack) -> float | None:
+    """The furthest its front was seen drawn out, in metres; one frame's error does not count where there are many."""
+    return float(np.quantile(list(track.opened_m.values()), 0.95)) if track.opened_m else None
 
 
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:

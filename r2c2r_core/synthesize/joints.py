@@ -14,6 +14,8 @@ _OFF_CENTRE = (
 )
 _ADJACENT_M = 0.06
 _TRUSTED = 0.25
+_CERTAIN_OFF_CENTRE = 0.6  # of half the width: a handle this far out is at the door's edge
+_IN_PAIRS = 0.75  # of doors without a telling handle, how many open as pairs do: a guess, stated as one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +25,7 @@ class Hinge:
     side: HingeSide
     source: Source
     reason: str
+    confidence: float | None  # 0..1; None where the category leaves no choice
 
 
 def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> dict[str, Hinge]:
@@ -35,11 +38,11 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         asked = overrides.of(item.name).hinge
         seen = handle_hinge(item) if item.spec.opening == "side" else None
         if asked is not None:
-            hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person")
+            hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person", confidence=1.0)
         elif seen is not None:
             hinges[item.name] = seen
         elif item.spec.opening == "bottom":
-            hinges[item.name] = Hinge(side="bottom", source="inferred", reason="the category opens downwards")
+            hinges[item.name] = Hinge(side="bottom", source="inferred", reason="the category opens downwards", confidence=None)
         else:
             undecided.append(item)
     for item in sorted(undecided, key=lambda o: _along(o, o)):
@@ -56,10 +59,13 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
     x, z = handle.centre
     if abs(x) >= _OFF_CENTRE * half[0]:
         side: HingeSide = "left" if x > 0 else "right"
-        return Hinge(side=side, source="inferred", reason=f"the handle is on the {'right' if x > 0 else 'left'}")
+        trust = handle.confidence * min(abs(x) / (_CERTAIN_OFF_CENTRE * half[0]), 1.0)
+        reason = f"the handle is on the {'right' if x > 0 else 'left'}"
+        return Hinge(side=side, source="inferred", reason=reason, confidence=0.5 + 0.5 * float(trust))
     wide = item.dimensions_m[0] > 1.15 * item.dimensions_m[2]
     if item.spec.name == "wall_cabinet" and wide and not handle.is_vertical and z < -0.4 * half[1]:
-        return Hinge(side="top", source="inferred", reason="a wide flap with its handle at the lower edge")
+        reason, trust = "a wide flap with its handle at the lower edge", 0.5 + 0.5 * handle.confidence
+        return Hinge(side="top", source="inferred", reason=reason, confidence=trust)
     return None
 
 
@@ -67,13 +73,13 @@ def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hi
     """The side that makes a pair with a neighbour (pairs open outwards), else the category's."""
     left, right = _neighbour(item, objects, -1.0), _neighbour(item, objects, 1.0)
     if left is not None and _side(left, hinges) == "left" and not _paired(left, item, objects, hinges, -1.0):
-        return Hinge(side="right", source="inferred", reason=f"opens as a pair with {left.name}")
+        return Hinge(side="right", source="inferred", reason=f"opens as a pair with {left.name}", confidence=_IN_PAIRS)
     if right is not None and _side(right, hinges) == "right":
-        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}")
+        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
     if left is None and right is not None and _side(right, hinges) is None:
-        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}")
+        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
     side = item.spec.default_hinge or "left"
-    return Hinge(side=side, source="default", reason="nothing in the scan tells the side")
+    return Hinge(side=side, source="default", reason="nothing in the scan tells the side", confidence=0.5)
 
 
 def _paired(

@@ -12,6 +12,7 @@ from r2c2r_core.synthesize.clearance import open_freely
 from r2c2r_core.synthesize.joints import Hinge
 
 _BLOCKED_RAD = np.deg2rad(30.0)  # no one hangs a door that opens less
+_OPENS = 0.8  # that one hangs a door so that it opens: above a guess, below a handle at the edge
 _GAIN_RAD = np.deg2rad(30.0)
 _OTHER: dict[HingeSide, HingeSide] = {"left": "right", "right": "left"}
 
@@ -34,7 +35,7 @@ def open_all(
         if hinge is None or hinge.source == "person" or hinge.side not in _OTHER or _travel(opened[index]) > _BLOCKED_RAD:
             continue
         reason = f"hung on the {hinge.side} it could not open"
-        turned = rebuild(index, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason))
+        turned = rebuild(index, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=_OPENS))
         trial = [*fixtures[:index], turned, *fixtures[index + 1 :]]
         tried = open_freely(trial, walls, kept)
         others_lose = any(

@@ -25,6 +25,7 @@ from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces,
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 
 _WOOD = (0.80, 0.76, 0.70)
+_FULLY_OPEN = 0.75  # of the usual travel: a drawer drawn out this far was drawn out to its stop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +90,8 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
     joints = [_joint(item, motion, hinge, override) for motion in build.motions]
     warnings = [*item.warnings, *build.notes]
+    if item.opened_m is not None and all(joint.sources["limits"] == "default" for joint in joints):
+        warnings.append(f"seen open to {item.opened_m:.2f} m, which need not be all it opens")
     if hinge is not None and hinge.source == "default":
         warnings.append(f"hinge on the {hinge.side} by default: {hinge.reason}")
     return SceneObject(
@@ -161,9 +164,9 @@ def _link_origin(motion: Motion) -> Vector3:
 
 
 def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> Joint:
-    """The joint of one moving part; what a person gave replaces the category's limits."""
-    person = override.joint_lower is not None or override.joint_upper is not None
+    """The joint of one moving part; what a person gave, or the scan showed, replaces the category's limits."""
     axis: Source = hinge.source if hinge is not None else "inferred"
+    lower, upper, limits = _limits(item, motion, override)
     feel = item.spec.feel
     return Joint(
         name=f"{item.name}_{motion.part}_joint",
@@ -172,11 +175,23 @@ def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: 
         child=f"{item.name}_{motion.part}",
         origin_object=motion.origin_object,
         axis_object=motion.axis_object,
-        lower=override.joint_lower if override.joint_lower is not None else 0.0,
-        upper=override.joint_upper if override.joint_upper is not None else motion.upper,
+        lower=lower,
+        upper=upper,
         effort=feel.effort,
         velocity=feel.velocity,
         damping=feel.damping,
         friction=feel.friction,
-        sources={"axis": axis, "origin": "inferred", "limits": "person" if person else "default"},
+        sources={"axis": axis, "origin": "inferred", "limits": limits},
+        confidence=hinge.confidence if hinge is not None else None,
     )
+
+
+def _limits(item: MeasuredObject, motion: Motion, override: ObjectOverride) -> tuple[float, float, Source]:
+    """Lower and upper limit and where they come from: a person, the scan of an open drawer, or the category."""
+    if override.joint_lower is not None or override.joint_upper is not None:
+        upper = motion.upper if override.joint_upper is None else override.joint_upper
+        return override.joint_lower or 0.0, upper, "person"
+    seen = None if item.spec.several_fronts else item.opened_m  # of which drawer, nobody knows
+    if motion.type == "prismatic" and seen is not None and _FULLY_OPEN * motion.upper <= seen <= item.dimensions_m[1]:
+        return 0.0, seen, "measured"
+    return 0.0, motion.upper, "default"

@@ -89,7 +89,7 @@ def test_the_manifest_follows_its_schema(written: tuple[Path, Certificate]) -> N
     door = document["objects"][0]
     keys = "name category dimensions_m world_from_object joint dimension_source mask candidates chosen placement warp meshes"
     assert set(keys.split()) | {"mass_kg", "warnings"} <= set(door)
-    assert set(door["joint"]) == {"name", "type", "axis", "origin", "lower", "upper", "source", "blocked_by"}
+    assert set(door["joint"]) == {"name", "type", "axis", "origin", "lower", "upper", "source", "confidence", "blocked_by"}
     assert door["joint"]["blocked_by"] == []
     assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]
     assert door["joint"]["source"] == {"axis": "inferred", "origin": "inferred", "limits": "default"}

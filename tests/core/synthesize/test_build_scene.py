@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,27 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     assert np.deg2rad(75) < joint.upper < np.deg2rad(100)
     assert joint.sources["limits"] == "inferred"
     assert any("a wall is in the way" in w for w in scene.objects[0].warnings)
+
+
+@pytest.mark.parametrize(("seen_m", "source"), [(0.43, "measured"), (0.12, "default"), (0.9, "default"), (None, "default")])
+def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(seen_m: float | None, source: str) -> None:
+    """Drawn out far it was drawn to its stop; a crack open says nothing; more than its depth is an error."""
+    track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
+    track = replace(track, opened_m={} if seen_m is None else {4: 0.05, 5: seen_m})
+    scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
+    joint = scene.objects[0].joints[0]
+    assert joint.sources["limits"] == source
+    if source == "measured":
+        assert joint.upper == pytest.approx(seen_m, abs=0.02)
+    assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source == "default")
+
+
+def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
+    at_edge, off_centre, without = (
+        built(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle)).objects[0].joints[0].confidence or 0.0
+        for handle in (Handle(0.25, 0.2), Handle(0.09, 0.2), None)
+    )
+    assert at_edge > 0.9 > off_centre > without == 0.5
 
 
 def test_an_unknown_category_is_a_rigid_object_with_advice() -> None:
