@@ -39,6 +39,7 @@ from app.routes import (
     viewer,
 )
 from app.security import Guard, Person
+from app.services import masks
 from app.services.context import Context
 from app.services.people import People
 from app.services.prompts import tell_object
@@ -121,6 +122,7 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
     context.live.on_object = lambda project, number: _tell(context, project, number)
     if settings.run_jobs:
         runner.start()
+        masks.resume(context)
     return context
 
 

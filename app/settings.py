@@ -27,8 +27,9 @@ class Settings:
     max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE
     max_unpacked_files: int = 200_000
     min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
+    job_memory_bytes: int = 2048 * MEBIBYTE  # free before a job starts: what a kitchen of a recording of minutes takes
     heavy_jobs: int = 1
-    job_attempts: int = 3  # how often a job that lost its server is taken up again
+    job_attempts: int = 3  # how often a job that lost its server or its process is taken up again without getting further
     kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0

@@ -188,7 +188,8 @@ class Job(SQLModel, table=True):
     message: str = ""
     error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
     log_path: str | None = None
-    attempts: int = 0
+    attempts: int = 0  # since it last got further
+    reached: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # stages it ever finished
     who: str = ""
     owner_pid: int | None = None  # the server that runs it
     worker_pid: int | None = None

@@ -24,6 +24,7 @@ from r2c2r_core.workspace import write_atomically
 _log = logging.getLogger(__name__)
 
 IDLE_LOOK_S = 5.0
+MOST_DEATHS = 2  # how often a process that vanished is started anew by itself
 LEFT_S = 10.0
 """A preparation that no tab looks at any more is stopped after this: longer than a page takes to load anew."""
 
@@ -45,7 +46,10 @@ class _Session:
     """One project's process."""
 
     project: str
+    files: ProjectFiles
+    segmenter: str
     worker: Worker
+    deaths: int = 0  # of processes before this one, since one finished an object
     state: schemas.LiveState = "starting"
     fraction: float = 0.0
     text: str = "starting"
@@ -78,7 +82,7 @@ class LiveSegmenters:
                 return
             options = ("--width", str(self._settings.preview_width), "--segmenter", segmenter)
             command = (*self._commands.live, str(files.work), *options)
-            session = _Session(project, Worker(command, files.root / "logs" / "live.log"))
+            session = _Session(project, files, segmenter, Worker(command, files.root / "logs" / "live.log"))
             session.proposals_path = None if files.proposals.is_file() else files.proposals
             self._sessions[project] = session
             self._ended.pop(project, None)
@@ -98,7 +102,7 @@ class LiveSegmenters:
             session = self._sessions[project]
             session.used = time.monotonic()
             path = mask_path(files.masks, number, key)
-            path.unlink(missing_ok=True)
+            mask_store.begin(path)
             session.tasks[number] = _Task(key, path, prompt)
             if session.state == "ready":
                 self._send(session, number)
@@ -232,6 +236,7 @@ class LiveSegmenters:
     def _end_task(self, session: _Session, number: int, task: _Task, end: str, error: dict[str, Any] | None) -> None:
         task.masks.end, task.masks.error = end, _named(error)
         task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
+        session.deaths = 0 if end == "done" else session.deaths
         with contextlib.suppress(OSError):
             mask_store.append(task.path, {"end": end, "error": task.masks.error})
         self._tell_segment(session, number)
@@ -264,6 +269,10 @@ class LiveSegmenters:
             )
             if self._sessions.get(session.project) is session:
                 del self._sessions[session.project]
+            vanished = not stopped_by_us and session.state != "failed" and session.error is None
+            if vanished and session.deaths < MOST_DEATHS:
+                self._revive(session)
+                return
             failed = session.state == "failed" or not stopped_by_us
             if failed:
                 if session.error is None:
@@ -281,6 +290,16 @@ class LiveSegmenters:
                 if task.state in ("waiting", "running"):
                     self._end_task(session, number, task, "failed" if failed else "cancelled", session.error)
         self._tell_status(session)
+
+    def _revive(self, lost: _Session) -> None:
+        """Go on in a new process with what the lost one had not finished."""
+        _log.warning("the live segmenter of %s vanished: started anew", lost.project)
+        self.open(lost.project, lost.files, lost.segmenter)
+        self._sessions[lost.project].deaths = lost.deaths + 1
+        self._sessions[lost.project].watched = lost.watched
+        for number, task in lost.tasks.items():
+            if task.state in ("waiting", "running"):
+                self.segment(lost.project, lost.files, lost.segmenter, number, task.key, task.prompt)
 
     def _tell_status(self, session: _Session) -> None:
         self._hub.publish("live", session.project, status=_status(session).model_dump())

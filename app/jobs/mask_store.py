@@ -28,6 +28,12 @@ def mask_path(folder: Path, object_id: int, key: str) -> Path:
     return folder / str(object_id) / f"{key}.jsonl"
 
 
+def begin(path: Path) -> None:
+    """Forget older masks; until an end is written, whoever starts next knows that these are wanted."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"")
+
+
 def append(path: Path, line: dict[str, Any]) -> None:
     """Add one line."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import psutil
 from sqlalchemy import Engine, text
 from sqlmodel import Session, col, select
 
@@ -157,7 +158,7 @@ class Runner:
                     self._end(unfinished, "failed", UNEXPECTED)
                     unfinished = None
                     continue
-                job_id = self._claim()
+                job_id = self._claim() if self._has_memory() else None
                 if job_id is None:
                     self._wake.wait(1.0)
                     self._wake.clear()
@@ -167,6 +168,21 @@ class Runner:
                 _log.exception("job %s", job_id)
                 unfinished = job_id
                 self._stopping.wait(1.0)
+
+    def _has_memory(self) -> bool:
+        """Whether a job may start now; the one that is next says why it waits."""
+        free, needed = psutil.virtual_memory().available, self.settings.job_memory_bytes
+        if free >= needed:
+            return True
+        with writing(self.engine) as session:
+            row = session.exec(select(Job).where(Job.state == "queued").order_by(col(Job.id))).first()
+            words = f"waits for memory: {free / 1e9:.1f} GB free, {needed / 1e9:.1f} GB needed"
+            if row is None or row.message.startswith(words[:16]):
+                return False
+            row.message, number = words, row.id or 0
+            session.add(row)
+        self._tell(number)
+        return False
 
     def _claim(self) -> int | None:
         """Take the oldest waiting job; no two threads or servers get the same one."""
@@ -198,9 +214,10 @@ class Runner:
             progress.at_step, progress.fraction = number, 0.0
             outcome = self._run_step(job_id, step, progress, log)
             if outcome is not None:
-                if outcome != {"stopped": True}:
+                if outcome != {"stopped": True} and not self._take_up_again(job_id, outcome):
                     self._end(job_id, "cancelled" if self._was_cancelled(job_id) else "failed", outcome)
                 return
+            self._got_further(job_id, number + 1)
         self._finish(job_id)
 
     def _run_step(self, job_id: int, step: Step, progress: _Progress, log: Any) -> dict[str, Any] | None:
@@ -310,6 +327,29 @@ class Runner:
         self._cancelled.discard(job_id)
         self._tell(job_id)
         self._tell_project(job_id)
+
+    def _take_up_again(self, job_id: int, outcome: dict[str, Any]) -> bool:
+        """Queue a job anew whose process vanished, unless that happened too often at the same place."""
+        if outcome["kind"] != "worker-died" or self._was_cancelled(job_id):
+            return False
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            if row.attempts >= self.settings.job_attempts:
+                return False
+            row.state, row.worker_pid, row.owner_pid, row.eta_s = "queued", None, None, None
+            row.message = "taken up again after its process ended early"
+            self._note(session, row, "state", f"{outcome['message']}; taken up again")
+            session.add(row)
+        self._tell(job_id)
+        self.wake()
+        return True
+
+    def _got_further(self, job_id: int, stages: int) -> None:
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            if stages > row.reached:
+                row.reached, row.attempts = stages, 1
+                session.add(row)
 
     def _requeue(self, job_id: int) -> None:
         with writing(self.engine) as session:

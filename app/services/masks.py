@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from sqlmodel import Session
+from sqlmodel import Session, select
 
 from app import schemas
 from app.db import queries
@@ -81,6 +81,17 @@ def follow(context: Context, project_id: str, object_id: int) -> None:
             context.hub.publish("mask", project_id, object=object_id, **counts, **shown)
     elif project.status == "ready":
         _start(context, project, item, points)
+
+
+def resume(context: Context) -> None:
+    """Go on with masks that were being computed when the server went away."""
+    with reading(context.engine) as session:
+        projects = [row for row in session.exec(select(Project)) if row.status == "ready"]
+        wanted = [(row, item, points) for row in projects for item, points in _prompted(session, row.id)]
+    for project, item, points in wanted:
+        stored = mask_store.read(mask_path(context.files(project).masks, item.id or 0, _key(project, item, points)))
+        if stored is not None and stored.end is None:
+            _start(context, project, item, points)
 
 
 def state_of(

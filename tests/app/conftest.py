@@ -96,6 +96,7 @@ def running(
     given = {
         "host": "127.0.0.1",
         "min_free_bytes": 0,
+        "job_memory_bytes": 0,
         "kill_grace_s": 0.5,
         "user": "tester",
         "import_roots": (data_dir.parent,),

@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from typing import Any
 
 from sqlmodel import select
 
-from app.db.engine import open_engine, writing
+from app.db.engine import open_engine, reading, writing
 from app.db.tables import Job
 from app.process import started_at
 from app.settings import Settings
@@ -91,6 +92,30 @@ def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
     assert job["error"]["kind"] == "worker-died"
     assert "signal 9" in job["error"]["message"]
     assert "\n" not in job["error"]["message"]
+    assert job["attempts"] == web.settings.job_attempts
+
+
+def test_a_worker_that_dies_once_is_replaced_by_itself(web: Running) -> None:
+    project = web.sample()
+    folder = behave(web, project, generate="hang")
+    job = run(web, project)
+    web.until(lambda: (folder / "hanging").exists())
+    (folder / "behave.json").unlink()
+    with reading(web.context.engine) as session:
+        row = session.get(Job, job)
+        assert row is not None
+        os.killpg(row.worker_pid or 0, signal.SIGKILL)
+    assert web.job(job, "done", "failed")["state"] == "done"
+    assert "taken up again" in str(web.get(f"/api/jobs/{job}/events"))
+
+
+def test_a_job_waits_for_memory_and_says_so(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+    with start(job_memory_bytes=1 << 60) as web:
+        job = run(web, project)
+        web.until(lambda: "waits for memory" in web.get(f"/api/jobs/{job}")["message"])
+        assert web.post(f"/api/jobs/{job}/cancel")["state"] == "cancelled"
 
 
 def test_a_worker_that_is_done_but_does_not_leave_is_done(web: Running) -> None:
@@ -173,7 +198,8 @@ def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(st
         number = lost.id or 0
     engine.dispose()
     with start() as web:
-        assert web.job(number, "done")["attempts"] == 2
+        web.job(number, "done")
+        assert "taken up again" in str(web.get(f"/api/jobs/{number}/events"))
         assert orphan.wait(timeout=60) == -signal.SIGKILL
 
 
@@ -196,7 +222,7 @@ from pathlib import Path
 from app.main import create_app
 from app.settings import Settings
 from tests.app.conftest import FAKE_COMMANDS
-settings = Settings(data_dir=Path(sys.argv[1]), min_free_bytes=0, launch_token="t")
+settings = Settings(data_dir=Path(sys.argv[1]), min_free_bytes=0, job_memory_bytes=0, launch_token="t")
 uvicorn.run(create_app(settings, commands=FAKE_COMMANDS), port=0, log_level="error")
 """
 
@@ -220,7 +246,8 @@ def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start:
     engine.dispose()
     (folder / "behave.json").unlink()
     with start() as web:
-        assert web.job(job.id or 0, "done")["attempts"] == 2
+        web.job(job.id or 0, "done")
+        assert "taken up again" in str(web.get(f"/api/jobs/{job.id}/events"))
         assert len(web.get(f"/api/projects/{project}/objects")) == 2
     Running.until(lambda: not _alive(worker))
 
