@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from app import schemas
 from app.deps import Ctx
 from app.routes.numbers import FrameNumber, RowId
-from app.services import masks, prompts
+from app.services import clouds, masks, prompts
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
 
@@ -38,6 +38,18 @@ def delete_object(context: Ctx, project: str, object: RowId) -> schemas.SceneObj
 def add_point(context: Ctx, project: str, object: RowId, body: schemas.PointIn, infer: bool = True) -> schemas.SceneObject:
     """One click; without `infer` the masks wait for the next one (or for segment)."""
     return prompts.add_point(context, project, object, body, infer)
+
+
+@router.post("/objects/{object}/clicks", operation_id="addPoints", status_code=201)
+def add_points(context: Ctx, project: str, object: RowId, body: schemas.PointsIn, infer: bool = True) -> schemas.SceneObject:
+    """Clicks that belong together, such as those of a box: one change, one undo."""
+    return prompts.add_points(context, project, object, body, infer)
+
+
+@router.get("/objects/{object}/cloud", operation_id="getObjectPoints")
+def get_object_points(context: Ctx, project: str, object: RowId) -> schemas.ObjectPoints:
+    """The object's points in 3D, from its masks and the depth under them; none while there are no masks."""
+    return clouds.object_points(context, project, object)
 
 
 @router.patch("/objects/{object}/points/{point}", operation_id="movePoint")

@@ -18,6 +18,12 @@ class PointIn(Shape):
     label: Literal[0, 1] = 1
 
 
+class PointsIn(Shape):
+    """Clicks that belong together: one change, one undo."""
+
+    points: list[PointIn] = Field(min_length=1, max_length=100)
+
+
 class PointPatch(Shape):
     """A moved or flipped click."""
 
@@ -124,3 +130,14 @@ class PromptsFilePoint(Shape):
     x: float = Field(allow_inf_nan=False)
     y: float = Field(allow_inf_nan=False)
     label: Literal[0, 1]
+
+
+class ObjectPoints(Shape):
+    """What the masks and the depth say of an object's shape: points around their centre, +Z up."""
+
+    count: int
+    frames: int  # that they come from
+    centre_m: list[float]  # world
+    size_m: list[float]  # of the box around most of them, along the world's axes
+    xyz_mm: str  # base64 of int16, little endian, three a point
+    rgb: str  # base64 of bytes, three a point

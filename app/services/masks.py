@@ -108,6 +108,12 @@ def state_of(
     return state, len(masks.frames), notices
 
 
+def frames_of(context: Context, project: Project, item: SceneObject, points: list[Point]) -> list[dict[str, Any]]:
+    """The object's masks, by frame, with their confidence; none while there are none."""
+    found = _found(context, project, item, points)
+    return list(found[1].frames.values()) if found is not None else []
+
+
 def lanes(context: Context, project_id: str) -> list[schemas.Lane]:
     """Where each object is seen."""
     with reading(context.engine) as session:

@@ -94,6 +94,20 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
     return _after(context, project_id, object_id, infer)
 
 
+def add_points(context: Context, project_id: str, object_id: int, body: schemas.PointsIn, infer: bool) -> schemas.SceneObject:
+    """Clicks that belong together, as one change."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        for point in body.points:
+            _check_point(context, project, point.frame, point.x, point.y)
+        frame = body.points[0].frame
+        text = f"{len(body.points)} points on {item.name}, frame {frame}"
+        with history.change(session, item, "prompts", "add points", text, who=context.who, frame=frame):
+            session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
+    return _after(context, project_id, object_id, infer)
+
+
 def move_point(
     context: Context, project_id: str, object_id: int, point_id: int, body: schemas.PointPatch, infer: bool
 ) -> schemas.SceneObject:

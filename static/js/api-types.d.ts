@@ -352,6 +352,16 @@ export interface ObjectPatch {
   version?: number | null;
 }
 
+/** What the masks and the depth say of an object's shape: points around their centre, +Z up. */
+export interface ObjectPoints {
+  count: number;
+  frames: number;
+  centre_m: number[];
+  size_m: number[];
+  xyz_mm: string;
+  rgb: string;
+}
+
 /** What a person corrected about one object; None is computed. */
 export interface OverrideData {
   candidate: string | null;
@@ -413,6 +423,11 @@ export interface PointPatch {
   x?: number | null;
   y?: number | null;
   label?: 0 | 1 | null;
+}
+
+/** Clicks that belong together: one change, one undo. */
+export interface PointsIn {
+  points: PointIn[];
 }
 
 /** One recording and what became of it. */
@@ -794,6 +809,10 @@ export interface Operations {
   getCandidates: { parameters: { project: string; object: number }; body: undefined; answer: CandidateGroup };
   /** POST /api/projects/{project}/objects/{object}/candidates */
   uploadCandidate: { parameters: { project: string; object: number; filename: string; rerun?: boolean }; body: undefined; answer: Reviewed };
+  /** POST /api/projects/{project}/objects/{object}/clicks */
+  addPoints: { parameters: { project: string; object: number; infer?: boolean }; body: PointsIn; answer: SceneObject };
+  /** GET /api/projects/{project}/objects/{object}/cloud */
+  getObjectPoints: { parameters: { project: string; object: number }; body: undefined; answer: ObjectPoints };
   /** GET /api/projects/{project}/objects/{object}/override */
   getOverride: { parameters: { project: string; object: number }; body: undefined; answer: OverrideData };
   /** PATCH /api/projects/{project}/objects/{object}/override */

@@ -3,8 +3,8 @@
 /** @import {
  *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
- *   Bundle, ViewerSession, ViewerShown, ViewerShow, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest,
- *   Upload
+ *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ViewerSession, ViewerShown, ViewerShow,
+ *   RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload
  * } from "./api-types" */
 
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
@@ -144,6 +144,11 @@ export const deleteObject = (id, object) => send("DELETE", `${of(id)}/objects/${
 /** @param {string} id @param {number} object @param {PointIn} point @param {boolean} infer @returns {Promise<SceneObject>} */
 export const addPoint = (id, object, point, infer = true) =>
   send("POST", `${of(id)}/objects/${object}/points?infer=${infer}`, point);
+/** @param {string} id @param {number} object @param {PointIn[]} points @param {boolean} infer @returns {Promise<SceneObject>} */
+export const addPoints = (id, object, points, infer = true) =>
+  send("POST", `${of(id)}/objects/${object}/clicks?infer=${infer}`, { points });
+/** @param {string} id @param {number} object @param {AbortSignal} [signal] @returns {Promise<ObjectPoints>} */
+export const getObjectPoints = (id, object, signal) => get(`${of(id)}/objects/${object}/cloud`, signal);
 /** @param {string} id @param {number} object @param {number} point @param {Partial<PointPatch>} patch @returns {Promise<SceneObject>} */
 export const changePoint = (id, object, point, patch) =>
   send("PATCH", `${of(id)}/objects/${object}/points/${point}`, patch);
@@ -198,6 +203,19 @@ export const uploadCandidate = async (id, object, file) => {
   const query = new URLSearchParams({ filename: file.name });
   return (await call(`${of(id)}/objects/${object}/candidates?${query}`, { method: "POST", body: file })).json();
 };
+
+/** @param {string} id @returns {Promise<ReviewStatus>} */
+export const getReview = (id) => get(`${of(id)}/review`);
+/** @param {string} id @param {ReviewStep} step @returns {Promise<ReviewStatus>} */
+export const stepReview = (id, step) => send("POST", `${of(id)}/review`, step);
+/** @param {string} id @returns {Promise<Figures>} */
+export const getFigures = (id) => get(`${of(id)}/figures`);
+/** @param {string} id @returns {Promise<Comment[]>} */
+export const listComments = (id) => get(`${of(id)}/comments`);
+/** @param {string} id @param {Partial<CommentIn>} comment @returns {Promise<Comment>} */
+export const addComment = (id, comment) => send("POST", `${of(id)}/comments`, comment);
+/** @param {string} id @param {number} comment @param {boolean} resolved @returns {Promise<Comment>} */
+export const resolveComment = (id, comment, resolved) => send("PATCH", `${of(id)}/comments/${comment}`, { resolved });
 
 /** @param {string} id @returns {Promise<SceneSummary>} */
 export const getScene = (id) => get(`${of(id)}/scene`);

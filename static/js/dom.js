@@ -98,3 +98,15 @@ export function isTyping(event) {
     return !["range", "checkbox", "radio", "button", "file"].includes(target.type);
   return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
 }
+
+const PLAIN_KEYS = "plain-keys";
+
+/** Whether a letter alone is a command (WCAG 2.1.4 asks for a way to turn that off). */
+export function plainKeys() {
+  return localStorage.getItem(PLAIN_KEYS) !== "off";
+}
+
+/** @param {boolean} on */
+export function setPlainKeys(on) {
+  localStorage.setItem(PLAIN_KEYS, on ? "on" : "off");
+}

@@ -1,13 +1,18 @@
 /** The only file with side effects: defines the elements and starts the router. */
 
 import { AppShell } from "./elements/app-shell.js";
+import { CommandPalette } from "./elements/command-palette.js";
+import { CommentList } from "./elements/comment-list.js";
 import { FilmStrip } from "./elements/film-strip.js";
 import { FolderDialog } from "./elements/folder-dialog.js";
 import { FrameCanvas } from "./elements/frame-canvas.js";
+import { FrameMosaic } from "./elements/frame-mosaic.js";
 import { HelpOverlay } from "./elements/help-overlay.js";
 import { JobPanel } from "./elements/job-panel.js";
+import { ObjectCloud } from "./elements/object-cloud.js";
 import { ObjectList } from "./elements/object-list.js";
 import { ProposalList } from "./elements/proposal-list.js";
+import { ReviewState } from "./elements/review-state.js";
 import { SegmenterChoice } from "./elements/segmenter-choice.js";
 import { Toasts } from "./elements/toasts.js";
 import { ViewerFrame } from "./elements/viewer-frame.js";
@@ -23,6 +28,11 @@ import { startRouter } from "./router.js";
 customElements.define("r2c2r-toasts", Toasts);
 customElements.define("r2c2r-who", WhoIsIn);
 customElements.define("r2c2r-help", HelpOverlay);
+customElements.define("r2c2r-palette", CommandPalette);
+customElements.define("r2c2r-comments", CommentList);
+customElements.define("r2c2r-mosaic", FrameMosaic);
+customElements.define("r2c2r-object-cloud", ObjectCloud);
+customElements.define("r2c2r-review-state", ReviewState);
 customElements.define("r2c2r-folder-dialog", FolderDialog);
 customElements.define("r2c2r-job", JobPanel);
 customElements.define("r2c2r-frame-canvas", FrameCanvas);

@@ -5,6 +5,11 @@ import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { strips } from "../../static/js/lib/strips.js";
 import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
+import { clicksOfBox } from "../../static/js/lib/box.js";
+import { ranked } from "../../static/js/lib/commands.js";
+import { nextDoubtful, worstFirst } from "../../static/js/lib/lanes.js";
+import { disagreements } from "../../static/js/lib/merge.js";
+import { project } from "../../static/js/lib/points.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
@@ -144,4 +149,52 @@ test("only the same file goes on with a stopped upload", () => {
   assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500 }, [stopped]), stopped);
   for (const other of [{ name: "b.r3d" }, { size: 8 }, { lastModified: 1501 }])
     assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500, ...other }, [stopped]), undefined);
+});
+
+test("a box becomes a click on its middle and one beside every side that is in the frame", () => {
+  const frame = { width: 100, height: 80, index: 4 };
+  const clicks = clicksOfBox({ x: 60, y: 50 }, { x: 20, y: 10 }, frame);
+  assert.deepEqual(clicks[0], { frame: 4, x: 40, y: 30, label: 1 });
+  assert.ok(clicks.slice(1).every((c) => c.label === 0 && (c.x < 20 || c.x > 60 || c.y < 10 || c.y > 50)));
+  assert.equal(clicks.length, 5);
+  assert.equal(clicksOfBox({ x: 0, y: 0 }, { x: 40, y: 40 }, frame).length, 3); // nothing is said outside the picture
+  assert.equal(clicksOfBox({ x: 10, y: 10 }, { x: 13, y: 40 }, frame), null); // a slip of the hand
+});
+
+test("doubtful frames are found, and the worst come first", () => {
+  const frames = [0, 3, 7, 9].map((index) => ({ index }));
+  const sure = new Map([[0, 0.9], [3, 0.4], [7, 0.8], [9, 0.1]]);
+  assert.equal(nextDoubtful(frames, sure, 0, 1), 1);
+  assert.equal(nextDoubtful(frames, sure, 1, 1), 3);
+  assert.equal(nextDoubtful(frames, sure, 1, -1), null);
+  assert.deepEqual(worstFirst(sure, 3).map((e) => e.frame).slice(0, 2), [9, 3]);
+  assert.equal(worstFirst(sure, 10).length, 4);
+});
+
+test("only what two people set differently is asked about", () => {
+  const seen = { name: "a", category: "drawer" };
+  assert.deepEqual(disagreements(seen, { name: "b" }, { name: "c", category: "drawer" }), ["name"]);
+  assert.deepEqual(disagreements(seen, { name: "b" }, { name: "a", category: "cabinet" }), []); // theirs is elsewhere
+  assert.deepEqual(disagreements(seen, { name: "b" }, { name: "b", category: "drawer" }), []); // the same thought
+});
+
+test("the palette finds by any word, best first", () => {
+  const commands = ["Next frame", "Object drawer_1", "Frame without masks"].map((text) => ({ text, run: () => {} }));
+  assert.deepEqual(ranked(commands, "frame").map((c) => c.text), ["Frame without masks", "Next frame"]);
+  assert.deepEqual(ranked(commands, "draw obj").map((c) => c.text), ["Object drawer_1"]);
+  assert.equal(ranked(commands, "").length, 3);
+});
+
+test("letters alone can be turned off; keys with Ctrl stay", () => {
+  assert.equal(actionOf(key("g"), "annotate"), "segment");
+  assert.equal(actionOf(key("g"), "annotate", false), null);
+  assert.equal(actionOf(key("k", { ctrlKey: true }), "annotate", false), "palette");
+  assert.equal(actionOf(key("ArrowRight"), "annotate", false), "next-frame");
+});
+
+test("of two points behind each other the nearer one is drawn", () => {
+  const cloud = { positions: Int16Array.from([0, -50, 0, 0, 50, 0]), colours: Uint8Array.from([9, 9, 9, 200, 0, 0]), radius: 50 };
+  const picture = { width: 21, height: 21, data: new Uint8ClampedArray(4 * 21 * 21) };
+  project(cloud, { yaw: 0, pitch: 0 }, picture);
+  assert.deepEqual([...picture.data.slice(4 * (11 * 21 + 11), 4 * (11 * 21 + 11) + 4)], [9, 9, 9, 255]);
 });

@@ -1,15 +1,25 @@
 /** Header, navigation, the current page, messages and help. */
 
 import { getProject } from "../api.js";
-import { h, icon, isTyping, LiveElement } from "../dom.js";
-import { actionOf } from "../lib/keymap.js";
+import { h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { actionOf, KEYMAP } from "../lib/keymap.js";
+import { counted } from "../lib/format.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
+import { go } from "../router.js";
+import { CommandPalette } from "./command-palette.js";
 import { HelpOverlay } from "./help-overlay.js";
+import { stateChip } from "./review-state.js";
 import { sayError, Toasts } from "./toasts.js";
 import { WhoIsIn } from "./who.js";
 
 /** @typedef {import("../router.js").Route} Route */
-/** @typedef {HTMLElement & { project?: string, query?: URLSearchParams }} PageElement */
+/** @typedef {import("../lib/commands.js").Command} Command */
+/**
+ * @typedef {HTMLElement & {
+ *   project?: string, query?: URLSearchParams, act?: (action: string) => void, commands?: (typed: string) => Command[],
+ * }} PageElement
+ */
 
 const TABS = [
   ["overview", "Overview"],
@@ -22,9 +32,11 @@ const TABS = [
 export class AppShell extends LiveElement {
   #where = h("span", { class: "where muted" });
   #tabs = h("nav", { class: "tabs", "aria-label": "Project" });
-  #online = h("span", { class: "chip", hidden: true }, "reconnecting…");
+  #state = h("span", { hidden: true });
+  #online = h("div", { class: "banner", role: "status", hidden: true });
   #main = h("main", { id: "main", tabIndex: -1 });
   #help = new HelpOverlay();
+  #commands = new CommandPalette();
   /** @type {Route | null} */
   #route = null;
 
@@ -34,6 +46,8 @@ export class AppShell extends LiveElement {
     const help = h("button", { class: "quiet", type: "button", "aria-label": "Keyboard and mouse help" });
     help.append(icon("help"));
     help.addEventListener("click", () => this.#help.toggle());
+    const palette = h("button", { class: "quiet palette-button", type: "button" }, "Commands ", h("kbd", {}, "Ctrl K"));
+    palette.addEventListener("click", () => this.#openPalette());
     const logo = h("img", { src: "/static/icons/logo.svg", alt: "" });
     this.replaceChildren(
       h(
@@ -41,21 +55,26 @@ export class AppShell extends LiveElement {
         { class: "topbar" },
         h("a", { class: "brand", href: "/" }, logo, "r2c2r"),
         this.#where,
+        this.#state,
         this.#tabs,
         h("span", { class: "spring" }),
-        this.#online,
         new WhoIsIn(),
+        palette,
         help,
         theme,
       ),
+      this.#online,
       this.#main,
       new Toasts(),
       this.#help,
+      this.#commands,
     );
     document.documentElement.dataset.theme = localStorage.getItem("theme") ?? "";
-    live.addEventListener("offline", () => (this.#online.hidden = false), { signal: this.signal });
-    live.addEventListener("online", () => (this.#online.hidden = true), { signal: this.signal });
-    document.addEventListener("keydown", (event) => this.#onKey(event), { signal: this.signal });
+    const { signal } = this;
+    for (const type of ["offline", "online"]) live.addEventListener(type, () => this.#drawOnline(), { signal });
+    outbox.addEventListener("change", () => this.#drawOnline(), { signal });
+    live.addEventListener("project", () => this.#route && this.#drawProject(this.#route), { signal });
+    document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
   }
 
   /** @param {Route} route */
@@ -75,6 +94,7 @@ export class AppShell extends LiveElement {
   #drawTabs(route) {
     this.#tabs.hidden = route.project === null;
     this.#where.textContent = "";
+    this.#state.hidden = true;
     document.title = "r2c2r";
     if (route.project === null) return;
     const base = `/p/${route.project}`;
@@ -85,18 +105,61 @@ export class AppShell extends LiveElement {
         return link;
       }),
     );
+    this.#drawProject(route);
+  }
+
+  /** @param {Route} route */
+  #drawProject(route) {
+    if (route.project === null) return;
     getProject(route.project, this.signal).then((project) => {
       if (this.#route?.project !== project.id) return;
       this.#where.textContent = project.name;
+      this.#state.replaceChildren(stateChip(project.review_state));
+      this.#state.hidden = false;
       document.title = `${project.name} · r2c2r`;
     }, sayError);
   }
 
+  /** Lost connections are said, with what still waits; it is sent by itself once the server answers. */
+  #drawOnline() {
+    const waiting = outbox.stuck
+      ? ` ${counted(outbox.waiting, "change")} not stored yet: nothing is lost while this page stays open.`
+      : "";
+    this.#online.hidden = live.connected && !outbox.stuck;
+    this.#online.textContent = `The server does not answer; trying again.${waiting}`;
+  }
+
   /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (isTyping(event) || actionOf(event, "all") !== "help") return;
+    const action = actionOf(event, "all", plainKeys());
+    if (action === "palette") this.#openPalette();
+    else if (action === "help" && !isTyping(event)) this.#help.toggle();
+    else return;
     event.preventDefault();
-    this.#help.toggle();
+  }
+
+  /** Everything that can be done here, from the one table of keys, the tabs, and what the page adds. */
+  #openPalette() {
+    const page = /** @type {PageElement | null} */ (this.#main.firstElementChild);
+    const route = this.#route;
+    const base = route?.project ? `/p/${route.project}` : "";
+    const tabs = base
+      ? TABS.map(([name, text]) => ({
+          text: `Go to ${text}`,
+          run: () => go(name === "overview" ? base : `${base}/${name}`),
+        }))
+      : [];
+    const keys = KEYMAP.filter((binding) => binding.page === route?.page && page?.act).map((binding) => ({
+      text: binding.text,
+      keys: binding.keys[0],
+      run: () => page?.act?.(binding.action),
+    }));
+    const everywhere = [
+      { text: "Go to Projects", run: () => go("/") },
+      { text: "Dark or light", run: switchTheme },
+      { text: "Keyboard and mouse help", keys: "?", run: () => this.#help.toggle() },
+    ];
+    this.#commands.open((typed) => [...(page?.commands?.(typed) ?? []), ...keys, ...tabs, ...everywhere]);
   }
 }
 

@@ -1,9 +1,10 @@
-/** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, and "play". */
+/** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
 
 import { h, icon, LiveElement } from "../dom.js";
+import { DOUBTFUL } from "../lib/lanes.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
-/** @typedef {{ colour: string, name: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView */
+/** @typedef {{ id: number, number: number, colour: string, name: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView */
 
 const THUMBS = 18;
 
@@ -84,13 +85,26 @@ export class FilmStrip extends LiveElement {
           this.emit("seek", Math.round(share * (this.#frames.length - 1)));
         });
         draw();
-        return canvas;
+        const name = h(
+          "button",
+          {
+            type: "button",
+            class: "quiet",
+            "aria-pressed": String(lane.current),
+            "aria-label": `Lane of ${lane.name}`,
+          },
+          lane.name,
+        );
+        name.addEventListener("click", () => this.emit("pick-object", lane.id));
+        return h("div", { class: lane.current ? "lane current" : "lane" }, name, canvas);
       }),
     );
+    const current = /** @type {HTMLElement | null} */ (this.#lanes.querySelector(".current"));
+    if (current) this.#lanes.scrollTop = current.offsetTop - this.#lanes.offsetTop - this.#lanes.clientHeight / 2;
   }
 
   /**
-   * A bar where the mask is present, pale where it is unsure, a diamond at each click.
+   * A bar where the mask is present, hatched where it is doubtful, a diamond at each click.
    * @param {HTMLCanvasElement} canvas
    * @param {LaneView} lane
    */
@@ -99,14 +113,16 @@ export class FilmStrip extends LiveElement {
     if (!context) return;
     const step = canvas.width / Math.max(this.#frames.length, 1);
     context.clearRect(0, 0, canvas.width, canvas.height);
+    const hatched = hatch(context, lane.colour);
     context.globalAlpha = 0.18;
     context.fillStyle = lane.colour;
     context.fillRect(0, 5, canvas.width, 2);
     this.#frames.forEach((frame, k) => {
       const confidence = lane.frames.get(frame.index);
       if (confidence === undefined) return;
-      context.globalAlpha = confidence < 0.5 ? 0.45 : lane.current ? 1 : 0.75;
-      context.fillRect(k * step, confidence < 0.5 ? 4 : 2, Math.max(step, 1), confidence < 0.5 ? 4 : 8);
+      context.globalAlpha = lane.current ? 1 : 0.75;
+      context.fillStyle = confidence < DOUBTFUL ? hatched : lane.colour;
+      context.fillRect(k * step, 2, Math.max(step, 1), 8);
     });
     context.globalAlpha = 1;
     this.#frames.forEach((frame, k) => {
@@ -133,4 +149,24 @@ export class FilmStrip extends LiveElement {
  */
 function distance(button, position) {
   return Math.abs(Number(button.dataset.position) - position);
+}
+
+/**
+ * Slanted lines in a colour.
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} colour
+ */
+function hatch(context, colour) {
+  const tile = new OffscreenCanvas(6, 6);
+  const drawn = tile.getContext("2d");
+  if (!drawn) return colour;
+  drawn.strokeStyle = colour;
+  drawn.lineWidth = 2;
+  for (const x of [-3, 3]) {
+    drawn.beginPath();
+    drawn.moveTo(x, 6);
+    drawn.lineTo(x + 6, 0);
+    drawn.stroke();
+  }
+  return context.createPattern(tile, "repeat") ?? colour;
 }

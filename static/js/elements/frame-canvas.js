@@ -1,6 +1,7 @@
 /**
- * One frame with masks and clicks. Emits "click-point" {x, y, label, hold}, "move-point" {id, x, y}, "remove-point" {id}.
- * Zoom with the wheel, pan with the middle button or Space-drag; a crosshair moved by arrows replaces the mouse.
+ * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
+ * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id.
+ * Zoom with the wheel, pan with the middle button or Alt-drag; a crosshair moved by arrows replaces the mouse.
  */
 
 import { h, LiveElement } from "../dom.js";
@@ -12,6 +13,7 @@ import { fit, toImage, toScreen, zoom } from "../lib/view.js";
 /** @typedef {import("../api-types").Point} Point */
 /** @typedef {{ object: number, colour: [number, number, number], mask: MaskBits, current: boolean }} Layer */
 /** @typedef {Point & { colour: string, number: number, object: number, current: boolean }} Marker */
+/** @typedef {{ id: number, x: number, y: number, text: string }} Pin */
 /** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
 const GRIP_PX = 11;
@@ -30,9 +32,11 @@ export class FrameCanvas extends LiveElement {
   #markers = [];
   /** @type {Outline[]} */
   #outlines = [];
+  /** @type {Pin[]} */
+  #pins = [];
   /** @type {{ x: number, y: number } | null} */
   #crosshair = null;
-  /** @type {{ marker: Marker | null, x: number, y: number, pan: boolean, moved: boolean } | null} */
+  /** @type {{ marker: Marker | null, x: number, y: number, start: { x: number, y: number }, pan: boolean, moved: boolean } | null} */
   #drag = null;
   #paintings = 0;
   opacity = 0.42;
@@ -99,6 +103,12 @@ export class FrameCanvas extends LiveElement {
     this.draw();
   }
 
+  /** @param {Pin[]} pins comments on this frame */
+  setPins(pins) {
+    this.#pins = pins;
+    this.draw();
+  }
+
   fit() {
     this.#view = fit(this.#size, { width: Math.max(this.clientWidth, 1), height: Math.max(this.clientHeight, 1) });
     this.#fitted = true;
@@ -143,6 +153,8 @@ export class FrameCanvas extends LiveElement {
     }
     for (const outline of this.#outlines) drawOutline(context, this.#view, outline);
     for (const marker of this.#markers) this.#drawMarker(context, marker);
+    for (const pin of this.#pins) this.#drawPin(context, toScreen(this.#view, pin));
+    this.#drawBox(context);
     if (this.#crosshair) this.#drawCrosshair(context, toScreen(this.#view, this.#crosshair));
   }
 
@@ -171,6 +183,39 @@ export class FrameCanvas extends LiveElement {
     context.strokeStyle = marker.label ? "#10131a" : "#d0241b";
     context.stroke();
     context.globalAlpha = 1;
+  }
+
+  /**
+   * A speech bubble whose tip is the spot.
+   * @param {CanvasRenderingContext2D} context
+   * @param {{ x: number, y: number }} at
+   */
+  #drawPin(context, { x, y }) {
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + 5, y - 8);
+    context.roundRect(x - 2, y - 26, 24, 18, 5);
+    context.fillStyle = "#ffe14d";
+    context.fill();
+    context.lineWidth = 1.5;
+    context.strokeStyle = "#10131a";
+    context.stroke();
+    context.fillStyle = "#10131a";
+    for (const dot of [4, 10, 16]) context.fillRect(x + dot - 1, y - 18, 3, 3);
+  }
+
+  /** The box being drawn. @param {CanvasRenderingContext2D} context */
+  #drawBox(context) {
+    const drag = this.#drag;
+    if (!drag || !drag.moved || drag.pan || drag.marker) return;
+    for (const [width, style] of /** @type {const} */ ([
+      [3, "#10131a"],
+      [1.5, "#ffe14d"],
+    ])) {
+      context.lineWidth = width;
+      context.strokeStyle = style;
+      context.strokeRect(drag.start.x, drag.start.y, drag.x - drag.start.x, drag.y - drag.start.y);
+    }
   }
 
   /**
@@ -211,7 +256,8 @@ export class FrameCanvas extends LiveElement {
   #down(event) {
     this.#canvas.setPointerCapture(event.pointerId);
     const at = this.#at(event);
-    this.#drag = { ...at, marker: this.#markerAt(at) ?? null, pan: event.button === 1, moved: false };
+    const pan = event.button === 1 || event.altKey;
+    this.#drag = { ...at, start: at, marker: pan ? null : (this.#markerAt(at) ?? null), pan, moved: false };
     if (event.button === 1) event.preventDefault();
   }
 
@@ -220,7 +266,7 @@ export class FrameCanvas extends LiveElement {
     const drag = this.#drag;
     if (!drag) return;
     const at = this.#at(event);
-    if (Math.hypot(at.x - drag.x, at.y - drag.y) > 3) drag.moved = true;
+    if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) > 3) drag.moved = true;
     if (!drag.moved) return;
     if (drag.pan) {
       this.#view = { ...this.#view, x: this.#view.x + at.x - drag.x, y: this.#view.y + at.y - drag.y };
@@ -228,7 +274,7 @@ export class FrameCanvas extends LiveElement {
       this.#drag = { ...drag, ...at };
     } else if (drag.marker) {
       Object.assign(drag.marker, this.#clamped(toImage(this.#view, at)));
-    }
+    } else Object.assign(drag, at);
     this.draw();
   }
 
@@ -240,10 +286,32 @@ export class FrameCanvas extends LiveElement {
     const position = toImage(this.#view, this.#at(event));
     if (drag.marker && drag.moved) this.emit("move-point", { id: drag.marker.id, ...this.#clamped(position) });
     else if (drag.marker) this.emit("remove-point", { id: drag.marker.id });
-    else if (!drag.moved && this.#inside(position)) {
+    else if (drag.moved) this.#endBox(drag.start, position, event);
+    else if (this.#pinAt(this.#at(event))) this.emit("pick-pin", this.#pinAt(this.#at(event))?.id);
+    else if (this.#inside(position)) {
       const label = event.button === 2 || event.shiftKey ? 0 : 1;
       this.emit("click-point", { ...position, label, hold: event.ctrlKey || event.metaKey });
     }
+  }
+
+  /**
+   * @param {{ x: number, y: number }} start on the screen
+   * @param {{ x: number, y: number }} end in the image
+   * @param {PointerEvent} event
+   */
+  #endBox(start, end, event) {
+    this.draw();
+    if (event.button !== 0) return;
+    const [from, to] = [this.#clamped(toImage(this.#view, start)), this.#clamped(end)];
+    this.emit("draw-box", { from, to, hold: event.ctrlKey || event.metaKey });
+  }
+
+  /** @param {{ x: number, y: number }} at on the screen */
+  #pinAt(at) {
+    return this.#pins.findLast((pin) => {
+      const tip = toScreen(this.#view, pin);
+      return at.x >= tip.x - 4 && at.x <= tip.x + 24 && at.y >= tip.y - 28 && at.y <= tip.y;
+    });
   }
 
   /** @param {{ x: number, y: number }} position */

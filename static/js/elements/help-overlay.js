@@ -1,6 +1,6 @@
 /** The `?` overlay, printed from the keymap the code uses. */
 
-import { h } from "../dom.js";
+import { h, plainKeys, setPlainKeys } from "../dom.js";
 import { KEYMAP } from "../lib/keymap.js";
 
 const TITLES = { all: "Everywhere", annotate: "Annotate", review: "Review" };
@@ -41,11 +41,14 @@ function content(close) {
     "p",
     {},
     "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
-      "Wheel zooms, middle drag pans. Hold Ctrl to place several clicks before the mask is computed.",
+      "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans. Hold Ctrl to place several clicks before the mask is computed.",
   );
+  const plain = h("input", { type: "checkbox", checked: plainKeys() });
+  plain.addEventListener("change", () => setPlainKeys(plain.checked));
   return [
     h("h1", {}, "Keyboard and mouse"),
     mouse,
+    h("label", { class: "row" }, plain, "Letters alone are commands (the palette, Ctrl+K, works without)"),
     ...sections,
     h("p", {}, h("button", { type: "button", onClick: close }, "Close")),
   ];

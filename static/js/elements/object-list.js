@@ -1,6 +1,6 @@
 /**
  * The objects of a project. Emits "pick-object" id|null (not "select": fields fire that themselves, and it bubbles),
- * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id.
+ * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id, "stop" id.
  */
 
 import { h, icon, LiveElement } from "../dom.js";
@@ -13,6 +13,8 @@ export class ObjectList extends LiveElement {
   #categories = h("datalist", { id: "categories" });
   #new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
   #drawn = "";
+  /** @type {number | null} whose line was brought into sight */
+  #shown = null;
   /** @type {(() => void) | null} what to draw once the person has finished typing */
   #waiting = null;
 
@@ -48,6 +50,8 @@ export class ObjectList extends LiveElement {
         this.#item(object, k + 1, object.id === current, hidden.has(object.id), colourOf(object)),
       ),
     );
+    if (this.#shown !== current) this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+    this.#shown = current;
     if (!objects.length) {
       this.#list.replaceChildren(h("li", { class: "muted" }, "Click a drawer, a door or a thing in the picture."));
     }
@@ -91,12 +95,20 @@ export class ObjectList extends LiveElement {
       "li",
       { class: current ? "current" : "" },
       h("div", { class: "head" }, badge, pick, eye, remove),
-      h("div", { class: "row muted" }, state(object)),
+      h("div", { class: "row muted" }, state(object), this.#stop(object)),
       current ? this.#fields(object) : null,
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colour);
     return item;
+  }
+
+  /** @param {SceneObject} object */
+  #stop(object) {
+    if (object.segment !== "running" && object.segment !== "waiting") return null;
+    const stop = h("button", { type: "button", class: "quiet", "aria-label": `Stop finding ${object.name}` }, "Stop");
+    stop.addEventListener("click", () => this.emit("stop", object.id));
+    return stop;
   }
 
   /** @param {SceneObject} object */
@@ -132,6 +144,7 @@ function state(object) {
   if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
   if (object.mask_frames) {
+    if (object.segment === "partial") return `${clicks} · stopped after ${counted(object.mask_frames, "frame")}`;
     const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
     return h("span", {}, `${clicks} · ${counted(object.mask_frames, "frame")} `, drawn);
   }

@@ -5,6 +5,7 @@
 /** @type {Binding[]} */
 export const KEYMAP = [
   { keys: ["?"], action: "help", text: "Show or hide this list", page: "all" },
+  { keys: ["Ctrl+k"], action: "palette", text: "Find a command, an object or a frame", page: "all" },
   { keys: ["Ctrl+z"], action: "undo", text: "Undo", page: "all" },
   { keys: ["Ctrl+Shift+z", "Ctrl+y"], action: "redo", text: "Redo", page: "all" },
   { keys: ["ArrowRight", "f"], action: "next-frame", text: "Next frame", page: "annotate" },
@@ -27,6 +28,19 @@ export const KEYMAP = [
   { keys: ["Shift+h"], action: "solo", text: "Show this object's mask alone", page: "annotate" },
   { keys: ["t"], action: "raw", text: "Hold: the frame without masks", page: "annotate" },
   { keys: ["0"], action: "fit", text: "Fit the frame to the window", page: "annotate" },
+  {
+    keys: ["1", "2", "3", "4", "5", "6", "7", "8", "9"],
+    action: "pick-number",
+    text: "Choose the object of that number",
+    page: "annotate",
+  },
+  { keys: ["."], action: "next-doubtful", text: "Next frame where this object's mask is doubtful", page: "annotate" },
+  { keys: [","], action: "previous-doubtful", text: "Previous frame where it is doubtful", page: "annotate" },
+  { keys: ["g"], action: "segment", text: "Find this object in all frames again", page: "annotate" },
+  { keys: ["Shift+g"], action: "cancel-segment", text: "Stop finding it; the masks there are stay", page: "annotate" },
+  { keys: ["m"], action: "mosaic", text: "This object on many frames, worst first", page: "annotate" },
+  { keys: ["z"], action: "depth", text: "Depth instead of colour", page: "annotate" },
+  { keys: ["i"], action: "comment", text: "Pin a comment: the next click says where", page: "annotate" },
   {
     keys: ["k"],
     action: "crosshair",
@@ -52,20 +66,28 @@ export const KEYMAP = [
   { keys: ["x"], action: "reject", text: "Reject this candidate", page: "review" },
   { keys: ["n"], action: "next-object", text: "Next object", page: "review" },
   { keys: ["p"], action: "previous-object", text: "Previous object", page: "review" },
+  { keys: ["c"], action: "comment", text: "Comment on this object", page: "review" },
+  { keys: ["b"], action: "blink", text: "Hold: the photo without the mesh over it", page: "review" },
+  { keys: ["o"], action: "sweep", text: "Open and close the joints of this object", page: "review" },
+  { keys: ["."], action: "next-photo", text: "Next photo of this object", page: "review" },
+  { keys: [","], action: "previous-photo", text: "Previous photo of this object", page: "review" },
   { keys: ["1"], action: "view-candidate", text: "Show the candidate alone", page: "review" },
   { keys: ["2"], action: "view-aligned", text: "Show the mesh over the scan", page: "review" },
   { keys: ["3"], action: "view-scene", text: "Show the finished scene", page: "review" },
   { keys: ["4"], action: "view-cloud", text: "Show the scan", page: "review" },
+  { keys: ["5"], action: "view-photo", text: "Show the mesh over the photos", page: "review" },
 ];
 
 /**
  * The action of a key press on a page, or null.
  * @param {{ key: string, ctrlKey: boolean, metaKey: boolean, shiftKey: boolean, altKey: boolean }} event
  * @param {string} page
+ * @param {boolean} [plain] whether a letter alone is a command; some who dictate or hold a key by accident turn that off
  */
-export function actionOf(event, page) {
+export function actionOf(event, page, plain = true) {
   if (event.altKey) return null;
   const name = nameOf(event);
+  if (!plain && name.length === 1) return null;
   const found = KEYMAP.find(
     (binding) => (binding.page === page || binding.page === "all") && binding.keys.includes(name),
   );

@@ -1,0 +1,71 @@
+"""An object's points in 3D, while it is still being clicked: the depth under its masks, seen from its surest frames."""
+
+import base64
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading
+from app.files import ProjectFiles
+from app.jobs.mask_wire import bits_mask
+from app.services import masks, views
+from app.services.context import Context
+from r2c2r_core.arrays import Points
+from r2c2r_core.ingest.depth import decode_depth
+
+VIEWS = 10
+POINTS_A_VIEW = 1200
+_CORE_PERCENT = 2.0  # what lies outside, at either end, is depth noise along the outline
+
+
+def object_points(context: Context, project_id: str, object_id: int) -> schemas.ObjectPoints:
+    """The object's points; none while it has no masks."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        found = masks.frames_of(context, project, item, queries.points_of(session, object_id))
+        files = context.files(project)
+    surest = sorted(found, key=lambda entry: (-float(entry["confidence"]), int(entry["frame"])))[: 3 * VIEWS]
+    spread = sorted(surest, key=lambda entry: int(entry["frame"]))[:: max(len(surest) // VIEWS, 1)][:VIEWS]
+    parts = [part for entry in spread if len((part := _seen_in(files, entry))[0])]
+    if not parts:
+        return schemas.ObjectPoints(count=0, frames=0, centre_m=[0, 0, 0], size_m=[0, 0, 0], xyz_mm="", rgb="")
+    points, colours = (np.concatenate(column) for column in zip(*parts, strict=True))
+    low, high = np.percentile(points, (_CORE_PERCENT, 100 - _CORE_PERCENT), axis=0)
+    kept = ((points >= low - 0.02) & (points <= high + 0.02)).all(axis=1)
+    centre = (low + high) / 2
+    millimetres = np.clip((points[kept] - centre) * 1000, -32000, 32000).astype("<i2")
+    return schemas.ObjectPoints(
+        count=int(kept.sum()),
+        frames=len(parts),
+        centre_m=centre.tolist(),
+        size_m=(high - low).tolist(),
+        xyz_mm=base64.b64encode(millimetres.tobytes()).decode(),
+        rgb=base64.b64encode(colours[kept].tobytes()).decode(),
+    )
+
+
+def _seen_in(files: ProjectFiles, entry: dict[str, Any]) -> tuple[Points, np.ndarray]:
+    """Points (n, 3) of the world under one mask, and their colours (n, 3)."""
+    nothing = np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
+    index = int(entry["frame"])
+    frame = views.frame_of(files, index)
+    raw = cv2.imread(str(files.work / "capture" / "depth" / f"{index:06d}.png"), cv2.IMREAD_UNCHANGED)
+    photo = cv2.imread(str(files.work / "capture" / "rgb" / f"{index:06d}.jpg"), cv2.IMREAD_REDUCED_COLOR_2)
+    if frame is None or raw is None or photo is None:
+        return nothing
+    depth, camera = decode_depth(raw), frame.depth_camera
+    mask = cv2.resize(bits_mask(entry["mask"]).astype(np.uint8), depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    mask = cv2.erode(mask, np.ones((3, 3), np.uint8)).astype(bool)  # along the outline the depth is of what lies behind
+    rows, columns = np.nonzero(mask & (depth > 0))
+    if not len(rows):
+        return nothing
+    chosen = np.random.default_rng(index).permutation(len(rows))[:POINTS_A_VIEW]
+    rows, columns = rows[chosen], columns[chosen]
+    z = depth[rows, columns].astype(np.float64)
+    rays = np.column_stack([(columns + 0.5 - camera.cx) / camera.fx, (rows + 0.5 - camera.cy) / camera.fy, np.ones(len(z))])
+    small = cv2.resize(photo, depth.shape[::-1], interpolation=cv2.INTER_AREA)
+    return frame.world_from_camera.apply(rays * z[:, None]), small[rows, columns][:, ::-1]

@@ -1,0 +1,62 @@
+/** The masks of the frames that were looked at and of those that arrived live, and on which frames each object is seen. */
+
+/** @typedef {import("../api-types").FrameMask} FrameMask */
+/** @typedef {import("../api-types").Lane} Lane */
+
+export class Masks {
+  /** @type {Map<string, FrameMask>} by "object/frame" */
+  #masks = new Map();
+  /** @type {Map<number, Map<number, number>>} object -> frame -> confidence */
+  #lanes = new Map();
+
+  /** @param {Lane[]} lanes */
+  fill(lanes) {
+    this.#masks.clear();
+    this.#lanes = new Map(lanes.map((lane) => [lane.object, new Map(lane.frames.map((e) => [e.frame, e.confidence]))]));
+  }
+
+  /** @param {FrameMask} mask */
+  keep(mask) {
+    this.#masks.set(`${mask.object}/${mask.frame}`, mask);
+  }
+
+  /**
+   * One that arrived live. A first look can be here before the answer that names its object.
+   * @param {FrameMask} mask
+   */
+  receive(mask) {
+    const lane = this.#lanes.get(mask.object) ?? new Map();
+    this.#lanes.set(mask.object, lane);
+    if (mask.mask.box_width) lane.set(mask.frame, mask.confidence);
+    this.keep(mask);
+  }
+
+  /** @param {number} object whose masks are made anew */
+  restart(object) {
+    this.#lanes.set(object, new Map());
+    for (const key of [...this.#masks.keys()]) if (key.startsWith(`${object}/`)) this.#masks.delete(key);
+  }
+
+  /** @param {number} object */
+  forget(object) {
+    this.restart(object);
+    this.#lanes.delete(object);
+  }
+
+  /**
+   * @param {number} object
+   * @param {number} frame
+   */
+  on(object, frame) {
+    return this.#masks.get(`${object}/${frame}`);
+  }
+
+  /**
+   * Confidence by frame.
+   * @param {number} object
+   * @returns {Map<number, number>}
+   */
+  lane(object) {
+    return this.#lanes.get(object) ?? new Map();
+  }
+}

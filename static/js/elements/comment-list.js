@@ -1,0 +1,88 @@
+/** What people said about a spot. Emits "show-comment" Comment, "comments" Comment[] (open ones) whenever they change. */
+
+import { addComment, listComments, resolveComment } from "../api.js";
+import { h, LiveElement } from "../dom.js";
+import { ago, counted } from "../lib/format.js";
+import { live } from "../live.js";
+import { askForText } from "./ask-dialog.js";
+import { say, sayError } from "./toasts.js";
+
+/** @typedef {import("../api-types").Comment} Comment */
+/** @typedef {import("../api-types").CommentIn} CommentIn */
+
+export class CommentList extends LiveElement {
+  project = "";
+  /** @type {Comment[]} */
+  #all = [];
+  #settled = h("input", { type: "checkbox" });
+  #heading = h("h2", {}, "Comments");
+  #list = h("ul", { class: "comments" });
+  #showSettled = h("label", { class: "row" }, this.#settled, "Settled ones too");
+
+  connected() {
+    this.replaceChildren(this.#heading, this.#list, this.#showSettled);
+    this.#settled.addEventListener("change", () => this.#draw(), { signal: this.signal });
+    live.addEventListener("comments", () => this.load(), { signal: this.signal });
+    this.load();
+  }
+
+  async load() {
+    if (!this.project) return;
+    try {
+      this.#all = await listComments(this.project);
+      this.#draw();
+      this.emit("comments", this.open);
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  get open() {
+    return this.#all.filter((comment) => comment.resolved_at === null);
+  }
+
+  /**
+   * Ask for the words, then store them with where they belong.
+   * @param {Partial<CommentIn>} pin
+   * @param {string} about
+   */
+  async ask(pin, about) {
+    const text = await askForText(`Comment on ${about}`, "What should change?", { button: "Comment" });
+    if (!text) return;
+    try {
+      await addComment(this.project, { ...pin, text });
+      say("Comment stored", { kind: "good" });
+      this.load();
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  #draw() {
+    const shown = this.#settled.checked ? this.#all : this.open;
+    this.#heading.textContent = this.open.length ? `${counted(this.open.length, "open comment")}` : "Comments";
+    this.#showSettled.hidden = this.open.length === this.#all.length;
+    this.#list.replaceChildren(
+      ...(shown.length ? shown.map((comment) => this.#item(comment)) : [h("li", { class: "muted" }, "None open.")]),
+    );
+  }
+
+  /** @param {Comment} comment */
+  #item(comment) {
+    const settled = comment.resolved_at !== null;
+    const where = comment.frame !== null ? `frame ${comment.frame}` : comment.point_world ? "in the scene" : "";
+    const show = h(
+      "button",
+      { type: "button", class: "quiet pick" },
+      settled ? h("s", {}, comment.text) : comment.text,
+    );
+    show.addEventListener("click", () => this.emit("show-comment", comment));
+    const settle = h("button", { type: "button", class: "quiet" }, settled ? "Open again" : "Resolve");
+    settle.setAttribute("aria-label", `${settle.textContent}: ${comment.text}`);
+    settle.addEventListener("click", () =>
+      resolveComment(this.project, comment.id, !settled).then(() => this.load(), sayError),
+    );
+    const about = [comment.who, ago(comment.at, Date.now() / 1000), where].filter(Boolean).join(" · ");
+    return h("li", {}, show, h("div", { class: "row" }, h("span", { class: "muted grow" }, about), settle));
+  }
+}

@@ -1,0 +1,98 @@
+/** Where the project stands, who brought it there, and the steps it may take from here with what each still lacks. */
+
+import { ApiError, getFigures, getReview, stepReview } from "../api.js";
+import { h, LiveElement } from "../dom.js";
+import { ago, duration } from "../lib/format.js";
+import { live } from "../live.js";
+import { askForText } from "./ask-dialog.js";
+import { say, sayError } from "./toasts.js";
+
+/** @typedef {import("../api-types").ReviewStatus} ReviewStatus */
+/** @typedef {import("../api-types").ReviewMove} ReviewMove */
+/** @typedef {import("../api-types").Figures} Figures */
+
+const TONES = { draft: "", ready: "", "in review": "warn", "changes requested": "bad", approved: "good" };
+
+/** @param {ReviewStatus["state"]} state */
+export function stateChip(state) {
+  return h("span", { class: `chip ${TONES[state]}` }, state);
+}
+
+export class ReviewState extends LiveElement {
+  project = "";
+  #body = h("section", { class: "review-state stack", "aria-label": "State of the review" });
+
+  connected() {
+    this.replaceChildren(this.#body);
+    const { signal } = this;
+    for (const type of ["project", "review", "comments"]) live.addEventListener(type, () => this.load(), { signal });
+    this.load();
+  }
+
+  async load() {
+    if (!this.project) return;
+    try {
+      const [status, figures] = await Promise.all([getReview(this.project), getFigures(this.project)]);
+      this.#draw(status, figures);
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /**
+   * @param {ReviewStatus} status
+   * @param {Figures} figures
+   */
+  #draw(status, figures) {
+    const by = status.at ? `${status.who}, ${ago(status.at, Date.now() / 1000)}` : "";
+    this.#body.replaceChildren(
+      h("div", { class: "row" }, stateChip(status.state), h("span", { class: "muted" }, by)),
+      status.reason ? h("p", { class: "said" }, status.reason) : "",
+      ...status.moves.map((move) => this.#move(status, move)),
+      h("p", { class: "muted" }, cost(figures)),
+    );
+  }
+
+  /**
+   * @param {ReviewStatus} status
+   * @param {ReviewMove} move
+   */
+  #move(status, move) {
+    const button = h("button", { type: "button", class: move.unmet.length ? "" : "primary" }, move.text);
+    button.addEventListener("click", () => this.#step(status, move));
+    const unmet = move.unmet.length
+      ? h("ul", { class: "muted unmet" }, ...move.unmet.map((line) => h("li", {}, line)))
+      : null;
+    return h("div", {}, button, unmet);
+  }
+
+  /**
+   * @param {ReviewStatus} status
+   * @param {ReviewMove} move
+   */
+  async #step(status, move) {
+    let reason = "";
+    if (move.unmet.length || move.needs_reason) {
+      const label = move.unmet.length ? "Why all the same? The history keeps it." : "What has to change?";
+      const given = await askForText(move.text, label, { button: move.text, notes: move.unmet });
+      if (!given) return;
+      reason = given;
+    }
+    try {
+      await stepReview(this.project, { from_state: status.state, to: move.to, reason });
+      say(`The project is ${move.to} now`, { kind: "good" });
+    } catch (error) {
+      sayError(error);
+      if (!(error instanceof ApiError)) return;
+    }
+    this.load();
+  }
+}
+
+/** @param {Figures} figures */
+function cost(figures) {
+  const clicks = figures.clicks_per_object === null ? "" : `${figures.clicks_per_object.toFixed(1)} clicks an object`;
+  const time =
+    figures.upload_to_approval_s === null ? "" : `approved ${duration(figures.upload_to_approval_s)} after the import`;
+  return [clicks, time].filter(Boolean).join(" · ");
+}

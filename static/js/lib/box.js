@@ -1,0 +1,34 @@
+/** A box drawn around a thing, said in clicks: the one prompt that every segmenter understands. */
+
+/** @typedef {{ x: number, y: number }} At */
+
+const OUTSIDE = 0.08; // of the box's side: how far beside it "not this" is said
+const LEAST_PX = 8;
+
+/**
+ * Clicks that mean "what this box holds": its middle, and beside each side that the frame still shows. Null for a slip.
+ * @param {At} from
+ * @param {At} to
+ * @param {{ width: number, height: number, index: number }} frame
+ * @returns {{ frame: number, x: number, y: number, label: 0 | 1 }[] | null}
+ */
+export function clicksOfBox(from, to, frame) {
+  const [left, right] = [Math.min(from.x, to.x), Math.max(from.x, to.x)];
+  const [top, bottom] = [Math.min(from.y, to.y), Math.max(from.y, to.y)];
+  if (right - left < LEAST_PX || bottom - top < LEAST_PX) return null;
+  const [x, y] = [(left + right) / 2, (top + bottom) / 2];
+  const dx = OUTSIDE * (right - left) + 2;
+  const dy = OUTSIDE * (bottom - top) + 2;
+  /** @type {At[]} */
+  const beside = [
+    { x: left - dx, y },
+    { x: right + dx, y },
+    { x, y: top - dy },
+    { x, y: bottom + dy },
+  ];
+  const seen = beside.filter((at) => at.x >= 0 && at.y >= 0 && at.x < frame.width && at.y < frame.height);
+  return [
+    { frame: frame.index, x, y, label: /** @type {1} */ (1) },
+    ...seen.map((at) => ({ frame: frame.index, ...at, label: /** @type {0} */ (0) })),
+  ];
+}

@@ -1,0 +1,36 @@
+/** What the frames of an object's lane say: where it is doubtful, which look worst. */
+
+export const DOUBTFUL = 0.5; // below this a mask is drawn hatched and offered for a second look
+
+/**
+ * The next frame, in that direction, whose mask is doubtful; null when there is none.
+ * @param {{ index: number }[]} frames
+ * @param {Map<number, number>} confidence by frame
+ * @param {number} position
+ * @param {1 | -1} step
+ */
+export function nextDoubtful(frames, confidence, position, step) {
+  for (let k = position + step; k >= 0 && k < frames.length; k += step) {
+    const sure = confidence.get(frames[k]?.index ?? -1);
+    if (sure !== undefined && sure < DOUBTFUL) return k;
+  }
+  return null;
+}
+
+/**
+ * Frames worth a look: the doubtful ones first, then evenly spread over the rest, at most `count`.
+ * @param {Map<number, number>} confidence by frame
+ * @param {number} count
+ * @returns {{ frame: number, confidence: number }[]} worst first
+ */
+export function worstFirst(confidence, count) {
+  const all = [...confidence].map(([frame, sure]) => ({ frame, confidence: sure }));
+  const doubtful = all.filter((e) => e.confidence < DOUBTFUL).toSorted((a, b) => a.confidence - b.confidence);
+  const sure = all.filter((e) => e.confidence >= DOUBTFUL).toSorted((a, b) => a.frame - b.frame);
+  const room = Math.max(count - doubtful.length, 0);
+  const shown = Math.min(room, sure.length);
+  const spread = Array.from({ length: shown }, (_, k) => sure[Math.floor((k * sure.length) / shown)]).filter(
+    (e) => e !== undefined,
+  );
+  return [...doubtful.slice(0, count), ...spread.toSorted((a, b) => a.confidence - b.confidence)];
+}

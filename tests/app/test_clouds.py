@@ -1,0 +1,36 @@
+"""An object's points while it is being clicked."""
+
+import base64
+
+import numpy as np
+
+from tests.app.test_reviews import Reviewed, reviewed
+
+__all__ = ["reviewed"]
+
+
+def test_the_points_of_an_object_lie_where_depth_and_masks_put_them(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    found = web.get(f"/api/projects/{project}/objects/{number}/cloud")
+    points = np.frombuffer(base64.b64decode(found["xyz_mm"]), "<i2").reshape(-1, 3)
+    assert found["count"] == len(points) > 50
+    assert len(base64.b64decode(found["rgb"])) == 3 * len(points)
+    extent = np.ptp(points, axis=0) / 1000
+    assert (extent <= np.array(found["size_m"]) + 0.05).all()  # nothing far outside the box it is said to fill
+
+
+def test_an_object_without_masks_has_no_points(reviewed: Reviewed) -> None:
+    web, project, _ = reviewed
+    bare = web.post(f"/api/projects/{project}/objects", {"category": "mug"})["id"]
+    assert web.get(f"/api/projects/{project}/objects/{bare}/cloud")["count"] == 0
+
+
+def test_clicks_that_belong_together_are_one_change(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    base = f"/api/projects/{project}"
+    points = [{"frame": 3, "x": 40, "y": 40, "label": 1}, {"frame": 3, "x": 5, "y": 40, "label": 0}]
+    assert len(web.post(f"{base}/objects/{number}/clicks", {"points": points})["points"]) == 3
+    assert len(web.post(f"{base}/undo", {"object": number})["object"]["points"]) == 1
+    outside = [points[0], {"frame": 3, "x": 5000, "y": 1}]
+    web.post(f"{base}/objects/{number}/clicks", {"points": outside}, 422)
+    assert len(web.get(f"{base}/objects")[0]["points"]) == 1  # all or none
