@@ -7,6 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 
 _WALL_M = 0.03  # walls, fronts and floors of furniture and of ovens end within this of the outside
+_THICKEST_WALL_M = 0.08  # of a refrigerator; what is thicker stands inside
 _STEP_M = 0.02
 _LEAST_INSIDE_M = 0.06
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -44,12 +45,22 @@ def cavity_open(model: Any, joint: str) -> float | None:
     if not inner:
         return None
     front = [centre + _SIGNS * half] if slides else []  # a tray is open above its sides, up to its front's top
-    corners = np.concatenate([*front, *(solid.corners for solid in inner)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low, high = _between_walls([*front, *(solid.corners for solid in inner)])
     across = np.arange(3) != int(np.argmin(half))
-    low[across] = np.maximum(low, centre - half)[across]
-    high[across] = np.minimum(high, centre + half)[across]
-    return _free_share(low + _WALL_M, high - _WALL_M, inner)
+    low[across] = np.maximum(low, centre - half + _WALL_M)[across]
+    high[across] = np.minimum(high, centre + half - _WALL_M)[across]
+    return _free_share(low, high, inner)
+
+
+def _between_walls(solids: list[Points]) -> tuple[Vector3, Vector3]:
+    """Low and high corner of the space inside: the bounds of all solids, less the plates that stand along them."""
+    lows, highs = np.array([s.min(axis=0) for s in solids]), np.array([s.max(axis=0) for s in solids])
+    thick = highs - lows
+    low, high = lows.min(axis=0), highs.max(axis=0)
+    wall = thick <= _THICKEST_WALL_M
+    below = np.where(wall & (lows < low + 1e-3), thick, 0.0).max(axis=0)
+    above = np.where(wall & (highs > high - 1e-3), thick, 0.0).max(axis=0)
+    return low + np.maximum(below, _WALL_M), high - np.maximum(above, _WALL_M)
 
 
 def _free_share(low: Vector3, high: Vector3, solids: list[_Solid]) -> float | None:

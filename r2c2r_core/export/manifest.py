@@ -85,7 +85,7 @@ def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject)
         "candidates": [] if candidates is None else _candidate_entries(candidates),
         "chosen": None if candidates is None else {"candidate": candidates.chosen_id, "by": candidates.chosen_by, "at": None},
         "placement": None if placement is None else _placement_entry(placement),
-        "warp": {"residual_m": _plain(item.warp_residual_m)},
+        "warp": {"residual_m": _plain(item.warp_residual_m), "paper_residual_m": _plain(item.warp_residual_paper_m)},
         "meshes": {
             "visual": [body.visual_file for body in bodies if body.visual_file is not None],
             "collision": [name for body in bodies for name in body.collision_files],

@@ -44,8 +44,8 @@ class Simulation:
 def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
     """Run every test on a scene.xml."""
     try:
-        shipped, strict = _compiled(mjcf), _compiled(mjcf, strict=True)
-        solid, loose = _compiled(mjcf, strict=True, keep_free=True), _compiled(mjcf, strict=True, keep_free=True, loosen=True)
+        shipped, strict = compiled(mjcf), compiled(mjcf, strict=True)
+        solid, loose = compiled(mjcf, strict=True, keep_free=True), compiled(mjcf, strict=True, keep_free=True, loosen=True)
     except ValueError as error:
         return Simulation(findings=(finding("mjcf-compile", "scene.xml", str(error).partition("\n")[0]),))
     rest = touches(solid, {})
@@ -92,7 +92,7 @@ def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
             yield finding("overlap", touch.names.partition(" ")[0], f"{touch.names} overlap by {1000 * touch.depth_m:.1f} mm")
 
 
-def _compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:
+def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:
     """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go."""
     import mujoco
 

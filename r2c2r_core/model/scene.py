@@ -86,6 +86,7 @@ class SceneObject:
     front_texture: Image | None
     warp_residual_m: float | None  # front corners, after the fit; None before warp
     warnings: tuple[str, ...]
+    warp_residual_paper_m: float | None = None  # what the paper's affine map leaves of its own four corners, for comparison
     final_from_placed: Rigid3 = field(default_factory=Rigid3)  # how layout and person moved it: a world motion
 
 

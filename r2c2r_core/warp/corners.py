@@ -1,8 +1,9 @@
 """The four corners of a mesh's front face (paper section 4.8, mended).
 
 The paper scores vertices by radius and depth, which picks handle tips, needs a centred front, and gives four points that
-are not coplanar. Here: the front plane by RANSAC over surface points that look forwards, then the smallest rectangle
-around its inliers (method.md row 22).
+are not coplanar. Here: the direction most of the forward surface looks in, the foremost flat layer across it that spans the
+whole front (a handle spans little, a shaker door's sunk panel lies behind its frame), then the smallest rectangle around
+that plane's inliers (method.md row 22, whose RANSAC settles between frame and panel when they are millimetres apart).
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,9 @@ from r2c2r_core.geometry.transforms import rotation_between
 
 _INLIER_M = 0.003
 _SAMPLES = 12000
-_TRIALS = 200
+_LAYER_M = 0.002  # offsets are searched in steps of this
+_SPANS = 0.8  # of the forward surface's width and of its height: what a front face reaches over
+_LEAST_SHARE = 0.03  # of the forward surface: fewer points are specks
 _EDGE_SHARE = 0.0005  # of the inliers left outside each side: specks of other faces
 _RIM_M = 0.006
 _FORWARD = np.array([0.0, -1.0, 0.0])
@@ -53,37 +56,50 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
     looking = points[normals[:, 1] < -0.7]
     if len(looking) < 60:
         return None
-    plane = _foremost_plane(looking, rng)
-    if plane is None:
-        return None
-    normal, offset = plane
+    normal, offset = _foremost_plane(looking, normals[normals[:, 1] < -0.7])
     inliers = looking[np.abs(looking @ normal - offset) < _INLIER_M]
     forward = np.unique(faces[face_normals(vertices, faces)[:, 1] < -0.7])
     rim = vertices[forward][np.abs(vertices[forward] @ normal - offset) < _INLIER_M]
     return FrontFace(corners=_rectangle_corners(inliers, rim, normal, offset), outward=normal, inliers=len(inliers))
 
 
-def _foremost_plane(points: Points, rng: np.random.Generator) -> tuple[Vector3, float] | None:
-    """Plane (outward normal, offset) holding at least 60 % of the best plane's points and lying furthest forward."""
-    found: list[tuple[int, float, Vector3, float]] = []
-    for _ in range(_TRIALS):
-        a, b, c = points[rng.choice(len(points), 3, replace=False)]
-        normal = np.cross(b - a, c - a)
-        length = np.linalg.norm(normal)
-        if length < 1e-6:
+def _foremost_plane(points: Points, normals: Points) -> tuple[Vector3, float]:
+    """Plane (outward normal, offset) of the foremost flat layer that spans the front; of the fullest where none does."""
+    normal = _common_direction(normals)
+    offsets = points @ normal
+    across = np.stack([np.cross(normal, [0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]], axis=1)
+    flat = points @ across
+    whole = np.ptp(np.quantile(flat, [0.005, 0.995], axis=0), axis=0)
+    fullest, most = float(np.median(offsets)), 0
+    for offset in np.arange(offsets.max(), offsets.min() - _LAYER_M, -_LAYER_M):
+        layer = np.abs(offsets - offset) < _INLIER_M
+        count = int(layer.sum())
+        if count < _LEAST_SHARE * len(points):
             continue
-        normal = normal / length * (-1.0 if normal[1] > 0 else 1.0)
-        if normal[1] > -np.cos(np.deg2rad(12.0)):
-            continue
-        offset = float(normal @ a)
-        count = int((np.abs(points @ normal - offset) < _INLIER_M).sum())
-        found.append((count, offset, normal, offset))
-    if not found:
-        return None
-    most = max(count for count, *_ in found)
-    forward = [f for f in found if f[0] >= 0.6 * most]
-    _, _, normal, offset = max(forward, key=lambda f: (round(f[1] / 0.01), f[0]))
-    return _refined(points, normal, offset)
+        if (np.ptp(np.quantile(flat[layer], [0.005, 0.995], axis=0), axis=0) >= _SPANS * whole).all():
+            return _refined(points, normal, _densest(offsets, offset))
+        if count > most:
+            fullest, most = float(offset), count
+    return _refined(points, normal, fullest)
+
+
+def _common_direction(normals: Points) -> Vector3:
+    """The direction most normals agree on: their mean, thrice without those further off."""
+    kept = normals
+    for cosine in (np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(8.0)), np.cos(np.deg2rad(3.0))):
+        mean = np.median(kept, axis=0)
+        mean = mean / np.linalg.norm(mean)
+        near = kept[kept @ mean > cosine]
+        kept = near if len(near) >= 60 else kept
+    mean = kept.mean(axis=0)
+    return np.asarray(mean / np.linalg.norm(mean))
+
+
+def _densest(offsets: np.ndarray, offset: float) -> float:
+    """Where, within a layer's thickness behind its first sight, most of the points lie."""
+    near = offsets[(offsets <= offset + _INLIER_M) & (offsets > offset - 2 * _INLIER_M)]
+    candidates = np.arange(offset + _INLIER_M, offset - 2 * _INLIER_M, -_LAYER_M / 2)
+    return float(max(candidates, key=lambda c: int((np.abs(near - c) < _INLIER_M).sum())))
 
 
 def _refined(points: Points, normal: Vector3, offset: float) -> tuple[Vector3, float]:

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from r2c2r_core.arrays import Points
+from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.geometry.raster import sample_texture
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import Placement
@@ -15,6 +16,7 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.warp.affine import AxisMap, fit_map, fit_ranges, warp_vertices
 from r2c2r_core.warp.axes import face_outwards
 from r2c2r_core.warp.corners import FrontFace, find_front
+from r2c2r_core.warp.paper import PaperMap, fit_paper_map, paper_corners
 from r2c2r_core.warp.parts import cut_apart, outline
 from r2c2r_core.warp.solids import with_plain_colours
 
@@ -28,6 +30,7 @@ class WarpConfig:
     version: int = 2  # of the stage's code, so that a changed method re-runs
     front_scale: tuple[float, float] = (0.7, 1.4)  # how much a front may be stretched before its mesh is not believed
     depth_scale: tuple[float, float] = (0.2, 5.0)  # depth is mostly unobserved
+    method: Literal["axes", "paper"] = "axes"  # "paper": its corners and affine map (eq. 15-16) as printed, for comparison
     seed: int = 0
 
 
@@ -66,16 +69,14 @@ def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: 
         return _whole(item, vertices_world, asset.mesh, config)
     has_handle = any(box.name.startswith("handle") for link in item.links[1:] for box in link.boxes)
     canonical = face_outwards(vertices_world, asset.mesh.faces, item.world_from_object, has_handle=has_handle, seed=config.seed)
-    tilted = find_front(canonical.vertices, asset.mesh.faces, seed=config.seed)
-    if tilted is None:
-        raise _Unusable("no flat front was found on it")
-    upright = canonical.vertices @ tilted.upright_from_mesh.T
-    front = find_front(upright, asset.mesh.faces, seed=config.seed)
-    if front is None:
-        raise _Unusable("no flat front was found on it")
     target = front_corners(item)
-    axis_map = _believable(_map_to(front, upright, target, float(item.dimensions_m[1])), config)
-    warped = warp_vertices(upright, asset.mesh.faces, axis_map, float(front.centre[1]))
+    paper = _paper_map(canonical.vertices, target)
+    if config.method == "axes":
+        warped = _warped(item, canonical.vertices, asset.mesh.faces, target, config)
+    elif paper is not None:
+        warped = paper.apply(canonical.vertices)
+    else:
+        raise _Unusable("the paper's corners were not found on it")
     colour = _front_colour(asset.mesh, warped, item)
     painted, paint = with_plain_colours(
         TexturedMesh(vertices=warped, faces=asset.mesh.faces, uv=asset.mesh.uv, texture=asset.mesh.texture),
@@ -84,8 +85,29 @@ def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: 
     )
     visuals = cut_apart(item, painted, paint)
     links = tuple(_dressed(link, visuals.get(link.name), colour) for link in item.links)
-    residual = _corner_residual([visuals[link.name] for link in item.links[1:]], target, config.seed)
-    return replace(item, links=links, warp_residual_m=residual, warnings=(*item.warnings, *canonical.warnings))
+    return replace(
+        item,
+        links=links,
+        warp_residual_m=_corner_residual(item, visuals, config.seed),
+        warp_residual_paper_m=paper.residual_m if paper is not None else None,
+        warnings=(*item.warnings, *canonical.warnings),
+    )
+
+
+def _warped(item: SceneObject, canonical: Points, faces: Faces, target: Points, config: WarpConfig) -> Points:
+    """Vertices in the object frame: the mesh's front upright on the primitive's, its handle in shape, its depth fitted."""
+    tilted = find_front(canonical, faces, seed=config.seed)
+    upright = canonical if tilted is None else canonical @ tilted.upright_from_mesh.T
+    front = find_front(upright, faces, seed=config.seed)
+    if front is None:
+        raise _Unusable("no flat front was found on it")
+    axis_map = _believable(_map_to(front, upright, target, float(item.dimensions_m[1])), config)
+    return warp_vertices(upright, faces, axis_map, float(front.centre[1]))
+
+
+def _paper_map(canonical: Points, target: Points) -> PaperMap | None:
+    corners = paper_corners(canonical)
+    return None if corners is None else fit_paper_map(corners, target)
 
 
 def front_corners(item: SceneObject) -> Points:
@@ -124,19 +146,19 @@ def _believable(axis_map: AxisMap, config: WarpConfig) -> AxisMap:
     return axis_map
 
 
-def _corner_residual(fronts: Sequence[TexturedMesh], target: Points, seed: int) -> float | None:
-    """Largest distance from the primitive's front corners to those found anew on the finished fronts."""
-    whole = outline(fronts)
+def _corner_residual(item: SceneObject, visuals: dict[str, TexturedMesh], seed: int) -> float | None:
+    """Largest distance from the corners of the front boards to those found anew on the finished fronts."""
+    whole = outline([visuals[link.name] for link in item.links[1:]])
     found = find_front(whole.vertices, whole.faces, seed=seed)
     if found is None:
         return None
-    return float(np.linalg.norm(_outer(found.corners, target) - target, axis=1).max())
-
-
-def _outer(corners: Points, target: Points) -> Points:
-    """Corners of a front that covers only part of the face (a control panel stays behind) are compared where they lie."""
-    partial = np.abs(corners - target) > 0.05
-    return np.where(partial, target, corners)
+    boards = [(link.object_from_link @ link.boxes[0].link_from_box).translation for link in item.links[1:]]
+    halves = [link.boxes[0].size_m / 2 for link in item.links[1:]]
+    low, high = np.min(np.subtract(boards, halves), axis=0), np.max(np.add(boards, halves), axis=0)
+    corners = np.array(
+        [[x, low[1], z] for x, z in ((high[0], high[2]), (low[0], high[2]), (low[0], low[2]), (high[0], low[2]))]
+    )
+    return float(np.linalg.norm(found.corners - corners, axis=1).max())
 
 
 def _dressed(link: Link, visual_object: TexturedMesh | None, colour: tuple[float, float, float]) -> Link:

@@ -188,3 +188,16 @@ def test_a_thing_that_a_person_turned_turns_with_its_mesh() -> None:
     item = fit_meshes(scene, [track], [placement], [asset], WarpConfig()).objects[0]
     world = item.world_from_object.apply(in_object(item, 0).vertices)
     np.testing.assert_allclose(np.ptp(pose.inverse.apply(world), axis=0), unit.size, atol=2e-3)
+
+
+def test_the_papers_map_can_be_chosen_and_keeps_the_depth_that_ours_fits() -> None:
+    """Eq. 16 has w* = w: a mesh that is not as deep as its primitive stays short of the back."""
+    track, placement, asset = placed_unit(CABINET, np.random.default_rng(0), stretch=(1.0, 0.8, 1.0))
+    scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
+    ours = fit_meshes(scene, [track], [placement], [asset], WarpConfig()).objects[0]
+    paper = fit_meshes(scene, [track], [placement], [asset], WarpConfig(method="paper")).objects[0]
+    backs = [in_object(item, 0).vertices[:, 1].max() - item.dimensions_m[1] / 2 for item in (ours, paper)]
+    assert backs[0] == pytest.approx(0.0, abs=1e-6)
+    assert backs[1] < -0.01
+    for item in (ours, paper):  # a box's corners form a rectangle, which the affine map hits
+        assert item.warp_residual_paper_m == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,61 @@
+"""The front face of a mesh, where a frame, a sunk panel, a handle and noise compete for it."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.meshes import box_mesh, unite
+from r2c2r_core.warp.corners import find_front
+
+WIDTH, DEPTH, HEIGHT = 0.6, 0.56, 0.7
+FRONT_Y = -DEPTH / 2
+
+
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    return box_mesh(np.array(low), np.array(high))
+
+
+def shaker(sunk_m: float, frame_m: float = 0.06) -> tuple[np.ndarray, np.ndarray]:
+    """A cabinet whose door has a panel `sunk_m` behind its frame, and a bar handle."""
+    x, z = WIDTH / 2, HEIGHT / 2
+    body = block((-x, FRONT_Y, -z), (x, DEPTH / 2, z))
+    panel = block((-x + frame_m, FRONT_Y - 0.01, -z + frame_m), (x - frame_m, FRONT_Y + sunk_m, z - frame_m))
+    handle = block((x - 0.05, FRONT_Y - 0.035, -0.1), (x - 0.03, FRONT_Y + 0.01, 0.1))
+    return unite([unite([body], [panel]), handle])
+
+
+def turned(vertices: np.ndarray, degrees: float) -> np.ndarray:
+    """A lean about x and a turn about z, both by the angle."""
+    a = np.deg2rad(degrees)
+    lean = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+    turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+    return np.asarray(vertices @ (turn @ lean).T)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 2.0])
+@pytest.mark.parametrize("sunk_m", [0.005, 0.007, 0.012])
+def test_the_frame_of_a_shaker_door_is_its_front_however_large_the_panel(sunk_m: float, degrees: float) -> None:
+    vertices, faces = shaker(sunk_m)
+    vertices = turned(vertices, degrees)
+    found = find_front(vertices, faces)
+    assert found is not None
+    x, z = WIDTH / 2, HEIGHT / 2
+    corners = turned(np.array([[x, FRONT_Y, z], [-x, FRONT_Y, z], [-x, FRONT_Y, -z], [x, FRONT_Y, -z]]), degrees)
+    np.testing.assert_allclose(found.corners, corners, atol=1.5e-3)  # the samples' edge, where no vertex says better
+
+
+def test_noise_on_the_surface_moves_the_front_by_less_than_itself() -> None:
+    from trimesh.remesh import subdivide_to_size
+
+    vertices, faces = shaker(0.012)
+    vertices, faces = subdivide_to_size(vertices, faces, 0.02)
+    noisy = vertices + np.random.default_rng(0).normal(0, 0.0005, vertices.shape)
+    found = find_front(noisy, faces)
+    assert found is not None
+    assert abs(found.centre[1] - FRONT_Y) < 1e-3
+    assert np.abs(np.ptp(found.corners, axis=0)[[0, 2]] - [WIDTH, HEIGHT]).max() < 6e-3
+
+
+def test_what_looks_nowhere_forwards_has_no_front() -> None:
+    assert find_front(*box_mesh(np.zeros(3), np.array([1.0, 1e-4, 1.0]))) is not None
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    assert find_front(vertices, np.array([[0, 1, 2]])) is None
