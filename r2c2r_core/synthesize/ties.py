@@ -1,32 +1,32 @@
-"""Lines that the fronts of a run share: their tops, their bottoms, and the seams between them.
+"""What the fronts of a run share: their plane, their tops and bottoms, and the seams between them.
 
 A seam measured from both sides is known better than either edge: n + 1 seams instead of 2 n edges take the width error
-from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring can be wrong by is corrected.
+from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring can be wrong by is tied.
 """
 
-from collections.abc import Sequence
-
-import numpy as np
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.edits import trimmed
 from r2c2r_core.synthesize.fixtures.spec import FRONT_GAP_M
-from r2c2r_core.synthesize.runs import built_in, weight, weighted_median
+from r2c2r_core.synthesize.runs import built_in
+from r2c2r_core.synthesize.solve import Face, Tie
 
 _LINE_M = 0.02  # tops within this of each other are one line
 _SEAM_M = (-0.010, 0.011)  # edges that overlap or stand apart by this much are one seam; real gaps are 2-4 mm
 _COPLANAR_M = 0.002
 
 
-def share_lines(objects: Sequence[MeasuredObject]) -> tuple[MeasuredObject, ...]:
-    """Fronts of one plane with common tops and bottoms, and one gap at each seam."""
-    items = list(objects)
+def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
+    """Every plane, line and seam that built-in fronts share; `items` are aligned in runs already."""
+    ties: list[Tie] = []
     for plane in _coplanar(items):
+        ties += [Tie(first=Face(a, 1, -1.0), second=Face(b, 1, -1.0)) for a, b in pairwise(plane)]
         for sign in (1.0, -1.0):
-            _level(items, plane, sign)
+            ties += _levels(items, plane, sign)
         for axis in (0, 2):
-            _close_seams(items, plane, axis)
-    return tuple(items)
+            ties += _seams(items, plane, axis)
+    return ties
 
 
 def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
@@ -48,31 +48,24 @@ def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
     return float(a.outward @ b.outward) > 1 - 1e-6 and abs(apart) < _COPLANAR_M
 
 
-def _level(items: list[MeasuredObject], plane: Sequence[int], sign: float) -> None:
-    """Tops (+1) or bottoms (-1) within 2 cm of each other put on one line."""
+def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) -> Iterator[Tie]:
+    """Tops (+1) or bottoms (-1) within 2 cm of each other are on one line."""
     left = sorted(plane, key=lambda i: _edge(items[i], 2, sign))
     while left:
         first = _edge(items[left[0]], 2, sign)
         line = [i for i in left if _edge(items[i], 2, sign) - first <= _LINE_M]
         left = left[len(line) :]
-        heights, weights = (np.array([f(items[i]) for i in line]) for f in (lambda o: _edge(o, 2, sign), weight))
-        target = weighted_median(heights, weights)
-        for i in line:
-            items[i] = _with_edge(items[i], 2, sign, target)
+        yield from (Tie(first=Face(a, 2, sign), second=Face(b, 2, sign)) for a, b in pairwise(line))
 
 
-def _close_seams(items: list[MeasuredObject], plane: Sequence[int], axis: int) -> None:
-    """One gap of 3 mm where the edges of two neighbours nearly meet; each edge takes part in one seam."""
+def _seams(items: Sequence[MeasuredObject], plane: Sequence[int], axis: int) -> Iterator[Tie]:
+    """One gap of 3 mm where the edges of two neighbours nearly meet."""
     across = 2 if axis == 0 else 0
     for i in plane:
         for j in plane:
-            a, b = items[i], items[j]
-            gap = _edge(b, axis, -1.0) - _edge(a, axis, 1.0)
-            if i == j or not _SEAM_M[0] < gap < _SEAM_M[1] or not _beside(a, b, across):
-                continue
-            middle = (_edge(b, axis, -1.0) + _edge(a, axis, 1.0)) / 2
-            items[i] = _with_edge(a, axis, 1.0, middle - FRONT_GAP_M / 2)
-            items[j] = _with_edge(b, axis, -1.0, middle + FRONT_GAP_M / 2)
+            gap = _edge(items[j], axis, -1.0) - _edge(items[i], axis, 1.0)
+            if i != j and _SEAM_M[0] < gap < _SEAM_M[1] and _beside(items[i], items[j], across):
+                yield Tie(first=Face(i, axis, 1.0), second=Face(j, axis, -1.0), gap_m=FRONT_GAP_M)
 
 
 def _beside(a: MeasuredObject, b: MeasuredObject, across: int) -> bool:
@@ -86,8 +79,3 @@ def _edge(item: MeasuredObject, axis: int, sign: float) -> float:
     return float(
         item.world_from_object.translation @ item.world_from_object.rotation[:, axis] + sign * item.dimensions_m[axis] / 2
     )
-
-
-def _with_edge(item: MeasuredObject, axis: int, sign: float, position: float) -> MeasuredObject:
-    """The object with one face moved to `position`, the opposite one left where it is."""
-    return trimmed(item, axis, sign, sign * (_edge(item, axis, sign) - position))

@@ -1,0 +1,37 @@
+"""The smallest change that satisfies linear constraints."""
+
+import numpy as np
+
+
+def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """The shortest y with `equal @ y = equal_to` and `at_least @ y >= bound` (n unknowns; (k, n), (k,), (m, n), (m,)).
+
+    Least distance programming by non-negative least squares (Lawson & Hanson 1974, ch. 23), in the null space of the
+    equalities; where these contradict each other they hold in least squares. Raises ValueError when the bounds leave nothing.
+    """
+    from scipy.optimize import nnls
+
+    shortest, free = _solved(equal, equal_to)
+    rows, needed = at_least @ free, bound - at_least @ shortest
+    used = np.abs(rows).max(axis=1, initial=0.0) > 1e-12
+    if (needed[~used] > 1e-9).any():
+        raise ValueError("a bound that nothing can meet")
+    rows, needed = rows[used], needed[used]
+    if not (needed > 0).any():
+        return shortest
+    stacked = np.vstack([rows.T, needed])
+    target = np.append(np.zeros(rows.shape[1]), 1.0)
+    multipliers, length = nnls(stacked, target, maxiter=30 * stacked.shape[1])
+    if length < 1e-9:
+        raise ValueError("bounds that contradict each other")
+    residual = stacked @ multipliers - target
+    return np.asarray(shortest - free @ (residual[:-1] / residual[-1]))
+
+
+def _solved(equal: np.ndarray, equal_to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The shortest solution of equalities, and an orthonormal basis (n, f) of what they leave free."""
+    if len(equal) == 0:
+        return np.zeros(equal.shape[1]), np.eye(equal.shape[1])
+    u, scales, vt = np.linalg.svd(equal)
+    rank = int((scales > 1e-9 * scales[0]).sum())
+    return vt[:rank].T @ ((u[:, :rank].T @ equal_to) / scales[:rank]), vt[rank:].T

@@ -1,0 +1,193 @@
+"""The layout as one small optimisation: the least change of all faces together that meets what furniture must.
+
+Unknowns are the six faces of every object along its own axes; each counts in units of what measuring it can be wrong by.
+Hard: faces that are one line, plane or seam (ties), what a person fixed, how much a size may change; overlapping pairs keep
+their gap along the axis on which that is cheapest, to a tenth of a millimetre.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.least_change import least_change
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.synthesize.dimensions import MeasuredObject
+
+_EDGE_M = {True: 0.005, False: 0.012}  # of a front's edges: measured over all frames, or on the mesh alone
+_PLANE_M = 0.003
+_UNSEEN_M = 0.15  # of a back that nobody saw
+_APPLIANCE_M, _THING_M = 0.05, 0.15  # of where it stands: what was put there gives way, furniture that is built in does not
+_APPLIANCE_TRIM_M = 0.004  # it moves rather than shrinks
+_TRIM_M, _TRIM_SHARE = 0.012, 0.025  # how much a size may change: an edge is measured to about 8 mm (backends.md 2.9)
+_LEAST_DEPTH_SHARE = 0.6  # of an unseen depth that must remain
+_FIXED_M = 1e-6
+_SOFT_M = 1e-5  # what a bound may give where it must
+_SPARE_M = 1e-4
+
+
+class Face(NamedTuple):
+    """A face of an object: its index, the axis of its own frame, and the side on it (-1, +1)."""
+
+    item: int
+    axis: int
+    sign: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tie:
+    """Two faces of equally turned objects that are one line: the second lies `gap_m` beyond the first, along the axis."""
+
+    first: Face
+    second: Face
+    gap_m: float = 0.0
+
+
+def solved(
+    measured: Sequence[MeasuredObject], ties: Sequence[Tie], apart: Sequence[tuple[int, int]], gap_m: float
+) -> list[MeasuredObject]:
+    """The objects after the least change that keeps `ties`, and leaves a gap between the pairs that must stand apart."""
+    items = list(measured)
+    for group in _groups(len(items), [*((t.first.item, t.second.item) for t in ties), *apart]):
+        place = {item: k for k, item in enumerate(group)}
+        own_ties = [_renumbered(tie, place) for tie in ties if tie.first.item in place]
+        own_pairs = [(place[a], place[b]) for a, b in apart if a in place]
+        for item, found in zip(group, _solved([items[k] for k in group], own_ties, own_pairs, gap_m), strict=True):
+            items[item] = found
+    return items
+
+
+def _solved(
+    items: Sequence[MeasuredObject], ties: Sequence[Tie], apart: Sequence[tuple[int, int]], gap_m: float
+) -> list[MeasuredObject]:
+    """The same for objects that hang together."""
+    sigma = np.concatenate([_sigmas(item) for item in items])
+    faces = np.concatenate([_faces(item) for item in items])
+    equal, equal_to = np.zeros((len(ties), len(sigma))), np.zeros(len(ties))
+    for row, tie in enumerate(ties):
+        first, second = _column(tie.first), _column(tie.second)
+        equal[row, second], equal[row, first] = 1.0, -1.0
+        equal_to[row] = tie.gap_m - (faces[second] - faces[first])
+    bounds = [bound for index, item in enumerate(items) for bound in _size_bounds(index, item, len(sigma))]
+    bounds += [_separation(items, pair, faces, sigma, gap_m) for pair in apart]
+    rows, needed = np.array([row for row, _ in bounds]), np.array([least for _, least in bounds])
+    slack = np.eye(len(rows)) * _SOFT_M
+    no_slack = np.zeros((len(ties), len(rows)))
+    y = least_change(np.hstack([equal * sigma, no_slack]), equal_to, np.hstack([rows * sigma, slack]), needed)
+    changed = faces + sigma * y[: len(sigma)]
+    return [item if item.fixed_by_person else _with_faces(item, changed[6 * k : 6 * k + 6]) for k, item in enumerate(items)]
+
+
+def _groups(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Objects that ties or overlaps connect; what stands alone is left out."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    if not links:
+        return []
+    first, second = np.array(links).T
+    _, label = connected_components(coo_array((np.ones(len(links)), (first, second)), shape=(count, count)), directed=False)
+    groups = [np.flatnonzero(label == number).tolist() for number in np.unique(label)]
+    return [group for group in groups if len(group) > 1]
+
+
+def _renumbered(tie: Tie, place: Mapping[int, int]) -> Tie:
+    first, second = (face._replace(item=place[face.item]) for face in (tie.first, tie.second))
+    return Tie(first=first, second=second, gap_m=tie.gap_m)
+
+
+def _faces(item: MeasuredObject) -> np.ndarray:
+    """Low and high face along each own axis: (x-, x+, y-, y+, z-, z+), metres from the world's origin."""
+    centre = item.world_from_object.rotation.T @ item.world_from_object.translation
+    return np.column_stack([centre - item.dimensions_m / 2, centre + item.dimensions_m / 2]).ravel()
+
+
+def _with_faces(item: MeasuredObject, faces: np.ndarray) -> MeasuredObject:
+    low, high = faces[0::2], faces[1::2]
+    rotation = item.world_from_object.rotation
+    return replace(item, dimensions_m=high - low, world_from_object=Rigid3(rotation, rotation @ ((low + high) / 2)))
+
+
+def _sigmas(item: MeasuredObject) -> np.ndarray:
+    """What measuring each face can be wrong by, one sigma."""
+    if item.fixed_by_person:
+        return np.full(6, _FIXED_M)
+    if item.spec.opening == "rigid":
+        return np.full(6, _THING_M)
+    if item.spec.stands:
+        return np.full(6, _APPLIANCE_M)
+    edge = _EDGE_M[item.front_measured]
+    back = _UNSEEN_M if _unseen_back(item) else edge
+    return np.array([edge, edge, _PLANE_M, back, edge, edge])
+
+
+def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[np.ndarray, float]]:
+    """Rows and bounds that keep each size near what was measured; an unseen depth may shrink, and nothing unseen grows."""
+    bounds = []
+    for axis in range(3):
+        row = np.zeros(unknowns)
+        row[6 * index + 2 * axis + 1], row[6 * index + 2 * axis] = 1.0, -1.0
+        bounds += [(row, -_shrink(item, axis)), (-row, -_trim(item, axis))]
+    return bounds
+
+
+def _trim(item: MeasuredObject, axis: int) -> float:
+    """How much a measured size may be wrong by."""
+    if item.spec.opening == "rigid" or item.fixed_by_person:
+        return 0.0
+    return min(_APPLIANCE_TRIM_M if item.spec.stands else _TRIM_M, _TRIM_SHARE * float(item.dimensions_m[axis]))
+
+
+def _shrink(item: MeasuredObject, axis: int) -> float:
+    """How much a size may be given up."""
+    size = float(item.dimensions_m[axis])
+    if axis == 1 and _unseen_back(item):
+        return max(size - max(_LEAST_DEPTH_SHARE * size, min(item.spec.depth_range_m[0], size)), _trim(item, axis))
+    return _trim(item, axis)
+
+
+def _unseen_back(item: MeasuredObject) -> bool:
+    return item.sources[1] in ("inferred", "default") and item.spec.opening != "rigid" and not item.fixed_by_person
+
+
+def _separation(
+    items: Sequence[MeasuredObject], pair: tuple[int, int], faces: np.ndarray, sigma: np.ndarray, gap_m: float
+) -> tuple[np.ndarray, float]:
+    """The row that keeps two objects apart along the direction in which that changes least of what is known."""
+    first, second = pair
+    options = []
+    for a, b in ((first, second), (second, first)):
+        for axis in range(3):
+            direction = items[a].world_from_object.rotation[:, axis]
+            towards = items[b].world_from_object.translation - items[a].world_from_object.translation
+            outwards = direction if float(direction @ towards) >= 0 else -direction
+            row = _reach(a, items[a], outwards, len(faces)) + _reach(b, items[b], -outwards, len(faces))
+            overlap = float(row @ faces) + gap_m + _SPARE_M
+            options.append((_cost(items, row, overlap, sigma), -row, overlap))
+    _, row, overlap = min(options, key=lambda option: option[0])
+    return row, overlap
+
+
+def _cost(items: Sequence[MeasuredObject], row: np.ndarray, overlap_m: float, sigma: np.ndarray) -> float:
+    """How many sigmas it takes to clear an overlap: unseen backs give way first, but only so far."""
+    backs = 6 * np.arange(len(items)) + 3
+    spare = np.array([_shrink(item, 1) if _unseen_back(item) else 0.0 for item in items])
+    beyond = max(overlap_m - float(np.abs(row[backs]) @ spare), 0.0)
+    firm = sigma.copy()
+    firm[backs] = np.minimum(firm[backs], _EDGE_M[False])
+    return overlap_m / float(np.linalg.norm(row * sigma)) + beyond / float(np.linalg.norm(row * firm))
+
+
+def _reach(index: int, item: MeasuredObject, direction: Vector3, unknowns: int) -> np.ndarray:
+    """The row that gives how far an object reaches along a world direction: the support of its box, linear in its faces."""
+    row = np.zeros(unknowns)
+    along = item.world_from_object.rotation.T @ direction
+    for axis in range(3):
+        row[6 * index + 2 * axis + int(along[axis] > 0)] = along[axis]
+    return row
+
+
+def _column(face: Face) -> int:
+    return 6 * face.item + 2 * face.axis + int(face.sign > 0)

@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.least_change import least_change
+
+NONE = np.zeros((0, 2)), np.zeros(0)
+
+
+def test_nothing_changes_where_nothing_is_asked() -> None:
+    np.testing.assert_array_equal(least_change(*NONE, np.array([[1.0, 0.0]]), np.array([-1.0])), [0, 0])
+
+
+def test_the_nearest_point_of_a_half_plane_is_its_foot() -> None:
+    np.testing.assert_allclose(least_change(*NONE, np.array([[3.0, 4.0]]), np.array([10.0])), [1.2, 1.6], atol=1e-12)
+
+
+def test_an_equality_and_a_bound_hold_together() -> None:
+    y = least_change(np.array([[1.0, -1.0]]), np.array([1.0]), np.array([[0.0, 1.0]]), np.array([2.0]))
+    np.testing.assert_allclose(y, [3, 2], atol=1e-9)
+
+
+def test_no_feasible_point_is_nearer() -> None:
+    """Against a slow reference: the conditions of Karush, Kuhn and Tucker on random problems."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        equal, rows = rng.normal(size=(2, 8)), rng.normal(size=(12, 8))
+        inside = rng.normal(size=8)
+        equal_to, bound = equal @ inside, rows @ inside - rng.uniform(0, 1, 12)
+        y = least_change(equal, equal_to, rows, bound)
+        assert (rows @ y >= bound - 1e-9).all()
+        np.testing.assert_allclose(equal @ y, equal_to, atol=1e-9)
+        for _ in range(200):  # towards any other feasible point the distance grows
+            other = inside + rng.normal(size=8) * 0.3
+            other -= equal.T @ np.linalg.solve(equal @ equal.T, equal @ other - equal_to)
+            if (rows @ other >= bound).all():
+                assert y @ (other - y) >= -1e-9
+
+
+def test_bounds_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(ValueError, match="contradict"):
+        least_change(*NONE, np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0]))
