@@ -104,18 +104,24 @@ def settle(
     if len(points) < 30 or not hypotheses:
         return hypotheses[:keep]
     sample = points[np.linspace(0, len(points) - 1, min(160, len(points))).astype(np.int64)]
+    which = np.arange(len(hypotheses))
     scales = np.array([h.pose.scale for h in hypotheses])
     rotations = np.stack([h.pose.rotation for h in hypotheses])
     shifts = np.stack([h.pose.translation for h in hypotheses])
     first_scales, gate = scales.copy(), 0.12 * observation.size_m
-    distance = np.zeros((len(scales), len(sample)))
     for step in range(6):
-        local = np.einsum("kji,knj->kni", rotations, sample[None] - shifts[:, None]) / scales[:, None, None]
+        local = ((sample - shifts[:, None]) @ rotations) / scales[:, None, None]
         raw, nearest = shape.tree.query(local.reshape(-1, 3))
-        distance = raw.reshape(distance.shape) * scales[:, None]
+        distance = raw.reshape(local.shape[:2]) * scales[:, None]
+        cost = np.minimum(distance / (0.1 * observation.size_m), 1.0).mean(axis=1)
         if step == 5:
             break
         matched = shape.points[nearest].reshape(local.shape)
+        if step == 2:  # the far ones of hundreds need no finish
+            few = np.sort(np.argsort(cost, kind="stable")[: 6 * keep])
+            which, scales, rotations, shifts, first_scales, distance, matched = (
+                values[few] for values in (which, scales, rotations, shifts, first_scales, distance, matched)
+            )
         weight = 1.0 / (1.0 + (distance / gate) ** 2) ** 2
         target = np.broadcast_to(sample[None], matched.shape)
         scales, rotations, shifts = umeyama_batch(matched, target, weight)
@@ -124,7 +130,6 @@ def settle(
         turned = np.einsum("kij,kj->ki", rotations, centre)
         shifts = shifts + (scales - bounded)[:, None] * turned
         scales, gate = bounded, max(0.7 * gate, 0.02 * observation.size_m)
-    cost = np.minimum(distance / (0.1 * observation.size_m), 1.0).mean(axis=1)
     if outlines:
         cost = cost + _outline_misfit(shape, scales, rotations, shifts, observation.views)
     order = np.argsort(cost, kind="stable")
@@ -134,7 +139,9 @@ def settle(
             break
         if all(not _same(scales, rotations, int(k), j) for j in kept):
             kept.append(int(k))
-    return [Hypothesis(Similarity3(float(scales[k]), rotations[k], shifts[k]), hypotheses[k].up_mesh, "box") for k in kept]
+    return [
+        Hypothesis(Similarity3(float(scales[k]), rotations[k], shifts[k]), hypotheses[which[k]].up_mesh, "box") for k in kept
+    ]
 
 
 def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple[View, ...]) -> list[Hypothesis]:

@@ -15,7 +15,9 @@ class Lifted(NamedTuple):
     frame_index: int
     points_mesh: Points
     points_world: Points
-    noise_m: np.ndarray  # of the world point, from its depth
+    noise_m: np.ndarray  # of the world point along its ray, from its depth
+    rays: Points  # unit, from the camera to the world point
+    pixel_m: np.ndarray  # width of one pixel of the photo at the world point
 
 
 def depth_at(uv_px: Pixels, depth_m: DepthMetres) -> np.ndarray:

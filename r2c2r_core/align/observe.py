@@ -31,6 +31,7 @@ class View:
     depth_m: DepthMetres  # z-depth of this camera, 0 unknown
     depth_px: float  # width of one depth pixel, in pixels of this view
     signed_px: np.ndarray  # (h, w) float32, distance to the mask's outline, negative inside
+    outwards: np.ndarray  # (h, w, 2) float32, unit direction away from the mask; 0 where the outline is as near on both sides
     trusted: Mask  # the nearest outline pixel is the object's own edge, not an occluder's or the photo's
 
 
@@ -99,6 +100,7 @@ def depth_noise(depth_m: np.ndarray) -> np.ndarray:
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:
     """Up to `count` frames with large, whole, sharp masks, spread over the directions the object is seen from."""
     known = [f for f in capture.frames if f.index in track.masks]
+    known = [f for f in known if f.index not in track.opened_m] or known  # drawn out, it stands elsewhere
     largest = max((track.masks[f.index].area_px for f in known), default=0)
     known = [f for f in known if track.masks[f.index].area_px >= max(48.0, 0.08 * largest)]
     if not known:
@@ -204,6 +206,7 @@ def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vect
         depth_m=depth,
         depth_px=camera.fx / frame.depth_camera.fx,
         signed_px=signed,
+        outwards=outward_direction(signed),
         trusted=trusted,
     )
 
@@ -228,6 +231,15 @@ def outline(mask: Mask, inside: Mask, depth_m: DepthMetres) -> tuple[np.ndarray,
     bad_rim = rim & ndimage.binary_dilation(blocked, iterations=3)
     _, nearest_rim = ndimage.distance_transform_edt(~rim, return_indices=True)
     return signed, ~bad_rim[tuple(nearest_rim)]
+
+
+def outward_direction(signed_px: np.ndarray) -> np.ndarray:
+    """Unit direction (h, w, 2) in which a smoothed signed distance grows; 0 where it hardly does."""
+    smooth = cv2.GaussianBlur(signed_px, (0, 0), 1.0, borderType=cv2.BORDER_REFLECT)
+    slope_v, slope_u = np.gradient(smooth)
+    slope = np.stack([slope_u, slope_v], axis=-1)
+    length = np.linalg.norm(slope, axis=-1, keepdims=True)
+    return np.where(length > 0.3, slope / np.maximum(length, 1e-6), 0.0).astype(np.float32)
 
 
 def _aim(frame: Frame, track: MaskTrack, mask: Mask, centre_world: Vector3, size_px: int) -> tuple[Intrinsics, Rigid3]:

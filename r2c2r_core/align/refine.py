@@ -1,21 +1,25 @@
-"""Fine registration: observed points onto the model, silhouettes onto the masks, uprightness (mends paper eq. 7 and its ICP).
+"""Fine registration: observed points onto the model, outlines onto masks, keypoints onto rays, uprightness (paper eq. 7, ICP).
 
 Closest points alone let a flat front slide in its plane, so mask outlines (and the measured panel's edges) hold it there.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import cv2
 import numpy as np
-from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.align.judge import behind_face, face_depth, render_pose
+from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation, View
 from r2c2r_core.align.shape import Shape
 from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import FrontPanel, MaskTrack
+
+_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,6 +45,7 @@ def refine(
     shape: Shape,
     observation: Observation,
     anchors: Anchors,
+    lifted: Sequence[Lifted],
     *,
     free_scale: bool,
     iterations: int,
@@ -49,16 +54,21 @@ def refine(
     """Damped Gauss-Newton over turn, shift and (when free) scale; gates shrink from `loose` (a share of the size) on."""
     gate = loose * observation.size_m
     for _ in range(iterations):
-        pivot = _pivot(pose, shape)
-        rows = [
-            point_rows(pose, shape, observation, pivot, gate),
-            outline_rows(pose, shape, observation.views, anchors.front, pivot, gate),
-            anchor_rows(pose, shape, anchors, pivot),
-        ]
+        rows = _all_rows(pose, shape, observation, anchors, lifted, gate)
         step = _solve(rows, observation.size_m, free_scale)
-        pose = _moved(pose, step, pivot)
+        pose = moved(pose, step, pivot_of(pose, shape))
         gate = max(0.75 * gate, 0.012 * observation.size_m, 0.006)
     return pose
+
+
+def loosest_motion(
+    pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
+) -> tuple[np.ndarray, float]:
+    """The step (7,) of turn and shift that all the evidence together holds least, of a metre at the rim, and its spread (m)."""
+    normal, _ = _normal_equations(_all_rows(pose, shape, observation, anchors, lifted, max(0.012 * observation.size_m, 0.006)))
+    unit = _rim_unit(observation.size_m)[:6]
+    values, vectors = np.linalg.eigh(normal[:6, :6] * np.outer(unit, unit))
+    return np.append(unit * vectors[:, 0], 0.0), float(1.0 / np.sqrt(max(values[0], 1e-12)))
 
 
 def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anchors:
@@ -106,6 +116,33 @@ def outline_rows(
     return joined._replace(weight=joined.weight * min(200.0 / total, 1.0))
 
 
+def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, gate: float) -> Rows:
+    """Each keypoint's spot on the mesh to the ray it was seen along: what is painted holds where shape and outline do not.
+
+    Only across the ray, where a pixel is finer than depth; the depth there is among the observed points already.
+    """
+    matched = [m for m in lifted if len(m.points_mesh)]
+    if not matched:
+        return _no_rows()
+    placed = pose.apply(np.concatenate([m.points_mesh for m in matched]))
+    rays, pixel_m = np.concatenate([m.rays for m in matched]), np.concatenate([m.pixel_m for m in matched])
+    apart = placed - np.concatenate([m.points_world for m in matched])
+    along = np.einsum("nj,nj->n", apart, rays)
+    across = np.linalg.norm(apart - along[:, None] * rays, axis=1)
+    near = np.abs(along) < 3.0 * np.concatenate([m.noise_m for m in matched]) + gate
+    weight = near / (1.0 + (across / gate) ** 2) ** 2 / (1.5 * pixel_m + 0.001) ** 2
+    weight *= min(1.0, 150.0 / max(int(np.count_nonzero(near & (across < gate))), 1))
+    helper = np.where(np.abs(rays[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(rays, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    sides = (first, np.cross(rays, first))
+    return Rows(
+        np.concatenate([_jacobian(placed - pivot, side) for side in sides]),
+        np.concatenate([np.einsum("nj,nj->n", apart, side) for side in sides]),
+        np.tile(weight, 2),
+    )
+
+
 def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector3) -> Rows:
     """Uprightness, the measured panel's edges and direction, and the height of what the thing stands on."""
     rows: list[tuple[np.ndarray, float, float]] = []
@@ -129,7 +166,7 @@ def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector
 
 def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
     """Largest over smallest eigenvalue of the points' normal matrix in turn and shift: large = the surface slides."""
-    rows = point_rows(pose, shape, observation, _pivot(pose, shape), 0.05 * observation.size_m)
+    rows = point_rows(pose, shape, observation, pivot_of(pose, shape), 0.05 * observation.size_m)
     if len(rows.residual) < 6:
         return 1e9
     scaled = rows.jacobian[:, :6] / np.array([0.5 * observation.size_m] * 3 + [1.0] * 3)
@@ -156,30 +193,28 @@ def _spacing(shape: Shape) -> float:
 def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: View, pivot: Vector3, gate: float) -> Rows:
     """Silhouette residuals of one view."""
     rendered = render_pose(shape, vertices, behind, view)
-    rim = rendered.own & ~ndimage.binary_erosion(rendered.own, border_value=1)
-    beside_hidden = ndimage.binary_dilation(rendered.hidden | _nearer(view, rendered.depth_m), iterations=2)
+    own = rendered.own.astype(np.uint8)
+    rim = rendered.own & (cv2.erode(own, _CROSS) == 0)
+    beside_hidden = cv2.dilate((rendered.hidden | _nearer(view, rendered.depth_m)).astype(np.uint8), _CROSS, iterations=2) > 0
     rows, columns = np.nonzero(rim & view.trusted & view.inside & ~beside_hidden)
     if len(rows) < 4:
         return _no_rows()
     depth = rendered.depth_m[rows, columns].astype(np.float64)
     metres_per_px = depth / view.camera.fx
     residual = (view.signed_px[rows, columns] + 0.5) * metres_per_px
-    smooth = ndimage.gaussian_filter(view.signed_px, 1.0)
-    slope_v, slope_u = np.gradient(smooth)
-    g = np.stack([slope_u[rows, columns], slope_v[rows, columns]], axis=1)
-    length = np.linalg.norm(g, axis=1)
-    usable = length > 0.3
+    g = view.outwards[rows, columns].astype(np.float64)
+    usable = g.any(axis=1)
     x = (columns + 0.5 - view.camera.cx) / view.camera.fx
     y = (rows + 0.5 - view.camera.cy) / view.camera.fy
     points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
-    direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1) / np.maximum(length, 1e-6)[:, None]
+    direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
     weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
     return Rows(_jacobian(points - pivot, view.world_from_camera.turn(direction)), residual, weight)
 
 
 def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
     """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
-    grown = ndimage.maximum_filter(rendered_depth, size=5)
+    grown = cv2.dilate(rendered_depth, np.ones((5, 5), np.uint8))
     return np.asarray(
         (rendered_depth == 0) & (grown > 0) & ~view.mask & (view.depth_m > 0) & (view.depth_m < grown - 0.04 - 0.02 * grown)
     )
@@ -232,14 +267,39 @@ def _no_rows() -> Rows:
     return Rows(np.zeros((0, 7)), np.zeros(0), np.zeros(0))
 
 
-def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
-    """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
+def _all_rows(
+    pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted], gate: float
+) -> list[Rows]:
+    """Every kind of evidence at a pose."""
+    pivot = pivot_of(pose, shape)
+    return [
+        point_rows(pose, shape, observation, pivot, gate),
+        outline_rows(pose, shape, observation.views, anchors.front, pivot, gate),
+        keypoint_rows(pose, lifted, pivot, gate),
+        anchor_rows(pose, shape, anchors, pivot),
+    ]
+
+
+def _normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted normal matrix (7, 7) and right side (7,)."""
     normal, right = np.zeros((7, 7)), np.zeros(7)
     for part in rows:
         weighted = part.jacobian * part.weight[:, None]
         normal += weighted.T @ part.jacobian
         right -= weighted.T @ part.residual
-    unit = np.array([2.0 / max(size_m, 1e-3)] * 3 + [1.0] * 3 + [2.0 / max(size_m, 1e-3)])  # a metre at the rim
+    return normal, right
+
+
+def _rim_unit(size_m: float) -> np.ndarray:
+    """Turn, shift and log scale (7,) that move the object's rim by a metre each."""
+    reach = 2.0 / max(size_m, 1e-3)
+    return np.array([reach] * 3 + [1.0] * 3 + [reach])
+
+
+def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
+    """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
+    normal, right = _normal_equations(rows)
+    unit = _rim_unit(size_m)
     scaled = normal * np.outer(unit, unit)
     # One observation of half a size stops directions that nothing holds.
     scaled += np.eye(7) * (1e-6 * np.trace(scaled) / 7 + 4.0 / max(size_m, 1e-3) ** 2)
@@ -252,14 +312,14 @@ def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
     return np.asarray(step / max(1.0, float((np.abs(step) / limits).max())))
 
 
-def _moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
-    """The pose after a step about the pivot."""
+def moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
+    """The pose after a step of turn (rad), shift (m) and log scale about the pivot."""
     turn: Matrix3 = Rotation.from_rotvec(step[:3]).as_matrix()
     grow = float(np.exp(step[6]))
     translation = grow * turn @ (pose.translation - pivot) + pivot + step[3:6]
     return Similarity3(pose.scale * grow, turn @ pose.rotation, translation)
 
 
-def _pivot(pose: Similarity3, shape: Shape) -> Vector3:
+def pivot_of(pose: Similarity3, shape: Shape) -> Vector3:
     """The middle of the placed mesh."""
     return np.asarray(pose.apply(((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2)[None])[0])

@@ -15,9 +15,10 @@ from r2c2r_core.align.judge import Judgement, judge
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation, View, known_corners, look_at, observe
 from r2c2r_core.align.protocol import MATCHERS, Matcher
-from r2c2r_core.align.refine import anchors_for, point_condition, refine, surface_distance
+from r2c2r_core.align.refine import anchors_for, loosest_motion, point_condition, refine, surface_distance
 from r2c2r_core.align.render import render_views
 from r2c2r_core.align.shape import Shape, prepare_shape
+from r2c2r_core.align.sweep import sweep_loosest
 from r2c2r_core.align.voting import Votes, inliers_of, match_views, vote
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
@@ -78,13 +79,13 @@ def place_mesh(
     boxes = box_hypotheses(shape, observation, track, capture.room.manhattan_yaw_rad)
     proposals = settle(boxes, shape, observation, config.settled, outlines=track.kind != "front")
     proposals += [Hypothesis(pose, _upright_axis(shape, pose), "features") for pose in votes.hypotheses]
-    trials = _try(proposals, shape, observation, track, scale_range, config, progress.part(0.55, 0.95))
+    trials = _try(proposals, shape, observation, track, lifted, scale_range, config, progress.part(0.55, 0.95))
     if not trials:
         raise PlacementFailed(
             f"{asset.object_name}: no pose of {asset.candidate_id} fits the visible size",
             hint="choose another candidate, or check the mask",
         )
-    best = _finish(trials[0], shape, observation, track)
+    best = _finish(trials[0], shape, observation, track, lifted)
     if best.judgement.iou < config.least_iou:
         raise PlacementFailed(
             f"{asset.object_name}: the best pose of {asset.candidate_id} covers the mask with IoU {best.judgement.iou:.2f}, "
@@ -148,6 +149,7 @@ def _try(
     shape: Shape,
     observation: Observation,
     track: MaskTrack,
+    lifted: list[Lifted],
     scale_range: tuple[float, float],
     config: AlignConfig,
     progress: Progress,
@@ -165,7 +167,7 @@ def _try(
     for k, trial in enumerate(_different(rough, 10.0)[: config.refined]):
         progress.at(0.5 + 0.5 * k / config.refined, f"{track.name}: refining pose {k + 1}")
         anchors = anchors_for(track, shape, trial.hypothesis.up_mesh)
-        pose = refine(trial.hypothesis.pose, shape, observation, anchors, free_scale=True, iterations=8, loose=0.06)
+        pose = refine(trial.hypothesis.pose, shape, observation, anchors, lifted, free_scale=True, iterations=8, loose=0.06)
         if scale_range[0] <= pose.scale <= scale_range[1]:
             trials.append(
                 Trial(hypothesis=trial.hypothesis._replace(pose=pose), judgement=judge(pose, shape, observation.views, front))
@@ -185,11 +187,12 @@ def _different(trials: list[Trial], angle_deg: float) -> list[Trial]:
     return kept
 
 
-def _finish(trial: Trial, shape: Shape, observation: Observation, track: MaskTrack) -> Trial:
-    """Joint refit with scale free, then closest points with scale frozen."""
+def _finish(trial: Trial, shape: Shape, observation: Observation, track: MaskTrack, lifted: list[Lifted]) -> Trial:
+    """Joint refit with scale free, closest points with scale frozen, and colours for what is still loose."""
     anchors = anchors_for(track, shape, trial.hypothesis.up_mesh)
-    pose = refine(trial.hypothesis.pose, shape, observation, anchors, free_scale=True, iterations=10, loose=0.02)
-    pose = refine(pose, shape, observation, anchors, free_scale=False, iterations=4, loose=0.012)
+    pose = refine(trial.hypothesis.pose, shape, observation, anchors, lifted, free_scale=True, iterations=10, loose=0.02)
+    pose = refine(pose, shape, observation, anchors, lifted, free_scale=False, iterations=4, loose=0.012)
+    pose = sweep_loosest(pose, shape, observation, anchors, lifted)
     judgement = judge(pose, shape, observation.views, anchors.front)
     if judgement.score < trial.judgement.score - 0.01:
         return trial
@@ -212,6 +215,7 @@ def _placement(
     rival = _rival(best, trials, shape)
     rms = _rms(pose, shape, observation)
     matched = _matched(lifted, pose, shape)
+    anchors = anchors_for(track, shape, best.hypothesis.up_mesh)
     placement = Placement(
         object_name=asset.object_name,
         candidate_id=asset.candidate_id,
@@ -226,6 +230,8 @@ def _placement(
         runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
         method=f"{best.hypothesis.source} + {matcher}",
         warnings=(),
+        spread_m=loosest_motion(pose, shape, observation, anchors, lifted)[1],
+        runner_up_turn_deg=None if rival is None else _angle_deg(pose, rival.hypothesis.pose),
         matched=matched,
     )
     return replace(placement, warnings=_warnings(placement, best, observation))
@@ -301,7 +307,8 @@ def _warnings(placement: Placement, best: Trial, observation: Observation) -> tu
     if not placement.rms_m <= allowed:
         lines.append(f"scan and mesh are {placement.rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
     if placement.unsure:
-        lines.append("another orientation fits about as well: check which side is the front")
+        turn = f" ({placement.runner_up_turn_deg:.0f} degrees)" if placement.runner_up_turn_deg is not None else ""
+        lines.append(f"another orientation{turn} fits about as well: check which side is the front")
     if placement.condition > 30000:
         lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")
     if len(observation.views) < 3:

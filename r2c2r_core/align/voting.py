@@ -25,28 +25,23 @@ class Votes(NamedTuple):
 
 
 def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rng: np.random.Generator) -> Votes:
-    """One hypothesis a frame, each judged on the matches of all frames and refitted on them with scale free.
+    """A hypothesis of each frame and one of all together, judged on the matches of all and refitted on them with scale free.
 
     `size` is the mesh's diagonal in its own unit. Departs from eq. 2-7: scale, rotation and translation are solved
-    together (errors of a scale fixed first leak into the rest), from three points a sample instead of pair ratios, and
-    frames are summed, where eq. 7 leaves its index.
+    together (errors of a scale fixed first leak into the rest), frames are summed, where eq. 7 leaves its index, and
+    frames too poor to vote alone still count in the joint estimate.
     """
+    by_frame = {m.frame_index: 0 for m in lifted}
     if not sum(len(m.points_mesh) for m in lifted):
-        return Votes((), {m.frame_index: 0 for m in lifted})
+        return Votes((), by_frame)
     mesh = np.concatenate([m.points_mesh for m in lifted])
     world = np.concatenate([m.points_world for m in lifted])
     limit = np.concatenate([3.0 * m.noise_m for m in lifted])
     judged: list[tuple[int, SimilarityFit]] = []
-    by_frame: dict[int, int] = {}
-    for m in lifted:
-        by_frame[m.frame_index] = 0
+    for m in [*lifted, None]:
+        source, target, allowed = (mesh, world, limit) if m is None else (m.points_mesh, m.points_world, 3.0 * m.noise_m)
         own = similarity_consensus(
-            m.points_mesh,
-            m.points_world,
-            threshold=3.0 * m.noise_m,
-            rng=rng,
-            scale_range=scale_range,
-            relative_threshold=_RELATIVE,
+            source, target, threshold=allowed, rng=rng, scale_range=scale_range, relative_threshold=_RELATIVE
         )
         if own is None:
             continue
@@ -55,7 +50,8 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
         if not scale_range[0] <= joint.target_from_source.scale <= scale_range[1]:
             continue
         count = int(np.count_nonzero(inliers_of(joint.target_from_source, mesh, world, limit, size)))
-        by_frame[m.frame_index] = count
+        if m is not None:
+            by_frame[m.frame_index] = count
         judged.append((count, joint))
     judged.sort(key=lambda pair: -pair[0])
     return Votes(tuple(fit.target_from_source for _, fit in judged[:5]), by_frame)
@@ -103,4 +99,13 @@ def _lift_photo(
         mesh_points.append(lifted[hit])
         photo_rows.append(pairs[k].first[hit])
     rows = np.concatenate(photo_rows)
-    return Lifted(photo.frame_index, np.concatenate(mesh_points), points_world[rows], depth_noise(depth[rows]))
+    rays = points_world[rows] - photo.world_from_camera.translation
+    rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)
+    return Lifted(
+        photo.frame_index,
+        np.concatenate(mesh_points),
+        points_world[rows],
+        depth_noise(depth[rows]),
+        rays,
+        depth[rows] / photo.camera.fx,
+    )

@@ -12,9 +12,9 @@ def mutual_pairs(first: np.ndarray, second: np.ndarray, ratio: float) -> tuple[n
     if min(len(first), len(second)) < 2:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     likeness = first @ second.T  # of unit vectors: distance^2 = 2 - 2 * likeness
-    best = likeness.argmax(axis=1)
-    runner_up, top = np.partition(likeness, -2, axis=1)[:, -2:].T
-    rows = np.arange(len(best))
-    clear = (1.0 - top) < ratio**2 * (1.0 - runner_up)
-    chosen = np.flatnonzero(clear & (likeness.argmax(axis=0)[best] == rows))
+    rows, best, back = np.arange(len(first)), likeness.argmax(axis=1), likeness.argmax(axis=0)
+    top = likeness[rows, best]
+    likeness[rows, best] = -np.inf
+    clear = (1.0 - top) < ratio**2 * (1.0 - likeness.max(axis=1))
+    chosen = np.flatnonzero(clear & (back[best] == rows))
     return chosen, best[chosen]

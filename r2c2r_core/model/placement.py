@@ -45,4 +45,6 @@ class Placement:
     runner_up: float | None  # score of the best different hypothesis over the winner's, 0..1
     method: str
     warnings: tuple[str, ...]
+    spread_m: float | None = None  # standard deviation at the rim of the motion all the evidence together holds least
+    runner_up_turn_deg: float | None = None  # by how much the runner-up is turned from the winner
     matched: MatchedPoints = NO_MATCHES

@@ -264,8 +264,8 @@ def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTr
     )
 
 
-def bottle() -> tuple[TexturedMesh, Capture, MaskTrack]:
-    """A plain bottle, 25 cm high."""
+def bottle(*, label: bool = False) -> tuple[TexturedMesh, Capture, MaskTrack]:
+    """A bottle, 25 cm high: plain, or blotched all around, which alone tells its yaw."""
     radius, height = np.array([0.001, 0.035, 0.035, 0.014, 0.014, 0.001]), np.array([0, 0, 0.17, 0.2, 0.25, 0.25])
     angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     vertices = np.stack(
@@ -274,9 +274,10 @@ def bottle() -> tuple[TexturedMesh, Capture, MaskTrack]:
     i, j = (k.ravel() for k in np.meshgrid(np.arange(5) * 32, np.arange(32), indexing="ij"))
     a, b, c, d = i + j, i + (j + 1) % 32, i + 32 + j, i + 32 + (j + 1) % 32
     faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
-    thing = TexturedMesh(
-        vertices=vertices, faces=faces, uv=np.full((len(vertices), 2), 0.5), texture=np.full((8, 8, 3), 120, np.uint8)
-    )
+    around = np.tile(np.arange(32) / 31, 6)
+    uv = np.column_stack([around, np.repeat(height / 0.25, 32)]) if label else np.full((len(vertices), 2), 0.5)
+    texture = blotches(np.random.default_rng(3)) if label else np.full((8, 8, 3), 120, np.uint8)
+    thing = TexturedMesh(vertices=vertices, faces=faces, uv=uv, texture=texture)
     return thing, *film(thing, around=floor(), eyes=ring(8, 0.8, 0.5), target=(0, 0, 0.12))
 
 

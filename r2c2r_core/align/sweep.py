@@ -1,0 +1,44 @@
+"""What neither surface nor outline holds, the colours may: the yaw of a bottle is where its label shows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2c2r_core.align.judge import judge
+from r2c2r_core.align.lift import Lifted
+from r2c2r_core.align.observe import Observation
+from r2c2r_core.align.refine import Anchors, loosest_motion, moved, pivot_of
+from r2c2r_core.align.shape import Shape
+from r2c2r_core.geometry.transforms import Similarity3
+
+_LOOSE = 0.01  # of the size at the rim: half a degree and more is worth a sweep
+_SPANS = (0.075, 0.02)  # of the size at the rim, half widths: 8 degrees, as far as tried turns are apart; 2
+_STEPS = 9
+
+
+def sweep_loosest(
+    pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
+) -> Similarity3:
+    """The pose moved along the one motion the evidence hardly holds, to where masks, depth and colours agree best.
+
+    Unchanged where everything is held, and where no place along the way is better.
+    """
+    motion, spread_m = loosest_motion(pose, shape, observation, anchors, lifted)
+    if spread_m < _LOOSE * observation.size_m:
+        return pose
+    pivot = pivot_of(pose, shape)
+
+    def scores(places: np.ndarray) -> np.ndarray:
+        poses = [moved(pose, float(x) * motion, pivot) for x in places]
+        return np.array([judge(p, shape, observation.views, anchors.front).score for p in poses])
+
+    at = 0.0
+    for span in _SPANS:
+        places = at + np.linspace(-span, span, _STEPS) * observation.size_m
+        found = scores(places)
+        at = float(places[int(np.argmax(found))])
+    bend, slope, _ = np.polyfit(places - at, found, 2)  # single scores are noisy: pixels
+    if bend < 0 and abs(0.5 * slope / bend) < _SPANS[-1] * observation.size_m:
+        at -= float(0.5 * slope / bend)
+    before, after = scores(np.array([0.0, at]))
+    return moved(pose, at * motion, pivot) if after > before else pose
