@@ -188,7 +188,8 @@ class Runner:
         """Take the oldest waiting job; no two threads or servers get the same one."""
         statement = text(
             "UPDATE jobs SET state='running', owner_pid=:pid, attempts=attempts+1, started=COALESCE(started, :now), "
-            "heartbeat=:now, error=NULL WHERE id=(SELECT id FROM jobs WHERE state='queued' ORDER BY id LIMIT 1) RETURNING id"
+            "heartbeat=:now, error=NULL, stage='', stage_fraction=0 "
+            "WHERE id=(SELECT id FROM jobs WHERE state='queued' ORDER BY id LIMIT 1) RETURNING id"
         )
         with writing(self.engine) as session:
             found = session.execute(statement, {"pid": os.getpid(), "now": time.time()}).first()

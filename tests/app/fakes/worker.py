@@ -20,6 +20,19 @@ def say(**message: object) -> None:
     sys.stdout.flush()
 
 
+def work_slowly(workdir: Path, stage: str) -> None:
+    """Take a moment, unless the same was done before; what is stored tells two doings apart."""
+    stored = workdir / "nouns" / stage / "stand-in.noun"
+    key = (workdir / "prompts.json").read_text() + (workdir / "overrides.json").read_text()
+    if stored.is_file() and json.loads(stored.read_text())["key"] == key:
+        return
+    time.sleep(0.3)
+    stored.parent.mkdir(parents=True, exist_ok=True)
+    part = stored.with_suffix(".part")
+    part.write_text(json.dumps({"key": key, "at": time.time_ns()}))
+    part.replace(stored)
+
+
 def main() -> int:
     workdir, stage = Path(sys.argv[1]), sys.argv[3]
     told = workdir.parent / "behave.json"
@@ -36,6 +49,8 @@ def main() -> int:
         sys.stderr.write("Segmentation fault, nearly\n")
         sys.stderr.flush()
         signal.raise_signal(signal.SIGKILL)
+    if behaviour == "slow":
+        work_slowly(workdir, stage)
     if behaviour in ("hang", "deaf"):
         stopped: list[int] = []
         signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number) if behaviour == "hang" else None)
