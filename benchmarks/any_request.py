@@ -115,7 +115,7 @@ def main() -> int:
     """Send, report; 1 when a server error came back."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--examples", type=int, default=100, help="of each operation and mode; a quarter of them without a session"
+        "--examples", type=int, default=100, help="of each operation and mode, and a quarter more without a session"
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
