@@ -5,10 +5,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
 
+from app import schemas
 from app.deps import Ctx
 from app.routes.files import send
 from app.routes.numbers import FrameNumber, RowId
-from app.services import bundles, media
+from app.services import bundles, media, overlays
 
 router = APIRouter(prefix="/media/{project}", tags=["media"], default_response_class=Response)
 
@@ -49,6 +50,21 @@ def candidate_mesh(context: Ctx, request: Request, project: str, object: RowId, 
 def candidate_picture(context: Ctx, request: Request, project: str, object: RowId, candidate: str, v: str = "") -> Response:
     """A candidate rendered; all of them from the same side."""
     return send(request, media.candidate_png(context, project, object, candidate), "image/png", immutable=bool(v))
+
+
+@router.get("/overlay/{object}/{frame}.png", operation_id="overlayPicture")
+def overlay_picture(
+    context: Ctx,
+    request: Request,
+    project: str,
+    object: RowId,
+    frame: FrameNumber,
+    of: schemas.OverlayOf = "fitted",
+    look: schemas.OverlayLook = "ghost",
+    v: str = "",
+) -> Response:
+    """The object's mesh as that frame's camera sees it, to lay over the photo; transparent around it."""
+    return send(request, overlays.overlay(context, project, object, frame, of, look), "image/png", immutable=bool(v))
 
 
 @router.get("/scene.glb", operation_id="sceneMesh")

@@ -5,7 +5,7 @@ from fastapi import APIRouter, Request
 from app import schemas
 from app.deps import Ctx, ReviewerCtx
 from app.routes.numbers import RowId
-from app.services import reviews
+from app.services import overlays, reviews
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
 
@@ -46,3 +46,9 @@ def get_override(context: Ctx, project: str, object: RowId) -> schemas.OverrideD
 def set_override(context: ReviewerCtx, project: str, object: RowId, body: schemas.OverridePatch) -> schemas.Reviewed:
     """Correct the object; what depends on it runs again."""
     return reviews.set_override(context, project, object, body)
+
+
+@router.get("/objects/{object}/photos", operation_id="getPhotos")
+def get_photos(context: Ctx, project: str, object: RowId) -> schemas.ObjectPhotos:
+    """The frames to check an object on, with their cameras, and what can be laid over them."""
+    return overlays.photos(context, project, object)

@@ -23,6 +23,7 @@ from app.schemas.objects import (
     UndoRequest,
 )
 from app.schemas.people import Credentials
+from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo
 from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, ProjectPatch, SampleRequest
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
 from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
@@ -63,9 +64,13 @@ __all__ = [
     "MaskBits",
     "ObjectIn",
     "ObjectPatch",
+    "ObjectPhotos",
     "ObjectPoints",
+    "OverlayLook",
+    "OverlayOf",
     "OverrideData",
     "OverridePatch",
+    "Photo",
     "Placement",
     "Point",
     "PointIn",

@@ -10,7 +10,7 @@ from app.db import queries
 from app.db.engine import reading, writing
 from app.db.tables import Comment, Event
 from app.errors import Conflict, NotFound
-from app.services import projects
+from app.services import overlays, projects
 from app.services.context import Context
 
 SCOPE = "comments"
@@ -25,14 +25,18 @@ def list_comments(context: Context, project_id: str) -> list[schemas.Comment]:
 
 
 def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.Comment:
-    """Say something about the project, an object, a pixel or a point."""
+    """Say something about the project, an object, a pixel or a point; where a pixel shows the object's mesh, that point too."""
+    point = body.point_world
+    if point is None and body.object is not None and body.frame is not None:
+        found = overlays.point_under(context, project_id, body.object, body.frame, body.x or 0.0, body.y or 0.0)
+        point = (found[0], found[1], found[2]) if found else None
     with writing(context.engine) as session:
         queries.project_row(session, project_id)
         if body.object is not None:
             queries.object_row(session, project_id, body.object)
         fields = body.model_dump(exclude={"object", "point_world"})
         row = Comment(project_id=project_id, object_id=body.object, who=context.who, at=time.time(), **fields)
-        row.point_world = list(body.point_world) if body.point_world else None
+        row.point_world = list(point) if point else None
         session.add(row)
         session.flush()
         _note(context, session, row, "comment", f"commented: {body.text}", {"comment": row.id})

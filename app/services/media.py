@@ -32,7 +32,7 @@ def frame(context: Context, project_id: str, index: int, width: int | None) -> P
     kept = next((w for w in WIDTHS if w >= width), size[0])
     if kept >= size[0]:
         return stored
-    return _kept(files.previews / "frames" / str(kept) / f"{index:06d}.jpg", lambda: _shrink(stored, kept))
+    return kept_file(files.previews / "frames" / str(kept) / f"{index:06d}.jpg", lambda: _shrink(stored, kept))
 
 
 def depth(context: Context, project_id: str, index: int) -> Path:
@@ -42,7 +42,9 @@ def depth(context: Context, project_id: str, index: int) -> Path:
     stored = files.work / "capture" / "depth" / f"{index:06d}.png"
     if not stored.is_file():
         raise NotFound(f"frame {index} has no depth image")
-    return _kept(files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored, _shrink(colour, _DEPTH_WIDTH)))
+    return kept_file(
+        files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored, _shrink(colour, _DEPTH_WIDTH))
+    )
 
 
 def thumbnail(context: Context, project_id: str) -> Path:
@@ -66,7 +68,7 @@ def candidate_glb(context: Context, project_id: str, object_id: int, candidate: 
     files, name = _object_files(context, project_id, object_id)
     key = generate_key(files, name)
     target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.glb")
-    return _kept(target, lambda: _glb(files, name, candidate))
+    return kept_file(target, lambda: _glb(files, name, candidate))
 
 
 def candidate_png(context: Context, project_id: str, object_id: int, candidate: str) -> Path:
@@ -74,7 +76,7 @@ def candidate_png(context: Context, project_id: str, object_id: int, candidate: 
     files, name = _object_files(context, project_id, object_id)
     key = generate_key(files, name)
     target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.png")
-    return _kept(target, lambda: _picture(files, name, candidate))
+    return kept_file(target, lambda: _picture(files, name, candidate))
 
 
 def _files(context: Context, project_id: str) -> ProjectFiles:
@@ -98,7 +100,7 @@ def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int
     raise NotFound(f"the recording has no frame {index}")
 
 
-def _kept(target: Path, make: Callable[[], bytes]) -> Path:
+def kept_file(target: Path, make: Callable[[], bytes]) -> Path:
     """The file, made if it is not there; two who ask at once make it once."""
     if target.is_file():
         return target

@@ -11,7 +11,7 @@ from app import schemas
 from app.db import queries
 from app.db.engine import reading
 from app.errors import Forbidden, NotReady, Unavailable
-from app.services import bundles
+from app.services import bundles, marks
 from app.services.context import Context
 from app.viewer import proxy
 
@@ -53,6 +53,8 @@ def show(context: Context, project_id: str, body: schemas.ViewerShow) -> schemas
         wish["candidate"] = body.candidate or _chosen(context, project_id, item.id or 0)
         wish["rotation"] = upright(files, item.name, wish["candidate"]).tolist()
     if body.mode == "scene":
+        with reading(context.engine) as session:
+            wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.name if item else None)
         folder: Path | None = bundles.folder(context, project_id)
         wish["bundle"] = str(folder) if folder else None
     return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, wish))

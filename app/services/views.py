@@ -22,3 +22,9 @@ def frame_of(files: ProjectFiles, index: int) -> Frame | None:
 def _frames_at(path: Path, _changed: int, work: Path) -> dict[int, Any]:
     capture = Workspace(work).load_latest("ingest", "scene")
     return {frame.index: frame for frame in capture.frames} if capture is not None else {}
+
+
+@lru_cache(maxsize=4)
+def latest(path: Path, changed: int, work: Path, stage: str, name: str) -> Any:
+    """A stage's noun, read once for every time its file changes."""
+    return Workspace(work).load_latest(stage, name)

@@ -47,6 +47,10 @@ class View:
         self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud", bool(wish.get("full")))
         self.mode = wish["mode"]
         self.text = _MODES[self.mode](self, wish)
+        for number, mark in enumerate(wish.get("marks", ())):
+            self._add_mark(f"/marks/{number}", mark)
+        if wish.get("focus"):
+            self._look_from_path(np.asarray(wish["focus"], dtype=np.float64), distance=0.6)
 
     def move(self, values: dict[str, float]) -> None:
         """Set joints, clamped to their limits; unknown names are refused."""
@@ -149,6 +153,15 @@ class View:
         self._look_from_path((low + high) / 2)
         return f"{len(self.joints)} joints" + (", colliders" if collision else "")
 
+    def _add_mark(self, node: str, mark: dict[str, Any]) -> None:
+        """A line or a word in the scene: joint axes, what the certificate found, what people said."""
+        scene, colour = self.server.scene, tuple(mark.get("colour", (255, 225, 77)))
+        if mark.get("line"):
+            ends = np.asarray(mark["line"], dtype=np.float32)[None]
+            self.shown.append(scene.add_line_segments(f"{node}/line", ends, colour, thickness=0.008))
+        if mark.get("text"):
+            self.shown.append(scene.add_label(f"{node}/text", mark["text"], position=tuple(mark["at"])))
+
     def _asset(self, wish: dict[str, Any]) -> Any:
         found = self.work.load_latest("generate", wish["name"])
         wanted = wish.get("candidate") or (found.chosen_id if found else None)
@@ -173,11 +186,11 @@ class View:
         _ = shown.vertex_normals  # without them every face is shaded flat
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 
-    def _look_from_path(self, target: np.ndarray) -> None:
-        """Look at the target from where the person who filmed stood, a little further away."""
+    def _look_from_path(self, target: np.ndarray, distance: float = 1.15) -> None:
+        """Look at the target from where the person who filmed stood; `distance` as a share of theirs."""
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         start = positions.mean(axis=0)
-        self._look(target + 1.15 * (start - target), target)
+        self._look(target + distance * (start - target), target)
 
     def _look(self, position: np.ndarray, target: np.ndarray) -> None:
         place, aim = tuple(float(v) for v in position), tuple(float(v) for v in target)

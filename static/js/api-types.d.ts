@@ -352,6 +352,15 @@ export interface ObjectPatch {
   version?: number | null;
 }
 
+/** The photos to check an object on, best first; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
+export interface ObjectPhotos {
+  photos: Photo[];
+  version: string;
+  of: ("placed" | "primitive" | "fitted")[];
+  world_from_object: number[][] | null;
+  dimensions_m: number[] | null;
+}
+
 /** What the masks and the depth say of an object's shape: points around their centre, +Z up. */
 export interface ObjectPoints {
   count: number;
@@ -382,6 +391,19 @@ export interface OverridePatch {
   joint_lower?: number | null;
   joint_upper?: number | null;
   rerun?: boolean;
+}
+
+/** A frame that shows the object well, with its pinhole camera (pixels of the stored frame, OpenCV axes). */
+export interface Photo {
+  frame: number;
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+  camera_from_world: number[][];
+  confidence: number;
 }
 
 /** Where the chosen candidate stands, with the evidence for it. */
@@ -817,6 +839,8 @@ export interface Operations {
   getOverride: { parameters: { project: string; object: number }; body: undefined; answer: OverrideData };
   /** PATCH /api/projects/{project}/objects/{object}/override */
   setOverride: { parameters: { project: string; object: number }; body: OverridePatch; answer: Reviewed };
+  /** GET /api/projects/{project}/objects/{object}/photos */
+  getPhotos: { parameters: { project: string; object: number }; body: undefined; answer: ObjectPhotos };
   /** POST /api/projects/{project}/objects/{object}/points */
   addPoint: { parameters: { project: string; object: number; infer?: boolean }; body: PointIn; answer: SceneObject };
   /** DELETE /api/projects/{project}/objects/{object}/points/{point} */
@@ -883,6 +907,8 @@ export interface Operations {
   depthImage: { parameters: { project: string; frame: number; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/frames/{frame}.jpg */
   frameImage: { parameters: { project: string; frame: number; w?: number | null; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/overlay/{object}/{frame}.png */
+  overlayPicture: { parameters: { project: string; object: number; frame: number; of?: "placed" | "primitive" | "fitted"; look?: "ghost" | "outline" | "residual"; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/preview.png */
   scenePicture: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/report.html */

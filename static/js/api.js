@@ -3,7 +3,7 @@
 /** @import {
  *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
- *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ViewerSession, ViewerShown, ViewerShow,
+ *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ObjectPhotos, ViewerSession, ViewerShown, ViewerShow,
  *   RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload
  * } from "./api-types" */
 
@@ -216,6 +216,9 @@ export const listComments = (id) => get(`${of(id)}/comments`);
 export const addComment = (id, comment) => send("POST", `${of(id)}/comments`, comment);
 /** @param {string} id @param {number} comment @param {boolean} resolved @returns {Promise<Comment>} */
 export const resolveComment = (id, comment, resolved) => send("PATCH", `${of(id)}/comments/${comment}`, { resolved });
+
+/** @param {string} id @param {number} object @returns {Promise<ObjectPhotos>} */
+export const getPhotos = (id, object) => get(`${of(id)}/objects/${object}/photos`);
 
 /** @param {string} id @returns {Promise<SceneSummary>} */
 export const getScene = (id) => get(`${of(id)}/scene`);

@@ -2,7 +2,9 @@
 
 import base64
 
+import cv2
 import numpy as np
+import pytest
 
 from tests.app.test_reviews import Reviewed, reviewed
 
@@ -34,3 +36,20 @@ def test_clicks_that_belong_together_are_one_change(reviewed: Reviewed) -> None:
     outside = [points[0], {"frame": 3, "x": 5000, "y": 1}]
     web.post(f"{base}/objects/{number}/clicks", {"points": outside}, 422)
     assert len(web.get(f"{base}/objects")[0]["points"]) == 1  # all or none
+
+
+@pytest.mark.parametrize("look", ["ghost", "outline", "residual"])
+def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, look: str) -> None:
+    web, project, number = reviewed
+    shown = web.get(f"/api/projects/{project}/objects/{number}/photos")
+    assert "placed" in shown["of"]
+    photo = shown["photos"][0]
+    address = f"/media/{project}/overlay/{number}/{photo['frame']}.png?of=placed&look={look}&v={shown['version']}"
+    answer = web.client.get(address)
+    image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert image is not None
+    assert image.shape[1] == 640
+    assert image.shape[2] == 4
+    assert image[0, 0, 3] == 0  # nothing where the mesh is not
+    assert "immutable" in answer.headers["cache-control"]
+    assert web.client.get(f"/media/{project}/overlay/{number}/999.png").status_code in (404, 409)

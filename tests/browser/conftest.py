@@ -15,6 +15,9 @@ CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrom
 
 expect.set_options(timeout=60_000)  # what is waited for comes late on two busy cores
 
+PATIENCE_MS = 180_000  # a busy machine that draws 3D in software; nothing waits longer than what it waits for takes
+expect.set_options(timeout=PATIENCE_MS)
+
 QUIET = [  # without these Chromium looks for servers of its maker; a software GL draws the 3D view
     "--no-sandbox",
     "--disable-quic",
@@ -74,7 +77,8 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def page(browser: Browser, address: str) -> Iterator[Page]:
     """A page that is signed in, and that fails the test when our code throws."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+    context.set_default_timeout(PATIENCE_MS)
     opened = context.new_page()
     thrown: list[str] = []
     opened.on("pageerror", lambda error: thrown.append(str(error)))

@@ -91,7 +91,7 @@ export class ReviewState extends LiveElement {
 
 /** @param {Figures} figures */
 function cost(figures) {
-  const clicks = figures.clicks_per_object === null ? "" : `${figures.clicks_per_object.toFixed(1)} clicks an object`;
+  const clicks = !figures.clicks_per_object ? "" : `${figures.clicks_per_object.toFixed(1)} clicks an object`;
   const time =
     figures.upload_to_approval_s === null ? "" : `approved ${duration(figures.upload_to_approval_s)} after the import`;
   return [clicks, time].filter(Boolean).join(" · ");

@@ -29,7 +29,7 @@ export class ViewerFrame extends LiveElement {
       const dark = getComputedStyle(document.documentElement).colorScheme === "dark" || isDark() ? "?darkMode" : "";
       this.replaceChildren(h("iframe", { src: session.url + dark, title: "3D view of the project" }));
       this.#opened = true;
-      this.show(what);
+      this.show(this.#wanted); // it may have changed while the view opened
     } catch (error) {
       this.#down(error instanceof Error ? error.message : String(error), null);
     }

@@ -1,28 +1,53 @@
-/** Candidates beside their evidence, the aligned mesh over the scan, the finished scene with its joints. The verdict is a person's. */
+/** Candidates beside their evidence, the mesh over photos and scan, the finished scene with its joints. The verdict is a person's. */
 
-import { changeOverride, giveVerdict, listCandidates, moveJoints, undoRedo, uploadCandidate } from "../api.js";
-import { detailOf, h, icon, isTyping, LiveElement } from "../dom.js";
+import {
+  changeOverride,
+  getCertificate,
+  getScene,
+  giveVerdict,
+  listCandidates,
+  moveJoints,
+  undoRedo,
+  uploadCandidate,
+} from "../api.js";
+import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { askForText } from "../elements/ask-dialog.js";
+import { CommentList } from "../elements/comment-list.js";
+import { PhotoCheck } from "../elements/photo-check.js";
+import { ReviewState } from "../elements/review-state.js";
 import { say, sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
-import { counted, jointValue } from "../lib/format.js";
+import { counted } from "../lib/format.js";
 import { actionOf } from "../lib/keymap.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
+import { choice, gallery } from "../review/candidates.js";
+import { corrections } from "../review/corrections.js";
+import { findingsOf, placement } from "../review/evidence.js";
+import { JointPanel } from "../review/joint-panel.js";
 import { remember } from "../router.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Candidate} Candidate */
-/** @typedef {import("../api-types").Reviewed} Reviewed */
-/** @typedef {import("../api-types").ViewerShown} ViewerShown */
+/** @typedef {import("../api-types").Certificate} Certificate */
+/** @typedef {import("../api-types").Comment} Comment */
+/** @typedef {import("../api-types").CommentIn} CommentIn */
 /** @typedef {import("../api-types").Job} Job */
-/** @typedef {"candidate" | "aligned" | "scene" | "cloud"} Mode */
+/** @typedef {import("../api-types").OverridePatch} OverridePatch */
+/** @typedef {import("../api-types").Reviewed} Reviewed */
+/** @typedef {import("../api-types").SceneItem} SceneItem */
+/** @typedef {import("../api-types").ViewerShown} ViewerShown */
+/** @typedef {"candidate" | "aligned" | "photo" | "scene" | "cloud"} Mode */
 
 /** @type {[Mode, string][]} */
 const MODES = [
+  ["photo", "Over the photos"],
   ["candidate", "Candidate"],
   ["aligned", "Over the scan"],
   ["scene", "Finished scene"],
   ["cloud", "Scan"],
 ];
+const MOVE_MS = 100;
 
 export class ReviewPage extends LiveElement {
   project = "";
@@ -30,51 +55,71 @@ export class ReviewPage extends LiveElement {
   #nav = h("nav", { "aria-label": "Objects" });
   #bar = h("div", { class: "bar" });
   #viewer = new ViewerFrame();
-  #joints = h("div", { class: "joints", hidden: true });
+  #photos = new PhotoCheck();
+  #state = new ReviewState();
+  #comments = new CommentList();
   #panel = h("aside", { "aria-label": "Candidates" });
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "85", "aria-label": "Opacity of the mesh" });
   #collision = h("input", { type: "checkbox" });
+  #scan = h("input", { type: "checkbox" });
   #job = h("span", { class: "chip", role: "status", hidden: true });
+  #joints = new JointPanel((values) => this.#move(values));
 
   /** @type {CandidateGroup[]} */
   #groups = [];
+  /** @type {SceneItem[]} */
+  #items = [];
+  /** @type {Certificate | null} */
+  #certificate = null;
   #object = -1;
   #candidate = "";
   /** @type {Mode} */
   #mode = "scene";
 
   connected() {
-    this.replaceChildren(
-      h(
-        "div",
-        { class: "review" },
-        this.#nav,
-        h("div", { class: "centre" }, this.#bar, this.#viewer, this.#joints),
-        this.#panel,
-      ),
-    );
+    for (const element of [this.#state, this.#comments, this.#photos]) element.project = this.project;
+    const objects = h("div", { class: "objects" }, this.#state, this.#nav, this.#comments);
+    const centre = h("div", { class: "centre" }, this.#bar, this.#viewer, this.#photos, this.#joints.element);
+    this.replaceChildren(h("div", { class: "review" }, objects, centre, this.#panel));
     const { signal } = this;
-    this.#opacity.addEventListener("input", () => this.#show(), { signal });
-    this.#collision.addEventListener("change", () => this.#show(), { signal });
-    this.#viewer.addEventListener("shown", (event) => this.#drawJoints(detailOf(event)), { signal });
+    for (const input of [this.#opacity, this.#collision, this.#scan])
+      input.addEventListener("change", () => this.#show(), { signal });
+    this.#viewer.addEventListener("shown", (event) => this.#shown(detailOf(event)), { signal });
     this.#viewer.addEventListener(
       "not-ready",
       (event) => say(String(detailOf(event)), { hint: "run the pipeline first" }),
       { signal },
     );
+    this.#photos.addEventListener("pin-point", (event) => this.#comment(detailOf(event)), { signal });
+    this.#comments.addEventListener("show-comment", (event) => this.#showComment(detailOf(event)), { signal });
     live.addEventListener("review", () => this.#load(), { signal });
+    live.addEventListener("hello", (event) => detailOf(event).reset && this.#load(), { signal });
     live.addEventListener("job", (event) => this.#hear(/** @type {{ job: Job }} */ (detailOf(event)).job), { signal });
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
-    this.#drawBar();
-    this.#load().then(() => this.#viewer.open(this.project, this.#wanted()));
+    document.addEventListener("keyup", (event) => event.key.toLowerCase() === "b" && this.#photos.blink(false), {
+      signal,
+    });
+    signal.addEventListener("abort", () => this.#joints.stop());
+    if (this.query.has("object")) this.#mode = "photo";
+    this.#load().then(() => {
+      this.#show();
+      this.#viewer.open(this.project, this.#wanted());
+    });
   }
 
   async #load() {
     try {
-      this.#groups = await listCandidates(this.project);
+      const orNone = (/** @type {unknown} */ _) => null; // there is no scene or certificate before the first run
+      const [groups, scene, certificate] = await Promise.all([
+        listCandidates(this.project),
+        getScene(this.project).catch(orNone),
+        getCertificate(this.project).catch(orNone),
+      ]);
+      this.#groups = groups;
+      this.#items = scene?.items ?? [];
+      this.#certificate = certificate;
       const asked = Number(this.query.get("object") ?? this.#object);
-      if (!this.#group)
-        this.#choose(this.#groups.some((g) => g.object === asked) ? asked : (this.#groups[0]?.object ?? -1), false);
+      if (!this.#group) this.#choose(groups.some((g) => g.object === asked) ? asked : (groups[0]?.object ?? -1), false);
       this.#draw();
     } catch (error) {
       sayError(error);
@@ -85,6 +130,10 @@ export class ReviewPage extends LiveElement {
     return this.#groups.find((group) => group.object === this.#object);
   }
 
+  get #item() {
+    return this.#items.find((item) => item.object === this.#object);
+  }
+
   /**
    * @param {number} object
    * @param {boolean} show
@@ -93,26 +142,31 @@ export class ReviewPage extends LiveElement {
     this.#object = object;
     this.#candidate = this.#group?.chosen ?? "";
     remember({ object: object < 0 ? null : object });
-    if (show && (this.#mode === "scene" || this.#mode === "cloud")) this.#mode = "aligned";
+    if (show && (this.#mode === "scene" || this.#mode === "cloud")) this.#mode = "photo";
     this.#draw();
     if (show) this.#show();
   }
 
   #wanted() {
-    const object = this.#object < 0 ? null : this.#object;
+    const mode = this.#mode === "photo" ? "aligned" : this.#mode;
     return {
-      mode: this.#mode,
-      object: this.#mode === "scene" || this.#mode === "cloud" ? null : object,
-      candidate: this.#mode === "candidate" ? this.#candidate || null : null,
-      cloud: this.#mode !== "candidate",
+      mode,
+      object: mode === "cloud" || this.#object < 0 ? null : this.#object,
+      candidate: mode === "candidate" ? this.#candidate || null : null,
+      cloud: mode === "scene" ? this.#scan.checked : mode !== "candidate",
       opacity: Number(this.#opacity.value) / 100,
       collision: this.#collision.checked,
     };
   }
 
   #show() {
+    const photo = this.#mode === "photo";
+    this.#viewer.hidden = photo;
+    this.#photos.hidden = !photo;
+    if (this.#mode !== "scene") this.#joints.element.hidden = true;
     this.#drawBar();
-    this.#viewer.show(this.#wanted());
+    if (!photo) this.#viewer.show(this.#wanted());
+    else if (this.#object >= 0) this.#photos.show(this.#object).then(() => this.#drawPanel());
   }
 
   /** @param {Mode} mode */
@@ -121,6 +175,14 @@ export class ReviewPage extends LiveElement {
     this.#show();
   }
 
+  /** @param {ViewerShown} shown */
+  #shown(shown) {
+    this.#joints.show(shown.joints, this.#items);
+    this.#joints.element.hidden = this.#mode !== "scene" || !shown.joints.length;
+  }
+
+  // Drawing
+
   #draw() {
     this.#drawNav();
     this.#drawPanel();
@@ -128,14 +190,7 @@ export class ReviewPage extends LiveElement {
 
   #drawNav() {
     const items = this.#groups.map((group) => {
-      const tone = group.accepted ? "good" : group.placement?.unsure ? "warn" : "";
-      const text = group.accepted
-        ? "accepted"
-        : group.placement
-          ? group.placement.unsure
-            ? "unsure"
-            : "to review"
-          : "not placed";
+      const [text, tone] = standing(group);
       const button = h("button", { type: "button", "aria-pressed": String(group.object === this.#object) }, group.name);
       button.append(h("span", { class: `chip ${tone}` }, text));
       button.addEventListener("click", () => this.#choose(group.object));
@@ -164,6 +219,7 @@ export class ReviewPage extends LiveElement {
       }),
       this.#mode === "aligned" ? h("label", { class: "row" }, "Opacity", this.#opacity) : "",
       this.#mode === "scene" ? h("label", { class: "row" }, this.#collision, "Colliders") : "",
+      this.#mode === "scene" ? h("label", { class: "row" }, this.#scan, "Scan") : "",
       this.#job,
     );
   }
@@ -176,120 +232,83 @@ export class ReviewPage extends LiveElement {
       { type: "button", class: "quiet", disabled: !group.can_undo, "aria-label": "Undo" },
       icon("undo"),
     );
-    undo.addEventListener("click", () => this.#undo("undo"));
+    undo.addEventListener("click", () => this.act("undo"));
     const upload = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
     upload.addEventListener("change", () => {
       const file = upload.files?.[0];
-      if (file) this.#review(uploadCandidate(this.project, group.object, file));
+      if (file) this.#review(() => uploadCandidate(this.project, group.object, file));
     });
+    const told = {
+      show: (/** @type {Candidate} */ candidate) => this.#showCandidate(candidate),
+      verdict: (/** @type {Candidate} */ candidate, /** @type {"accepted" | "rejected"} */ said) =>
+        this.#verdict(candidate, said),
+    };
+    const edits = {
+      change: (/** @type {Partial<OverridePatch>} */ patch) =>
+        this.#review(() => changeOverride(this.project, group.object, patch)),
+      preview: (/** @type {{ pose: number[][], size: number[] } | null} */ box) => this.#photos.preview(box),
+    };
     this.#panel.replaceChildren(
       h("div", { class: "row" }, h("h2", {}, group.name), h("span", { class: "chip" }, group.category), undo),
-      h(
-        "p",
-        {},
-        group.chosen_by === "person" ? "Chosen by a person. " : "Chosen automatically: ",
-        h("span", { class: "muted" }, group.reason),
+      choice(group),
+      group.placement ? placement(group.placement, this.#item) : h("p", { class: "chip warn" }, "not placed"),
+      findingsOf(
+        this.#certificate,
+        group.name,
+        this.#groups.map((other) => other.name),
       ),
-      group.placement ? placement(group.placement) : h("p", { class: "chip warn" }, "not placed"),
-      this.#corrections(group),
+      corrections(group, this.#item, this.#mode === "photo" ? this.#photos.box : null, edits),
       h("h3", {}, counted(group.candidates.length, "candidate")),
-      h("div", { class: "candidates" }, ...group.candidates.map((candidate) => this.#card(group, candidate))),
-      h("p", {}, h("button", { type: "button", onClick: () => upload.click() }, "Upload a mesh instead…"), upload),
-    );
-  }
-
-  /**
-   * @param {CandidateGroup} group
-   * @param {Candidate} candidate
-   */
-  #card(group, candidate) {
-    const { metrics } = candidate;
-    const show = h("button", { type: "button", class: "show", "aria-label": `Show ${candidate.id} in 3D` });
-    show.append(h("img", { src: candidate.thumbnail, alt: `Candidate ${candidate.id}`, loading: "lazy" }));
-    show.addEventListener("click", () => {
-      this.#candidate = candidate.id;
-      this.#drawPanel();
-      this.#setMode("candidate");
-    });
-    const accept = h(
-      "button",
-      { type: "button", "aria-pressed": String(candidate.verdict === "accepted") },
-      icon("check"),
-      "Accept",
-    );
-    accept.addEventListener("click", () => this.#verdict(candidate, "accepted"));
-    const reject = h(
-      "button",
-      { type: "button", "aria-pressed": String(candidate.verdict === "rejected") },
-      icon("cross"),
-      "Reject",
-    );
-    reject.addEventListener("click", () => this.#verdict(candidate, "rejected"));
-    const iou = metrics.mask_iou === undefined ? "" : `mask ${(100 * metrics.mask_iou).toFixed(0)} %`;
-    const depth =
-      metrics.depth_residual_m === undefined ? "" : `depth ${(1000 * metrics.depth_residual_m).toFixed(0)} mm`;
-    return h(
-      "article",
-      { class: candidate.id === this.#candidate ? "current" : "" },
-      show,
+      gallery(group, this.#candidate, told),
       h(
         "div",
-        { class: "body" },
-        h(
-          "div",
-          {},
-          h("strong", {}, candidate.id),
-          candidate.id === group.chosen ? h("span", { class: "chip good" }, "★ used") : "",
-        ),
-        h("div", { class: "muted" }, [iou, depth, counted(candidate.faces, "face")].filter(Boolean).join(" · ")),
-        h(
-          "div",
-          { class: "muted" },
-          `${candidate.watertight ? "watertight" : "not watertight"} · ${candidate.generator}`,
-        ),
-        ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
-        accept,
-        reject,
+        { class: "row" },
+        h("button", { type: "button", onClick: () => upload.click() }, "Upload a mesh…"),
+        upload,
+        this.#commentButton(),
       ),
     );
   }
 
-  /** @param {CandidateGroup} group */
-  #corrections(group) {
-    const select = h("select", { "aria-label": `Hinge of ${group.name}` });
-    for (const side of ["automatic", "left", "right", "top", "bottom"]) {
-      select.append(h("option", { value: side, selected: (group.override.hinge ?? "automatic") === side }, side));
-    }
-    select.addEventListener("change", () => {
-      const hinge = select.value === "automatic" ? null : /** @type {"left"} */ (select.value);
-      this.#review(changeOverride(this.project, group.object, { hinge }));
-    });
-    return h("label", {}, h("span", { class: "muted" }, "Hinge"), select);
+  #commentButton() {
+    return h("button", { type: "button", onClick: () => this.act("comment") }, "Comment");
+  }
+
+  // What people say
+
+  /** @param {Candidate} candidate */
+  #showCandidate(candidate) {
+    this.#candidate = candidate.id;
+    this.#drawPanel();
+    this.#setMode("candidate");
   }
 
   /**
    * @param {Candidate} candidate
-   * @param {"accepted" | "rejected"} verdict
+   * @param {"accepted" | "rejected"} said
    */
-  #verdict(candidate, verdict) {
-    const again = candidate.verdict === verdict;
-    const reason = verdict === "rejected" && !again ? (prompt(`Why reject ${candidate.id}? (optional)`) ?? null) : "";
-    if (reason === null) return; // the prompt was cancelled
-    const given = {
-      candidate: candidate.id,
-      verdict: again ? /** @type {const} */ ("cleared") : verdict,
-      reason,
-      rerun: true,
-    };
-    this.#review(giveVerdict(this.project, this.#object, given));
+  async #verdict(candidate, said) {
+    const object = this.#object;
+    const again = candidate.verdict === said;
+    const asks = said === "rejected" && !again;
+    const reason = asks
+      ? await askForText(`Reject ${candidate.id}`, "Why? (optional)", { button: "Reject", required: false })
+      : "";
+    if (reason === null) return;
+    const verdict = again ? /** @type {const} */ ("cleared") : said;
+    await this.#review(() =>
+      giveVerdict(this.project, object, { candidate: candidate.id, verdict, reason, rerun: true }),
+    );
+    if (verdict === "accepted" && this.#object === object) this.#nextToReview();
   }
 
-  /** @param {Promise<Reviewed>} request */
+  /** @param {() => Promise<Reviewed>} request */
   async #review(request) {
     try {
-      const { text, job } = await request;
+      const { text, job } = await outbox.send(request);
       say(text, { kind: "good" });
       if (job) this.#hear(job);
+      this.#photos.preview(null);
       await this.#load();
     } catch (error) {
       sayError(error);
@@ -299,12 +318,24 @@ export class ReviewPage extends LiveElement {
   /** @param {"undo" | "redo"} which */
   async #undo(which) {
     try {
-      const { text } = await undoRedo(this.project, which, this.#object, "review");
+      const { text } = await outbox.send(() => undoRedo(this.project, which, this.#object, "review"));
       say(`${which === "undo" ? "Undone" : "Redone"}: ${text}`);
       await this.#load();
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /** @param {Partial<CommentIn>} pin */
+  #comment(pin = {}) {
+    const object = this.#object < 0 ? null : this.#object;
+    this.#comments.ask({ ...pin, object }, this.#group?.name ?? "the project");
+  }
+
+  /** @param {Comment} comment */
+  #showComment({ object, point_world: point }) {
+    if (object !== null) this.#choose(object);
+    if (point) this.#setMode("scene");
   }
 
   /** @param {Job} job */
@@ -315,50 +346,6 @@ export class ReviewPage extends LiveElement {
     this.#job.textContent = `running ${job.stage} ${Math.round(100 * job.progress)} %`;
     if (job.state === "done") this.#load().then(() => this.#show());
     if (job.state === "failed" && job.error) say(job.error.message, { kind: "bad", hint: job.error.hint });
-  }
-
-  /** @param {ViewerShown} shown */
-  #drawJoints(shown) {
-    this.#joints.hidden = shown.joints.length === 0;
-    const sliders = shown.joints.map((joint) => {
-      const type = joint.upper > 0.9 ? "revolute" : "prismatic"; // a drawer of 0.9 m travel does not exist
-      const input = h("input", {
-        type: "range",
-        min: String(joint.lower),
-        max: String(joint.upper),
-        step: "any",
-        value: String(joint.value),
-        "aria-label": joint.name,
-      });
-      const value = h("output", { class: "mono" }, jointValue(type, joint.value));
-      input.addEventListener("input", () => {
-        value.textContent = jointValue(type, Number(input.value));
-        this.#move({ [joint.name]: Number(input.value) });
-      });
-      return { joint, input, value, type, element: h("label", {}, h("span", {}, joint.name), input, value) };
-    });
-    /** @type {(share: number) => void} */
-    const all = (share) => {
-      /** @type {Record<string, number>} */
-      const values = {};
-      for (const { joint, input, value, type } of sliders) {
-        const position = joint.lower + share * (joint.upper - joint.lower);
-        input.value = String(position);
-        value.textContent = jointValue(/** @type {"revolute"} */ (type), position);
-        values[joint.name] = position;
-      }
-      this.#move(values);
-    };
-    this.#joints.replaceChildren(
-      h(
-        "div",
-        { class: "row" },
-        h("strong", {}, counted(shown.joints.length, "joint")),
-        h("button", { type: "button", onClick: () => all(1) }, "Open all"),
-        h("button", { type: "button", onClick: () => all(0) }, "Close all"),
-      ),
-      ...sliders.map(({ element }) => element),
-    );
   }
 
   /** @type {Record<string, number>} */
@@ -374,17 +361,28 @@ export class ReviewPage extends LiveElement {
       const sent = this.#moving;
       this.#moving = {};
       moveJoints(this.project, sent).catch(sayError);
-    }, 100);
+    }, MOVE_MS);
   }
+
+  // Keys and commands
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (isTyping(event)) return;
-    const action = actionOf(event, "review");
-    const act = action ? this.#actions[action] : undefined;
-    if (!act) return;
+    if (isTyping(event) || document.querySelector("dialog[open]")) return;
+    const action = actionOf(event, "review", plainKeys());
+    if (!action || !this.#actions[action]) return;
     event.preventDefault();
-    act();
+    if (!event.repeat || action !== "comment") this.act(action);
+  }
+
+  /** Do what a key or the palette asks for. @param {string} action */
+  act(action) {
+    this.#actions[action]?.();
+  }
+
+  /** @returns {import("../lib/commands.js").Command[]} */
+  commands() {
+    return this.#groups.map((group) => ({ text: `Object ${group.name}`, run: () => this.#choose(group.object) }));
   }
 
   /** @type {Record<string, () => void>} */
@@ -393,10 +391,16 @@ export class ReviewPage extends LiveElement {
     reject: () => this.#onCandidate("rejected"),
     "next-object": () => this.#step(1),
     "previous-object": () => this.#step(-1),
+    "next-photo": () => this.#photos.move(1),
+    "previous-photo": () => this.#photos.move(-1),
+    blink: () => this.#photos.blink(true),
+    sweep: () => this.#joints.sweep(this.#group?.name ?? null),
+    comment: () => this.#comment(),
     "view-candidate": () => this.#setMode("candidate"),
     "view-aligned": () => this.#setMode("aligned"),
     "view-scene": () => this.#setMode("scene"),
     "view-cloud": () => this.#setMode("cloud"),
+    "view-photo": () => this.#setMode("photo"),
     undo: () => this.#undo("undo"),
     redo: () => this.#undo("redo"),
   };
@@ -407,6 +411,13 @@ export class ReviewPage extends LiveElement {
     if (candidate) this.#verdict(candidate, verdict);
   }
 
+  /** The next object that nobody accepted yet; stay when all are. */
+  #nextToReview() {
+    const at = this.#groups.findIndex((group) => group.object === this.#object);
+    const left = [...this.#groups.slice(at + 1), ...this.#groups.slice(0, at)].find((group) => !group.accepted);
+    if (left) this.#choose(left.object);
+  }
+
   /** @param {number} by */
   #step(by) {
     const at = this.#groups.findIndex((group) => group.object === this.#object);
@@ -415,24 +426,12 @@ export class ReviewPage extends LiveElement {
   }
 }
 
-/** @param {NonNullable<CandidateGroup["placement"]>} placement */
-function placement(placement) {
-  /** @type {[string, string][]} */
-  const rows = [
-    ["Placed by", placement.method],
-    ["Distance to the scan", `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
-    ["Silhouette overlap", `${(100 * placement.mask_iou).toFixed(0)} %`],
-    ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
-    [
-      "Runner-up",
-      placement.runner_up === null ? "none" : `${(100 * placement.runner_up).toFixed(0)} % of the winner's score`,
-    ],
-  ];
-  return h(
-    "div",
-    { class: "stack" },
-    placement.unsure ? h("span", { class: "chip warn" }, "unsure: another pose fits nearly as well") : "",
-    h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
-    ...placement.warnings.map((warning) => h("p", { class: "muted" }, warning)),
-  );
+/**
+ * @param {CandidateGroup} group
+ * @returns {[string, string]} text and tone
+ */
+function standing(group) {
+  if (group.accepted) return ["accepted", "good"];
+  if (!group.placement) return ["not placed", ""];
+  return group.placement.unsure ? ["unsure", "warn"] : ["to review", ""];
 }

@@ -1,0 +1,62 @@
+"""What is pointed at in the 3D view: axes of joints, findings of the certificate, open comments."""
+
+from typing import Any
+
+import numpy as np
+from sqlmodel import Session, col, select
+
+from app.db import queries
+from app.db.tables import Comment
+from app.files import ProjectFiles
+from app.services import views
+from r2c2r_core.model.scene import SceneObject
+
+_REACH_M = 0.08  # an axis sticks out of its box by this much
+_AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
+_LONGEST_TEXT = 60
+
+
+def marks(
+    session: Session, files: ProjectFiles, project_id: str, name: str | None
+) -> tuple[list[dict[str, Any]], list[float] | None]:
+    """Marks of one object, or with None of all, and what to look at."""
+    items = [item for item in _scene_objects(files) if name is None or item.name == name]
+    bundle = queries.newest_bundle(session, project_id)
+    findings = (bundle.certificate or {}).get("findings", []) if bundle else []
+    found = [mark for item in items for mark in _axes(item)] if name is not None else []
+    for finding in findings:
+        item = next((i for i in items if finding["where"] == i.name or finding["where"].startswith(f"{i.name}_")), None)
+        if item is not None and (name is not None or finding["severity"] == "error"):
+            found.append(_word(item.world_from_object.translation, finding["message"], _FINDING))
+    said = select(Comment).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
+    found += [_word(np.asarray(c.point_world), f"{c.who}: {c.text}", _COMMENT) for c in session.exec(said) if c.point_world]
+    return found, items[0].world_from_object.translation.tolist() if name is not None and items else None
+
+
+def _axes(item: SceneObject) -> list[dict[str, Any]]:
+    """Each joint's axis through its origin, as long as the object is along it; a slide's begins there and shows its travel."""
+    pose = item.world_from_object
+    found = []
+    for joint in item.joints:
+        origin, axis = pose.apply(joint.origin_object[None])[0], pose.rotation @ joint.axis_object
+        half = float(np.abs(joint.axis_object) @ item.dimensions_m) / 2 + _REACH_M
+        start, end = (
+            (origin - half * axis, origin + half * axis) if joint.type == "revolute" else (origin, origin + joint.upper * axis)
+        )
+        source = joint.sources.get("axis", "")
+        found.append({**_word(end, f"{joint.type}, axis {source}", _AXIS), "line": [start.tolist(), end.tolist()]})
+    return found
+
+
+def _word(at: np.ndarray, text: str, colour: tuple[int, int, int]) -> dict[str, Any]:
+    short = text if len(text) <= _LONGEST_TEXT else f"{text[: _LONGEST_TEXT - 1]}…"
+    return {"text": short, "at": [float(value) for value in at], "colour": list(colour)}
+
+
+def _scene_objects(files: ProjectFiles) -> tuple[SceneObject, ...]:
+    for stage in ("warp", "synthesize"):
+        path = files.work / "nouns" / stage / "scene.noun"
+        if path.is_file():
+            scene = views.latest(path, path.stat().st_mtime_ns, files.work, stage, "scene")
+            return scene.objects if scene is not None else ()
+    return ()

@@ -1,0 +1,244 @@
+"""The object's mesh drawn over the photos it was seen in: ghost, outline, and how far it is from the measured depth."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading
+from app.errors import NotFound, NotReady
+from app.files import ProjectFiles
+from app.services import masks, media, views
+from app.services.context import Context
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.geometry.raster import rasterize, sample_texture
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.depth import decode_depth
+from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.workspace import Workspace
+
+WIDTH = 640
+PHOTOS = 12
+FAR_M = 0.03  # a residual of this much has its full colour
+_OUTLINE = (77, 225, 255)  # BGR
+_EDGE = 0.004  # Laplacian of the inverse depth over its largest value: a step of about 1 cm at 2 m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """One mesh in the world, with a texture or with a colour."""
+
+    vertices_world: Points
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    texture: np.ndarray | None = None
+    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)  # RGB 0..1
+
+
+def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectPhotos:
+    """The frames that show most of the object, and what can be laid over them."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        found = masks.frames_of(context, project, item, queries.points_of(session, object_id))
+        files = context.files(project)
+    best = sorted(found, key=lambda entry: -float(entry["area"]) * float(entry["confidence"]))[: 6 * PHOTOS]
+    spread = sorted(best, key=lambda entry: int(entry["frame"]))[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
+    shown = [photo for entry in spread if (photo := _photo(files, entry)) is not None]
+    fitted = _scene_object(files, "warp", item.name) or _scene_object(files, "synthesize", item.name)
+    stages: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
+    return schemas.ObjectPhotos(
+        photos=sorted(shown, key=lambda photo: -photo.confidence),
+        version=_version(files, item.name),
+        of=[name for name, stage in stages.items() if _stored(files, stage, item.name)],
+        world_from_object=fitted.world_from_object.matrix.tolist() if fitted else None,
+        dimensions_m=fitted.dimensions_m.tolist() if fitted else None,
+    )
+
+
+def overlay(
+    context: Context, project_id: str, object_id: int, index: int, of: schemas.OverlayOf, look: schemas.OverlayLook
+) -> Path:
+    """The object drawn for one frame: a PNG with a transparent ground, kept until the object is placed or fitted anew."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        name = queries.object_row(session, project_id, object_id, deleted=True).name
+        files = context.files(project)
+    target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name)}.png"
+    return media.kept_file(target, lambda: _drawn(files, name, index, of, look))
+
+
+def point_under(context: Context, project_id: str, object_id: int, index: int, x: float, y: float) -> list[float] | None:
+    """The point of the object's mesh, in the world, under a pixel of the stored frame; None where the mesh is not there."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        name = queries.object_row(session, project_id, object_id).name
+        files = context.files(project)
+    frame = views.frame_of(files, index)
+    if frame is None:
+        return None
+    try:
+        parts = parts_of(files, name, "fitted") or parts_of(files, name, "placed")
+    except NotReady:
+        return None
+    camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
+    _, depth = _render(parts, camera, frame.world_from_camera.inverse)
+    scale = camera.width / frame.rgb_camera.width
+    column, row = min(int(x * scale), camera.width - 1), min(int(y * scale), camera.height - 1)
+    z = float(depth[row, column])
+    if z <= 0:
+        return None
+    ray = np.array([(x * scale - camera.cx) / camera.fx, (y * scale - camera.cy) / camera.fy, 1.0])
+    return [float(value) for value in frame.world_from_camera.apply((ray * z)[None])[0]]
+
+
+def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf) -> list[Part]:
+    """The object's meshes in the world; NotReady while that stage has not made them."""
+    if of == "placed":
+        placement, made = (Workspace(files.work).load_latest(stage, name) for stage in ("align", "generate"))
+        asset = (
+            next((c for c in made.candidates if placement and c.candidate_id == placement.candidate_id), None) if made else None
+        )
+        if placement is None or asset is None:
+            raise NotReady(f"{name} is not placed yet", hint="run the project first")
+        mesh = asset.mesh
+        return [
+            Part(
+                vertices_world=placement.world_from_mesh.apply(mesh.vertices),
+                faces=mesh.faces,
+                uv=mesh.uv,
+                texture=mesh.texture,
+            )
+        ]
+    found = _scene_object(files, "warp" if of == "fitted" else "synthesize", name)
+    if found is None:
+        raise NotReady(f"{name} is not {'fitted' if of == 'fitted' else 'built'} yet", hint="run the project first")
+    return _scene_parts(found)
+
+
+def _scene_parts(item: SceneObject) -> list[Part]:
+    parts = []
+    for link in item.links:
+        world_from_link = item.world_from_object @ link.object_from_link
+        if link.visual is not None:
+            mesh = link.visual
+            placed = world_from_link.apply(mesh.vertices)
+            parts.append(Part(vertices_world=placed, faces=mesh.faces, uv=mesh.uv, texture=mesh.texture))
+            continue
+        for box in link.boxes:
+            vertices, faces = box_mesh(-box.size_m / 2, box.size_m / 2)
+            placed = (world_from_link @ box.link_from_box).apply(vertices)
+            parts.append(Part(vertices_world=placed, faces=faces, colour=link.colour))
+    return parts
+
+
+def _drawn(files: ProjectFiles, name: str, index: int, of: schemas.OverlayOf, look: schemas.OverlayLook) -> bytes:
+    frame = views.frame_of(files, index)
+    if frame is None:
+        raise NotFound(f"the recording has no frame {index}")
+    parts, camera_from_world = parts_of(files, name, of), frame.world_from_camera.inverse
+    if look == "residual":
+        image = _residual(files, index, parts, frame.depth_camera, camera_from_world)
+        image = cv2.resize(image, (WIDTH, round(WIDTH * image.shape[0] / image.shape[1])), interpolation=cv2.INTER_NEAREST)
+    else:
+        camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
+        colours, depth = _render(parts, camera, camera_from_world)
+        image = _outline(depth) if look == "outline" else np.dstack([colours, (depth > 0).astype(np.uint8) * 255])
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> tuple[np.ndarray, np.ndarray]:
+    """BGR (h, w, 3) and z-depth (h, w) of what is nearest."""
+    colours = np.zeros((camera.height, camera.width, 3), np.uint8)
+    depth = np.zeros((camera.height, camera.width), np.float32)
+    for part in parts:
+        attributes = np.tile(np.asarray(part.colour), (len(part.vertices_world), 1))
+        if part.uv is not None:
+            attributes = np.column_stack([part.uv, np.ones(len(part.uv))])
+        drawn = rasterize(part.vertices_world, part.faces, attributes, camera, camera_from_world)
+        nearer = (drawn.depth_m > 0) & ((depth == 0) | (drawn.depth_m < depth))
+        seen = sample_texture(part.texture, drawn.attributes[..., :2]) if part.texture is not None else 255 * drawn.attributes
+        colours[nearer] = np.clip(seen[nearer], 0, 255).astype(np.uint8)[:, ::-1]
+        depth[nearer] = drawn.depth_m[nearer]
+    return colours, depth
+
+
+def _outline(depth: np.ndarray) -> np.ndarray:
+    """BGRA: the silhouette's rim and the edges inside it, dark-edged so that it shows on any photo.
+
+    The inverse depth of a plane is affine in the pixels: its Laplacian is zero on every face, however oblique.
+    """
+    inverse = np.where(depth > 0, 1.0 / np.maximum(depth, 1e-3), 0.0).astype(np.float32)
+    bend = np.abs(cv2.Laplacian(inverse, cv2.CV_32F)) / max(float(inverse.max()), 1e-6)
+    rim = bend > _EDGE
+    image = np.zeros((*depth.shape, 4), np.uint8)
+    image[cv2.dilate(rim.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = (26, 19, 16, 200)
+    image[rim] = (*_OUTLINE, 255)
+    return image
+
+
+def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> np.ndarray:
+    """BGRA at depth size: red where the mesh stands before the measured surface, blue where behind, pale where they agree."""
+    raw = cv2.imread(str(files.work / "capture" / "depth" / f"{index:06d}.png"), cv2.IMREAD_UNCHANGED)
+    if raw is None:
+        raise NotFound(f"frame {index} has no depth image")
+    measured = decode_depth(raw)
+    _, depth = _render(parts, camera, camera_from_world)
+    both = (depth > 0) & (measured > 0)
+    off = np.clip((measured - depth) / FAR_M, -1, 1)
+    occluded = off < -0.999  # something stands before the object there: no word about the object
+    strength = np.abs(off)
+    before, behind = np.array([40, 40, 220.0]), np.array([220, 120, 30.0])
+    pale = np.array([235, 245, 235.0])
+    image = pale + strength[..., None] * (np.where(off[..., None] > 0, before, behind) - pale)
+    alpha = np.where(both & ~occluded, 200, 0)
+    return np.dstack([image.astype(np.uint8), alpha.astype(np.uint8)])
+
+
+def _photo(files: ProjectFiles, entry: dict[str, Any]) -> schemas.Photo | None:
+    frame = views.frame_of(files, int(entry["frame"]))
+    if frame is None:
+        return None
+    camera = frame.rgb_camera
+    return schemas.Photo(
+        frame=frame.index,
+        width=camera.width,
+        height=camera.height,
+        fx=camera.fx,
+        fy=camera.fy,
+        cx=camera.cx,
+        cy=camera.cy,
+        camera_from_world=frame.world_from_camera.inverse.matrix.tolist(),
+        confidence=float(entry["confidence"]),
+    )
+
+
+def _scene_object(files: ProjectFiles, stage: str, name: str) -> SceneObject | None:
+    path = _path(files, stage, name)
+    try:
+        scene = views.latest(path, path.stat().st_mtime_ns, files.work, stage, "scene")
+    except FileNotFoundError:
+        return None
+    return next((item for item in scene.objects if item.name == name), None) if scene is not None else None
+
+
+def _stored(files: ProjectFiles, stage: str, name: str) -> bool:
+    return _path(files, stage, name).is_file()
+
+
+def _path(files: ProjectFiles, stage: str, name: str) -> Path:
+    return files.work / "nouns" / stage / f"{name if stage == 'align' else 'scene'}.noun"
+
+
+def _version(files: ProjectFiles, name: str) -> str:
+    """Changes whenever one of the stages made the object anew."""
+    times = [
+        path.stat().st_mtime_ns for stage in ("align", "synthesize", "warp") if (path := _path(files, stage, name)).is_file()
+    ]
+    return f"{max(times, default=0):x}"

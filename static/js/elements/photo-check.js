@@ -1,0 +1,209 @@
+/**
+ * The object's mesh over the photos it was seen in: ghost, outline, distance to the measured depth, before and after the fit.
+ * Emits "pin-point" {frame, x, y} on a double click.
+ */
+
+import { getPhotos } from "../api.js";
+import { h, LiveElement } from "../dom.js";
+import { boxEdges } from "../lib/box-view.js";
+import { sayError } from "./toasts.js";
+
+/** @typedef {import("../api-types").ObjectPhotos} ObjectPhotos */
+/** @typedef {import("../api-types").Photo} Photo */
+/** @typedef {ObjectPhotos["of"][number]} Of */
+/** @typedef {"ghost" | "outline" | "residual"} Look */
+
+/** @type {Record<Of, string>} */
+const OF = { placed: "Candidate as placed", primitive: "Plain boxes", fitted: "Fitted" };
+/** @type {Record<Look, string>} */
+const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance to the scan" };
+
+export class PhotoCheck extends LiveElement {
+  project = "";
+  #object = -1;
+  /** @type {ObjectPhotos | null} */
+  #all = null;
+  #at = 0;
+  /** @type {Of} */
+  #of = "fitted";
+  /** @type {Look} */
+  #look = "ghost";
+  /** @type {{ pose: number[][], size: number[] } | null} what a correction would make of the box */
+  #preview = null;
+  #photo = h("img", { alt: "" });
+  #under = h("img", { class: "over", alt: "" });
+  #over = h("img", { class: "over", alt: "" });
+  #lines = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  #opacity = h("input", { type: "range", min: "0", max: "100", value: "75", "aria-label": "Opacity over the photo" });
+  #split = h("input", { type: "range", min: "0", max: "100", value: "100", "aria-label": "Before and after the fit" });
+  #tools = h("div", { class: "bar" });
+  #pictures = h("div", { class: "pictures" }, this.#photo, this.#under, this.#over);
+  #strip = h("div", { class: "thumbs" });
+  #legend = h("p", { class: "muted legend" });
+
+  connected() {
+    this.#lines.setAttribute("class", "over");
+    this.#lines.setAttribute("aria-hidden", "true");
+    this.#pictures.append(this.#lines);
+    this.replaceChildren(this.#tools, this.#pictures, this.#legend, this.#strip);
+    for (const slider of [this.#opacity, this.#split])
+      slider.addEventListener("input", () => this.#fade(), { signal: this.signal });
+    this.#pictures.addEventListener("dblclick", (event) => this.#pin(event), { signal: this.signal });
+  }
+
+  /** @param {number} object */
+  async show(object) {
+    const same = object === this.#object;
+    this.#object = object;
+    if (!same) this.#at = 0;
+    this.#preview = null;
+    try {
+      const found = await getPhotos(this.project, object);
+      if (this.#object !== object) return;
+      this.#all = found;
+      if (!found.of.includes(this.#of)) this.#of = found.of.at(-1) ?? "placed";
+      this.#draw();
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** The box of the finished scene; null where there is none. */
+  get box() {
+    const { world_from_object: pose, dimensions_m: size } = this.#all ?? {};
+    return pose && size ? { pose, size } : null;
+  }
+
+  /** Draw the box as a correction would have it; null draws the stored one. @param {{ pose: number[][], size: number[] } | null} box */
+  preview(box) {
+    this.#preview = box;
+    this.#drawBox();
+  }
+
+  /** @param {number} step */
+  move(step) {
+    const count = this.#all?.photos.length ?? 0;
+    if (count) this.#at = (this.#at + step + count) % count;
+    this.#draw();
+  }
+
+  /** @param {boolean} on whether the mesh is hidden for as long as a key is held */
+  blink(on) {
+    this.#pictures.classList.toggle("blink", on);
+  }
+
+  get #current() {
+    return this.#all?.photos[this.#at];
+  }
+
+  #draw() {
+    const all = this.#all;
+    const photo = this.#current;
+    this.#pictures.hidden = !photo;
+    if (!all || !photo || !all.of.length) {
+      this.#tools.replaceChildren();
+      this.#legend.textContent = "No photo to check this object on: run the pipeline first.";
+      return this.#strip.replaceChildren();
+    }
+    this.#photo.src = this.#frameUrl(photo, 960);
+    this.#photo.alt = `Frame ${photo.frame}`;
+    this.#over.src = this.#overlayUrl(photo, this.#of, this.#look);
+    this.#over.alt = `${OF[this.#of]}, ${LOOKS[this.#look].toLowerCase()}`;
+    const before = this.#of === "fitted" ? "primitive" : "placed";
+    this.#under.hidden = this.#look !== "ghost" || this.#of === before;
+    if (!this.#under.hidden) this.#under.src = this.#overlayUrl(photo, before, "ghost");
+    this.#drawTools(all, before);
+    this.#drawBox();
+    this.#fade();
+    this.#legend.textContent =
+      this.#look === "residual"
+        ? "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree."
+        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}. Hold B for the photo alone; double click pins a comment.`;
+    this.#strip.replaceChildren(...all.photos.map((other, k) => this.#thumb(other, k)));
+  }
+
+  /**
+   * @param {ObjectPhotos} all
+   * @param {Of} before
+   */
+  #drawTools(all, before) {
+    /** @type {(text: string, on: boolean, act: () => void) => HTMLElement} */
+    const button = (text, on, act) => {
+      const made = h("button", { type: "button", "aria-pressed": String(on) }, text);
+      made.addEventListener("click", () => (act(), this.#draw()));
+      return made;
+    };
+    const looks = /** @type {Look[]} */ (Object.keys(LOOKS));
+    this.#tools.replaceChildren(
+      ...all.of.map((of) => button(OF[of], of === this.#of, () => (this.#of = of))),
+      h("span", { class: "spring" }),
+      ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look))),
+      h("label", { class: "row" }, "Opacity", this.#opacity),
+      ...(this.#under.hidden ? [] : [h("label", { class: "row" }, OF[before], this.#split, OF[this.#of])]),
+    );
+  }
+
+  /**
+   * @param {Photo} photo
+   * @param {number} k
+   */
+  #thumb(photo, k) {
+    const image = h("img", { src: this.#frameUrl(photo, 160), alt: "" });
+    const button = h(
+      "button",
+      { type: "button", "aria-label": `Photo ${photo.frame}`, "aria-current": String(k === this.#at) },
+      image,
+    );
+    button.addEventListener("click", () => ((this.#at = k), this.#draw()));
+    return button;
+  }
+
+  #fade() {
+    const share = Number(this.#split.value);
+    this.#over.style.opacity = this.#under.style.opacity = String(Number(this.#opacity.value) / 100);
+    this.#over.style.clipPath = this.#under.hidden ? "" : `inset(0 ${100 - share}% 0 0)`;
+    this.#under.style.clipPath = `inset(0 0 0 ${share}%)`;
+  }
+
+  #drawBox() {
+    const photo = this.#current;
+    const box = this.#preview;
+    this.#lines.replaceChildren();
+    if (!photo || !box) return;
+    this.#lines.setAttribute("viewBox", `0 0 ${photo.width} ${photo.height}`);
+    for (const { from, to, front } of boxEdges(box.pose, box.size, photo)) {
+      const line = document.createElementNS(this.#lines.namespaceURI, "line");
+      const at = { x1: from[0], y1: from[1], x2: to[0], y2: to[1] };
+      for (const [name, value] of Object.entries(at)) line.setAttribute(name, String(value));
+      line.setAttribute("class", front ? "front" : "side");
+      this.#lines.append(line);
+    }
+  }
+
+  /** @param {MouseEvent} event */
+  #pin(event) {
+    const photo = this.#current;
+    if (!photo) return;
+    const shown = this.#photo.getBoundingClientRect();
+    const x = ((event.clientX - shown.left) / shown.width) * photo.width;
+    const y = ((event.clientY - shown.top) / shown.height) * photo.height;
+    this.emit("pin-point", { frame: photo.frame, x, y });
+  }
+
+  /**
+   * @param {Photo} photo
+   * @param {number} width
+   */
+  #frameUrl(photo, width) {
+    return `/media/${this.project}/frames/${photo.frame}.jpg?w=${width}`;
+  }
+
+  /**
+   * @param {Photo} photo
+   * @param {Of} of
+   * @param {Look} look
+   */
+  #overlayUrl(photo, of, look) {
+    return `/media/${this.project}/overlay/${this.#object}/${photo.frame}.png?of=${of}&look=${look}&v=${this.#all?.version ?? ""}`;
+  }
+}

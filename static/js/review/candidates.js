@@ -1,0 +1,118 @@
+/** Candidates side by side from the same camera, each with its evidence; the one that is used says why. */
+
+import { h, icon } from "../dom.js";
+import { counted } from "../lib/format.js";
+
+/** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
+/** @typedef {import("../api-types").Candidate} Candidate */
+
+/**
+ * @param {CandidateGroup} group
+ * @param {string} current the one shown in 3D
+ * @param {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void }} told
+ */
+export function gallery(group, current, told) {
+  return h("div", { class: "candidates" }, ...ranked(group).map((candidate) => card(group, candidate, current, told)));
+}
+
+/**
+ * Why this one, and which came second.
+ * @param {CandidateGroup} group
+ */
+export function choice(group) {
+  const second = group.ranking.find((id) => id !== group.chosen);
+  return h(
+    "p",
+    {},
+    group.chosen_by === "person" ? "Chosen by a person: " : "Chosen automatically: ",
+    h("span", { class: "muted" }, group.reason),
+    second ? h("span", { class: "muted" }, ` Runner-up: ${second}.`) : "",
+  );
+}
+
+/** @param {CandidateGroup} group */
+function ranked(group) {
+  const place = new Map(group.ranking.map((id, k) => [id, k]));
+  /** @type {(candidate: Candidate) => number} */
+  const order = ({ id }) => (id === group.chosen ? -1 : (place.get(id) ?? group.ranking.length));
+  return group.candidates.toSorted((a, b) => order(a) - order(b));
+}
+
+/**
+ * @param {CandidateGroup} group
+ * @param {Candidate} candidate
+ * @param {string} current
+ * @param {Parameters<typeof gallery>[2]} told
+ */
+function card(group, candidate, current, told) {
+  const show = h("button", { type: "button", class: "show", "aria-label": `Show ${candidate.id} in 3D` });
+  show.append(h("img", { src: candidate.thumbnail, alt: "", loading: "lazy" }));
+  show.addEventListener("click", () => told.show(candidate));
+  const second = candidate.id === group.ranking.find((id) => id !== group.chosen);
+  const said = candidate.verdict
+    ? `${candidate.verdict} by ${candidate.verdict_by}${candidate.verdict_reason ? `: ${candidate.verdict_reason}` : ""}`
+    : "";
+  return h(
+    "article",
+    { class: candidate.id === current ? "current" : "" },
+    show,
+    h(
+      "div",
+      { class: "body" },
+      h(
+        "div",
+        { class: "row" },
+        h("strong", {}, candidate.id),
+        candidate.id === group.chosen ? h("span", { class: "chip good" }, "★ used") : "",
+        second ? h("span", { class: "chip" }, "runner-up") : "",
+      ),
+      h("div", { class: "chips" }, ...evidence(candidate)),
+      said ? h("div", { class: "muted" }, said) : "",
+      ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
+      h(
+        "div",
+        { class: "verdicts" },
+        verdict(candidate, "accepted", told.verdict),
+        verdict(candidate, "rejected", told.verdict),
+      ),
+    ),
+  );
+}
+
+/** @param {Candidate} candidate */
+function evidence({ metrics, watertight, faces, generator }) {
+  /** @type {[string, boolean][]} text, and whether it is a warning */
+  const chips = [];
+  if (metrics.mask_iou !== undefined)
+    chips.push([`mask ${(100 * metrics.mask_iou).toFixed(0)} %`, metrics.mask_iou < 0.8]);
+  if (metrics.depth_residual_m !== undefined) {
+    chips.push([`depth ${(1000 * metrics.depth_residual_m).toFixed(0)} mm`, metrics.depth_residual_m > 0.02]);
+  }
+  if (metrics.seen_fraction !== undefined) chips.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
+  if (metrics.extent_middle !== undefined && metrics.extent_short !== undefined) {
+    chips.push([`1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
+  }
+  chips.push(
+    [watertight ? "watertight" : "not watertight", !watertight],
+    [counted(faces, "face"), false],
+    [generator, false],
+  );
+  return chips.map(([text, bad]) => h("span", { class: bad ? "chip warn" : "chip" }, text));
+}
+
+/**
+ * @param {Candidate} candidate
+ * @param {"accepted" | "rejected"} said
+ * @param {Parameters<typeof gallery>[2]["verdict"]} told
+ */
+function verdict(candidate, said, told) {
+  const [name, text] = said === "accepted" ? ["check", "Accept"] : ["cross", "Reject"];
+  const button = h(
+    "button",
+    { type: "button", "aria-pressed": String(candidate.verdict === said) },
+    icon(name ?? ""),
+    text,
+  );
+  button.addEventListener("click", () => told(candidate, said));
+  return button;
+}
