@@ -12,6 +12,7 @@ from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.edges import as_lab, panel_edges
 from r2c2r_core.segment.fronts import Front, near_plane, nudged, wall_behind
 from r2c2r_core.segment.handles import find_handles
+from r2c2r_core.segment.outline import outlined
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
@@ -51,8 +52,9 @@ def appliance_front(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, 
     wall = wall_behind(run, cell, room, hint.depth_m)
     depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
     front = squared(replace(front, depth_m=depth), bench.scene)
+    front, outlined_depth = outlined(front, bench.scene, hint.depth_m, wall)
     front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
-    return front, seen
+    return front, seen or outlined_depth
 
 
 def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize, support_row: float | None) -> Cell | None:

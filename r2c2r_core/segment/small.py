@@ -12,6 +12,7 @@ from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import colours_of, occluders, raised, small_mask, support_offset, usual_shift
 from r2c2r_core.segment.things import Thing, ThingConfig, support_height
 from r2c2r_core.segment.upright import WANDERS_M, upright_shape
+from r2c2r_core.segment.viewpoints import best_views
 from r2c2r_core.segment.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 
 _FRAMES = 18
@@ -32,7 +33,7 @@ def find_small(
     """A small thing's visual hull; None when depth shows nothing that stands apart at the clicks."""
     support = support_height(scene, positives, config)
     voxels = _voxels_around(scene, positives, config, support)
-    views = _best_views(scene, positives.mean(axis=0), _FRAMES)
+    views = best_views(scene, positives.mean(axis=0), _FRAMES)
     if len(views) < 2:
         return None
     spread = _pose_spread(scene, views, support, positives.mean(axis=0))
@@ -68,7 +69,7 @@ def glimpse_small(
 ) -> Thing | None:
     """The same from the depth of a few frames alone: a first look within the time of a click."""
     support = support_height(scene, positives, config)
-    views = _best_views(scene, positives.mean(axis=0), _GLIMPSE_FRAMES)[:_GLIMPSE_FRAMES]
+    views = best_views(scene, positives.mean(axis=0), _GLIMPSE_FRAMES)[:_GLIMPSE_FRAMES]
     if len(views) < 2:
         return None
     voxels = _voxels_around(scene, positives, config, support, _GLIMPSE_VOXELS)
@@ -135,9 +136,19 @@ def _too_wide(thing: Thing, config: ThingConfig) -> bool:
 
 def _lost(thing: Thing, scene: Scene, views: list[Frame], positives: Points) -> bool:
     """Whether the hull left a click, or shows in too few of the frames that see the clicks."""
-    away = [float(np.linalg.norm(thing.vertices - point, axis=1).min()) for point in positives]
+    away = [_from_hull(thing, point, views) for point in positives]
     shown = [bool(small_mask(thing, scene, frame)[0].any()) for frame in views[::2]]
     return max(away) > 0.02 or float(np.mean(shown)) < 0.7
+
+
+def _from_hull(thing: Thing, click: Vector3, views: list[Frame]) -> float:
+    """How far a click's point lies from the hull, metres; along the line of sight, depth of a curved thing may be off."""
+    sight = click - np.mean([frame.world_from_camera.translation for frame in views], axis=0)
+    sight /= max(float(np.linalg.norm(sight)), 1e-6)
+    offset = thing.vertices - click
+    along = offset @ sight
+    across = np.linalg.norm(offset - along[:, None] * sight, axis=1)
+    return float(np.hypot(across, np.maximum(np.abs(along) - _DEPTH_SLACK_M, 0)).min())
 
 
 def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre: Vector3) -> float:
@@ -163,34 +174,6 @@ def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support
     )
     size = max(0.003, float(np.prod(high - low) / count) ** (1 / 3))
     return Voxels(low, size, tuple(np.ceil((high - low) / size).astype(int).tolist()))
-
-
-def _best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
-    """Frames in which nothing hides the point, spread over the directions they look from."""
-    rated: list[tuple[float, Frame, float]] = []
-    for frame, local in zip(scene.frames, scene.seen_from_all(point), strict=True):
-        camera = frame.rgb_camera
-        if local[2] < 0.2:
-            continue
-        u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
-        margin = 0.04 * camera.width
-        if not (margin < u < camera.width - margin and margin < v < camera.height - margin):
-            continue
-        seen = scene.filled_depth(frame.index)
-        at = seen[int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)]
-        if 0 < at < local[2] - 0.08:
-            continue
-        away = point - frame.world_from_camera.translation
-        rated.append((float(np.sqrt(max(frame.sharpness, 1e-3)) / local[2]), frame, float(np.arctan2(away[1], away[0]))))
-    if not rated:
-        return []
-    middle = np.angle(np.exp(1j * np.array([yaw for _, _, yaw in rated])).mean())
-    bins: dict[int, list[tuple[float, Frame]]] = {}
-    for score, frame, yaw in rated:
-        bins.setdefault(round(float(np.angle(np.exp(1j * (yaw - middle)))) / np.radians(8)), []).append((score, frame))
-    per_bin = max(2, -(-count // len(bins)))
-    chosen = [item for _, items in sorted(bins.items()) for item in sorted(items, key=lambda item: -item[0])[:per_bin]]
-    return [frame for _, frame in sorted(chosen, key=lambda item: -item[0])[: count + 4]]
 
 
 def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | None) -> np.ndarray:
