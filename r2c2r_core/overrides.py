@@ -11,7 +11,8 @@ from r2c2r_core.model.inputs import HingeSide, ObjectOverride, Overrides
 
 NO_OVERRIDES = Overrides(objects={})
 
-_OBJECT_KEYS = ("candidate", "hinge", "dimensions_m", "pose", "joint_limits", "front", "rejected")
+_OBJECT_KEYS = ("candidate", "hinge", "dimensions_m", "pose", "joint_limits", "front", "rejected", "regenerate")
+_MOST_BATCHES = 20
 _SCENE_KEYS = ("up", "floor", "manhattan_yaw", "walls")
 
 
@@ -19,9 +20,9 @@ def read_overrides(path: Path) -> Overrides:
     """Corrections from `{"version": 1, "objects": {name: {…}}, "scene": {…}}`; unknown keys are refused.
 
     Per object: candidate (an id, or a mesh file relative to this file), hinge, dimensions_m [w, d, h], pose (4x4
-    world_from_object), joint_limits [lower, upper], front [x, y, z] (world), rejected [candidate ids]. Per scene: up
-    [x, y, z] (capture frame), floor (metres along up), manhattan_yaw (rad), walls [[x, y, offset]] (world
-    frame: the normal in plan, into the room, and the plane's distance from the origin along it).
+    world_from_object), joint_limits [lower, upper], front [x, y, z] (world), rejected [candidate ids], regenerate (times
+    further candidates were asked for). Per scene: up [x, y, z] (capture frame), floor (metres along up), manhattan_yaw (rad),
+    walls [[x, y, offset]] (world frame: the normal in plan, into the room, and the plane's distance from the origin along it).
     """
     try:
         document = json.loads(path.read_text())
@@ -70,6 +71,9 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
     dimensions = _vector(where, f"{name}.dimensions_m", entry.get("dimensions_m"))
     if dimensions is not None and (dimensions <= 0).any():
         raise OverrideError(f"{where}: {name}.dimensions_m is {dimensions.tolist()}", hint="expected three positive metres")
+    regenerate = entry.get("regenerate", 0)
+    if not isinstance(regenerate, int) or not 0 <= regenerate <= _MOST_BATCHES:
+        raise OverrideError(f"{where}: {name}.regenerate is {regenerate!r}", hint=f"expected 0 to {_MOST_BATCHES}")
     candidate = entry.get("candidate")
     if candidate is not None and (folder / candidate).is_file():
         candidate = str((folder / candidate).resolve())
@@ -82,6 +86,7 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
         joint_upper=None if limits is None else float(limits[1]),
         front_world=_vector(where, f"{name}.front", entry.get("front")),
         rejected=tuple(entry.get("rejected", ())),
+        regenerate=regenerate,
     )
 
 

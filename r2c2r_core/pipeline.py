@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
+from math import isfinite
 from pathlib import Path
 
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.align.stage import place_mesh
 from r2c2r_core.config import ReconstructConfig
-from r2c2r_core.errors import StageError
+from r2c2r_core.errors import PlacementFailed, StageError
 from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.consensus import Rule, choose_candidate, chosen_by_person
 from r2c2r_core.generate.stage import GENERATORS, generate_candidates, marked, with_uploads
@@ -26,9 +27,12 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.prompts import check_prompts
 from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
+from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.stage import build_scene
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace, file_key
+
+_MOST_WEIGHED = 5  # candidates placed for their evidence: about 4 s each on one core
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,25 +161,40 @@ def make_candidates(
     """Every object's candidates. Where the chosen generator fails on one, the weight-free one stands in, with a warning.
 
     The failure is not stored, so that the next run asks the chosen generator again. A mesh given by a person joins the
-    candidates that are there: nothing is generated anew for it.
+    candidates that are there, and so do further ones that a person asked for: nothing is generated anew for them.
     """
     config, chosen = request.config.generate, request.tools.generator
 
     def made_by(
         generator: str, objects: dict[str, Kept[MaskTrack]], excuse: Mapping[str, str]
     ) -> dict[str, Kept[CandidateSet]]:
-        def inputs(name: str, given: tuple[Path, ...]) -> tuple[object, ...]:
-            return generator, config, request.seed, excuse.get(name), *map(file_key, given)
+        def inputs(name: str, given: tuple[Path, ...], batch: int) -> tuple[object, ...]:
+            weighing = () if generator == GENERATORS.default and not given else _weighing_key(request)
+            return generator, config, request.seed, batch, excuse.get(name), weighing, *map(file_key, given)
 
         def make(name: str, track: MaskTrack, progress: Progress) -> CandidateSet:
-            given = _uploads(request.overrides, name)
-            before = ledger.stored("generate", name, tracks[name], inputs(name, ())) if given else None
+            given, batch = _uploads(request.overrides, name), request.overrides.of(name).regenerate
+            before = ledger.stored("generate", name, tracks[name], inputs(name, (), batch)) if given else None
             if before is not None:
-                return with_uploads(before, given, config.rule)
-            found = generate_candidates(capture, track, generator, config, uploads=given, seed=request.seed, progress=progress)
+                return weighed(capture, track, with_uploads(before, given, config.rule), request, progress)
+            found = generate_candidates(
+                capture,
+                track,
+                generator,
+                config,
+                uploads=given,
+                seed=request.seed,
+                batch=batch,
+                earlier=ledger.stored("generate", name, tracks[name], inputs(name, (), batch - 1)) if batch else None,
+                progress=progress,
+            )
+            found = weighed(capture, track, found, request, progress)
             return marked(found, excuse[name]) if name in excuse else found
 
-        return ledger.each("generate", objects, lambda name: inputs(name, _uploads(request.overrides, name)), make)
+        def inputs_now(name: str) -> tuple[object, ...]:
+            return inputs(name, _uploads(request.overrides, name), request.overrides.of(name).regenerate)
+
+        return ledger.each("generate", objects, inputs_now, make)
 
     made = made_by(chosen, tracks, {})
     missing = {name: track for name, track in tracks.items() if name not in made}
@@ -185,6 +204,35 @@ def make_candidates(
     excuses = {name: f"{chosen} made no mesh, {GENERATORS.default} stands in: {why}" for name, why in reasons.items()}
     stood_in = made_by(GENERATORS.default, missing, excuses)
     return {name: {**made, **stood_in}[name] for name in tracks if name in made or name in stood_in}
+
+
+def weighed(
+    capture: Capture, track: MaskTrack, found: CandidateSet, request: Request, progress: Progress = SILENT
+) -> CandidateSet:
+    """The candidates of generators that do not know their place, placed and compared with masks and depth; ranked anew.
+
+    The most likely few: one that no pose fits, or that was not tried, is known by its shape alone.
+    """
+    unknown = [c for c in found.candidates if "mask_iou" not in c.metrics]
+    if not unknown or len(found.candidates) == 1:
+        return found
+    tried = sorted(unknown, key=lambda c: found.ranking.index(c.candidate_id))[:_MOST_WEIGHED]
+    fits: dict[str, dict[str, float]] = {}
+    for k, asset in enumerate(tried):
+        part = progress.part(k / len(tried), (k + 1) / len(tried))
+        with suppress(PlacementFailed):
+            placed = place_mesh(
+                capture, track, asset, request.tools.matcher, request.config.align, seed=request.seed, progress=part
+            )
+            depth = {"depth_residual_m": placed.rms_m} if isfinite(placed.rms_m) else {}
+            fits[asset.candidate_id] = {"mask_iou": placed.mask_iou, **depth}
+    candidates = [replace(c, metrics={**c.metrics, **fits.get(c.candidate_id, {})}) for c in found.candidates]
+    return choose_candidate(candidates, rule=request.config.generate.rule)
+
+
+def _weighing_key(request: Request) -> tuple[object, ...]:
+    """What the evidence of placed candidates depends on beside them."""
+    return source_key("align"), request.tools.matcher, request.config.align
 
 
 def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) -> CandidateSet:

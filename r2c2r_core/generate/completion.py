@@ -28,29 +28,50 @@ class Completion:
 
     def make(self, evidence: Evidence, candidate_id: str, seed: int) -> MeshAsset:
         """One candidate from a random subset of the good frames and random parameters."""
-        name = evidence.track.name
-        rng = np.random.default_rng([seed, zlib.crc32(name.encode()), zlib.crc32(candidate_id.encode())])
+        rng = _generator(evidence, candidate_id, seed)
         variation = draw_variation(evidence, rng)
-        shape = _make_shape(evidence, variation)
-        if not _is_solid(shape):
-            raise GenerationFailed(f"{name}: candidate {candidate_id} did not close")
+        shape = _solid_shape(evidence, variation, candidate_id)
         atlas = _cut_open(shape)
         # a bare side may show in a few frames only, so furniture is pictured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
         picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m)
-        consistency = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
         return MeshAsset(
-            object_name=name,
+            object_name=evidence.track.name,
             candidate_id=candidate_id,
             mesh=unposed(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture, rng),
             generator="completion",
             seed=seed,
             watertight=True,
             frames=tuple(sorted(view.frame_index for view in variation.views)),
-            metrics={**shape_metrics(shape.vertices_local, shape.faces), "seen_fraction": picture.seen_fraction, **consistency},
+            metrics={**_metrics(shape, evidence), "seen_fraction": picture.seen_fraction},
             parameters={**variation.parameters, **shape.parameters},
             warnings=shape.warnings,
         )
+
+    def measured(self, evidence: Evidence, candidate_id: str, seed: int) -> tuple[Shape, dict[str, float]]:
+        """The same candidate where it stands, without a picture, and its measures."""
+        variation = draw_variation(evidence, _generator(evidence, candidate_id, seed))
+        shape = _solid_shape(evidence, variation, candidate_id)
+        return shape, _metrics(shape, evidence)
+
+
+def _generator(evidence: Evidence, candidate_id: str, seed: int) -> np.random.Generator:
+    """Randomness of one candidate of one object."""
+    return np.random.default_rng([seed, zlib.crc32(evidence.track.name.encode()), zlib.crc32(candidate_id.encode())])
+
+
+def _solid_shape(evidence: Evidence, variation: Variation, candidate_id: str) -> Shape:
+    """The shape, closed; raises GenerationFailed."""
+    shape = _make_shape(evidence, variation)
+    if not _is_solid(shape):
+        raise GenerationFailed(f"{evidence.track.name}: candidate {candidate_id} did not close")
+    return shape
+
+
+def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
+    """Scale-free measures, and how the shape fits the masks and depth of the frames that judge all candidates alike."""
+    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
+    return {**shape_metrics(shape.vertices_local, shape.faces), **fit}
 
 
 def _make_shape(evidence: Evidence, variation: Variation) -> Shape:

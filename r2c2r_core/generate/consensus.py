@@ -5,8 +5,9 @@ backends.md §2.6: the candidates come in frames and units of their own, so the 
 longest, filled share of the box); and the mean follows outliers (solid IoU 0.734, no better than a random pick), so the
 default is the medoid (0.780), joined with the candidates' own consistency with masks and depth (0.783).
 
-Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m. The last two
-are unknown for an uploaded mesh, which is then judged by its shape alone.
+Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m, faces. Masks and
+depth are unknown for a mesh whose generator does not know its place, until it was placed (pipeline.py does that); without
+them it is judged by its shape alone. An open mesh, or one with more faces than a simulator likes, has to fit better to win.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ Rule = Literal["medoid", "mean"]
 
 _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
 _DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
+_OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
+_MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
 
 
 def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str] = (), rule: Rule = "medoid") -> CandidateSet:
@@ -32,7 +35,7 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
         raise GenerationFailed(f"{name}: every candidate was rejected", hint="take one back, upload a mesh or change the seed")
     oddness = _oddness(candidates, allowed, rule)
     doubt = _doubt(candidates)
-    cost = oddness + doubt
+    cost = oddness + doubt + _flaws(candidates)
     order = sorted(range(len(candidates)), key=lambda i: (i not in allowed, round(float(cost[i]), 12), i))
     best = order[0]
     return CandidateSet(
@@ -78,6 +81,23 @@ def _doubt(candidates: Sequence[MeshAsset]) -> np.ndarray:
     return np.where(missing, np.median(values[~missing]) if (~missing).any() else 0.0, values)
 
 
+def _flaws(candidates: Sequence[MeshAsset]) -> np.ndarray:
+    """What a mesh costs that later stages can use less well."""
+    faces = np.array([c.metrics.get("faces", 0.0) for c in candidates])
+    heavy = _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0))
+    return np.asarray(heavy + [0.0 if c.watertight else _OPEN_COST for c in candidates])
+
+
+def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
+    """What the published rule (nearest to the mean box and volume) takes, to end the sentence; empty without a choice."""
+    if len(allowed) < 3 or rule == "mean":
+        return ""
+    from_mean = _oddness(candidates, allowed, "mean")
+    theirs = min(allowed, key=lambda i: (round(float(from_mean[i]), 12), i))
+    taken = "takes it too" if theirs == best else f"would take {candidates[theirs].candidate_id}"
+    return f"; the paper's rule, nearest to the mean box and volume, {taken}"
+
+
 def _reason(
     candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], oddness: np.ndarray, doubt: np.ndarray, rule: Rule
 ) -> str:
@@ -87,13 +107,12 @@ def _reason(
     skipped = f" ({passed_over} rejected)" if passed_over else ""
     if count == 1:
         return f"{chosen.candidate_id} is the only candidate left{skipped}."
+    beside = _papers_choice(candidates, best, allowed, rule)
     middle = "mean" if rule == "mean" else "others"
     shape = f"its proportions differ {100 * oddness[best]:.1f} % from the {middle} of {count}{skipped}"
     if "mask_iou" not in chosen.metrics:
-        return f"{chosen.candidate_id}: {shape}; its fit to masks and depth is known only after alignment."
+        return f"{chosen.candidate_id}: {shape}; its fit to masks and depth is known only after alignment{beside}."
     place = 1 + sum(1 for i in allowed if doubt[i] < doubt[best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
-    return (
-        f"{chosen.candidate_id}: {shape}, with mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count})."
-    )
+    return f"{chosen.candidate_id}: {shape}, with mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count}){beside}."

@@ -93,10 +93,14 @@ def generate_candidates(
     uploads: tuple[Path, ...] = (),
     rejected: tuple[str, ...] = (),
     seed: int = 0,
+    batch: int = 0,
+    earlier: CandidateSet | None = None,
     progress: Progress = SILENT,
 ) -> CandidateSet:
     """Candidates of one object, each in an arbitrary frame and unit, and the consensus among those nobody rejected.
 
+    With `batch` n there are n more times as many: a candidate's draw (frames, settings, seed) follows from its id, and ids go
+    on, so no draw comes again. `earlier` is what the batches before this one gave, made anew where it is not at hand.
     A candidate that fails is left out; raises GenerationFailed when none is left, OverrideError for an unusable upload, and
     BackendUnavailable when the generator cannot be used on this machine at all.
     """
@@ -104,7 +108,10 @@ def generate_candidates(
     backend = load_generator(generator, config, progress)
     progress.at(0.0, f"{track.name}: loading frames")
     evidence = gather_evidence(capture, track, config.pool_frames)
-    made, failures = _make_all(backend, evidence, config.count, seed, progress.part(0.1, 1.0))
+    kept = [] if earlier is None else [c for c in earlier.candidates if c.generator != "upload"]
+    numbers = range(0 if earlier is None else batch * config.count, (batch + 1) * config.count)
+    made, failures = _make_all(backend, evidence, [f"c{k}" for k in numbers], seed, progress.part(0.1, 1.0))
+    made = [*kept, *made]
     if not made and not given:
         raise GenerationFailed(
             f"{track.name}: {_count_of(failures)} failed: {failures[0]}",
@@ -141,19 +148,21 @@ def marked(found: CandidateSet, warning: str) -> CandidateSet:
 
 
 def _warned(asset: MeshAsset, warning: str) -> MeshAsset:
+    if warning in asset.warnings:
+        return asset
     return replace(asset, warnings=(warning, *asset.warnings))
 
 
 def _make_all(
-    backend: MeshGenerator, evidence: Evidence, count: int, seed: int, progress: Progress
+    backend: MeshGenerator, evidence: Evidence, names: list[str], seed: int, progress: Progress
 ) -> tuple[list[MeshAsset], list[str]]:
     """The candidates that could be made, and why the others could not; a generator that is gone is not asked again."""
     made: list[MeshAsset] = []
     failures: list[str] = []
-    for k in range(count):
-        progress.at(k / count, f"{evidence.track.name}: candidate {k + 1} of {count}")
+    for k, name in enumerate(names):
+        progress.at(k / len(names), f"{evidence.track.name}: candidate {k + 1} of {len(names)}")
         try:
-            asset = _attempt(partial(backend.make, evidence, f"c{k}", seed), failures)
+            asset = _attempt(partial(backend.make, evidence, name, seed), failures)
         except BackendUnavailable as error:
             log.warning("%s: %s", evidence.track.name, error)
             failures.append(str(error))

@@ -10,6 +10,7 @@ _LEAST_SHARE = 0.15  # of a side that must be seen before its own colours are us
 _BEFORE_FACE_M = 0.002
 _NEIGHBOURS = 4
 _MOST_KNOWN = 12_000
+_CELLS_A_REACH = 40  # colours fade over a reach: within a cell they hardly change
 _REACH = 0.15  # of the mesh's size: further from anything seen, the median colour is as good a guess
 
 
@@ -79,11 +80,22 @@ def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, p
         return
     known = known[:: max(len(known) // _MOST_KNOWN, 1)]
     reach = _REACH * float(np.linalg.norm(np.ptp(points, axis=0)))
-    distance, neighbour = cKDTree(points[known]).query(places, k=min(_NEIGHBOURS, len(known)), distance_upper_bound=reach)
-    distance, neighbour = distance.reshape(len(missing), -1), neighbour.reshape(len(missing), -1)
+    asked, of_cell = _by_cell(places, reach / _CELLS_A_REACH)
+    found = cKDTree(points[known]).query(asked, k=min(_NEIGHBOURS, len(known)), distance_upper_bound=reach)
+    distance, neighbour = (values.reshape(len(asked), -1)[of_cell] for values in found)
     near = np.isfinite(distance)
     weight = np.where(near, 1.0 / np.maximum(distance, 1e-4), 0.0)
     samples = filled[known[np.where(near, neighbour, 0)]]
     nearby = (samples * weight[..., None]).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)[:, None]
     trust = np.where(near[:, :1], np.exp(-((2.0 * distance[:, :1] / reach) ** 2)), 0.0)
     filled[missing] = np.round(trust * nearby + (1 - trust) * filled[missing]).clip(0, 255).astype(np.uint8)
+
+
+def _by_cell(places: Points, size_m: float) -> tuple[Points, np.ndarray]:
+    """One of the places in each occupied cell of space, and the cell of every place: neighbours are alike within it."""
+    cell = np.floor((places - places.min(axis=0)) / max(size_m, 1e-9)).astype(np.int64)
+    count = cell.max(axis=0) + 1
+    _, first, of_cell = np.unique(
+        (cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2], return_index=True, return_inverse=True
+    )
+    return places[first], of_cell

@@ -46,6 +46,7 @@ class ObjectOverride:
     joint_upper: float | None = None
     front_world: Vector3 | None = None  # direction the front faces, in the world
     rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
+    regenerate: int = 0  # times a reviewer asked for further candidates
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -3,14 +3,18 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.errors import BackendUnavailable
-from r2c2r_core.generate.stage import GenerateConfig
+from r2c2r_core.generate.consensus import choose_candidate
+from r2c2r_core.generate.stage import GenerateConfig, generate_candidates
+from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.ledger import Kept, Ledger
 from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
-from r2c2r_core.pipeline import Request, Tools, make_candidates, restricted_licences
+from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.pipeline import Request, Tools, make_candidates, restricted_licences, select_candidate, weighed
 from r2c2r_core.progress import SILENT
 from r2c2r_core.workspace import Workspace
 from tests.core.generate import scenes
@@ -104,6 +108,49 @@ def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
             found = make_candidates(request_for(address, overrides), ledger, capture, {"bad_1": tracks["bad_1"]})
             keys.append(found["bad_1"].key)
     assert keys[0] == keys[1] != keys[2]
+
+
+def test_further_candidates_join_those_that_are_there_and_repeat_none(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    one = {"bad_1": tracks["bad_1"]}
+    asked_again = Overrides(objects={"bad_1": ObjectOverride(rejected=("c0",), regenerate=1)})
+
+    def run(overrides, work):
+        request = replace(request_for("http://nowhere", overrides), tools=Tools())
+        return make_candidates(request, Ledger(Workspace(tmp_path / work), SILENT), capture, one)["bad_1"]
+
+    first = run(Overrides(objects={}), "kept")
+    further, anew = run(asked_again, "kept"), run(asked_again, "empty")
+    assert [c.candidate_id for c in further.value.candidates] == ["c0", "c1"]
+    assert further.key != first.key
+    old, new = further.value.candidates
+    assert np.array_equal(old.mesh.vertices, first.value.chosen.mesh.vertices)
+    assert new.parameters != old.parameters  # another draw
+    assert anew.key == further.key
+    for one_way, other_way in zip(further.value.candidates, anew.value.candidates, strict=True):
+        assert np.array_equal(one_way.mesh.vertices, other_way.mesh.vertices)
+    chosen = select_candidate(further.value, asked_again.of("bad_1"), "medoid")
+    assert chosen.chosen_id == "c1"
+
+
+def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
+    """A bottle and a flat box of the same odd looks: shape alone cannot tell which of two is right, masks and depth can."""
+    capture, tracks = two_bottles
+    track = tracks["good_1"].value
+    bottle = generate_candidates(capture, track, "completion", GenerateConfig(count=1, pool_frames=6)).chosen
+    shape_only = {k: v for k, v in bottle.metrics.items() if k not in ("mask_iou", "depth_residual_m")}
+    vertices, faces = box_mesh(np.array([-0.5, -0.4, -0.02]), np.array([0.5, 0.4, 0.02]))
+    flat = TexturedMesh(vertices=vertices, faces=faces, uv=np.zeros((len(vertices), 2)), texture=bottle.mesh.texture)
+    pair = (
+        replace(bottle, candidate_id="c0", generator="remote", mesh=flat, metrics=shape_only),
+        replace(bottle, candidate_id="c1", generator="remote", metrics=shape_only),
+    )
+    before = choose_candidate(pair)
+    assert before.chosen_id == "c0"  # a tie
+    after = weighed(capture, track, before, request_for("http://nowhere"))
+    assert after.chosen_id == "c1"
+    assert after.chosen.metrics["mask_iou"] > 0.7
+    assert "mask IoU" in after.reason
 
 
 def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles, tmp_path, monkeypatch):

@@ -100,3 +100,19 @@ def test_a_person_overrules_the_consensus():
 
 def test_equal_candidates_give_the_first():
     assert choose_candidate([replace(FIVE[0], candidate_id=f"c{k}") for k in range(3)]).chosen_id == "c0"
+
+
+def test_the_papers_choice_stands_beside_ours():
+    assert "would take c2" in choose_candidate(FIVE).reason
+    assert "takes it too" in choose_candidate(FIVE[:3]).reason
+    assert "paper" not in choose_candidate(FIVE[:2]).reason
+
+
+def test_an_open_or_very_heavy_mesh_has_to_fit_better_to_win():
+    alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
+    opened = [replace(alike[0], watertight=False), *alike[1:]]
+    assert choose_candidate(opened).ranking == ("c1", "c2", "c0")
+    heavy = [replace(alike[0], metrics={**alike[0].metrics, "faces": 200_000.0}), *alike[1:]]
+    assert choose_candidate(heavy).ranking == ("c1", "c2", "c0")
+    better = [replace(opened[0], metrics={**opened[0].metrics, "mask_iou": 0.9 + 0.11}), *alike[1:]]
+    assert choose_candidate(better).chosen_id == "c0"
