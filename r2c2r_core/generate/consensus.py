@@ -115,4 +115,5 @@ def _reason(
     place = 1 + sum(1 for i in allowed if doubt[i] < doubt[best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
-    return f"{chosen.candidate_id}: {shape}, with mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count}){beside}."
+    fit = f"mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count})"
+    return f"{chosen.candidate_id}: {shape}, with {fit}{beside}."
