@@ -64,16 +64,14 @@ def right_angle_yaw(normals: Points) -> float:
 
 def smallest_rectangle(points: np.ndarray) -> Rectangle:
     """The rectangle of least area around points (n, 2): one side lies on an edge of their hull (Freeman & Shapira 1975)."""
-    best: Rectangle | None = None
     hull = _hull(points)
-    for yaw in _hull_edge_yaws(hull):
-        axes = rotation_about_z(yaw)[:2, :2]
-        low, high = (hull @ axes).min(axis=0), (hull @ axes).max(axis=0)
-        candidate = Rectangle(axes @ ((low + high) / 2), axes, high - low)
-        if best is None or candidate.size.prod() < best.size.prod():
-            best = candidate
-    assert best is not None  # a hull has edges
-    return best
+    yaws = np.array(_hull_edge_yaws(hull))
+    along = np.column_stack([np.cos(yaws), np.sin(yaws)]) @ hull.T  # (edges, corners)
+    across = np.column_stack([-np.sin(yaws), np.cos(yaws)]) @ hull.T
+    best = int(np.argmin(np.ptp(along, axis=1) * np.ptp(across, axis=1)))
+    axes = rotation_about_z(float(yaws[best]))[:2, :2]
+    low, high = (hull @ axes).min(axis=0), (hull @ axes).max(axis=0)
+    return Rectangle(axes @ ((low + high) / 2), axes, high - low)
 
 
 def box_corners(size_m: Vector3) -> Points:

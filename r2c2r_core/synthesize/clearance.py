@@ -12,6 +12,7 @@ from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
 
 _TOUCH_M = 0.0005
+_WALL_TOUCH_M = 0.01  # a wall is a plane through a centimetre of uneven plaster, and a front's edge is known to 8 mm
 _STEPS = 36
 _BEHIND_M = 0.05  # a closed front further behind a wall's plane is not in front of that wall
 _SPARE = {"revolute": np.deg2rad(1.0), "prismatic": 0.003}  # kept free before the obstacle
@@ -69,7 +70,7 @@ def free_travel(
 
     def blocker_at(position: float) -> str | None:
         motion = motion_at(item, joint, position)
-        if (_wall_depths(motion.apply(corners), near_walls) > before + _TOUCH_M).any():
+        if (_wall_depths(motion.apply(corners), near_walls) > before + _WALL_TOUCH_M).any():
             return "a wall"
         return _blocker(_moved(moving, motion), obstacles, near, objects)
 

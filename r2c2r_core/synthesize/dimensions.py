@@ -7,11 +7,13 @@ axes it saw.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.boxes import upright_box
+from r2c2r_core.geometry.free_boxes import powell_box, smallest_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
@@ -25,6 +27,10 @@ from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
 
 _SAMPLES = 6000
 _TO_WALL_M = 0.03  # a back that ends this near the wall stands against it
+_LEVEL = 0.7  # of a unit axis: an axis that rises more is the one that points up
+BoxSearch = Literal["upright", "hull", "powell"]
+"""How a mesh's own axes are found: calipers in plan, where gravity is known; the hull's faces, where it was only assumed; or
+the paper's Powell search (eq. 8-9), for comparison."""
 _TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
 
 
@@ -68,13 +74,16 @@ def measure_object(
     override: ObjectOverride,
     *,
     seed: int = 0,
+    box_search: BoxSearch = "upright",
 ) -> MeasuredObject:
     """Size, pose and handle of one object; every axis says where its number comes from."""
     vertices_world = placement.world_from_mesh.apply(asset.mesh.vertices)
     samples = sampled(vertices_world, asset.mesh.faces, _SAMPLES, seed)
     warnings: list[str] = []
     outward, yaw_known = facing(capture, track, samples)
-    rotation = _mesh_rotation(samples, outward) if not yaw_known else front_rotation(outward)
+    if box_search == "upright" and capture.room.up_source == "assumed":
+        box_search = "hull"
+    rotation = front_rotation(outward) if yaw_known else _mesh_rotation(samples, outward, box_search)
     low, high = mesh_range(samples, rotation, with_front=spec.opening not in ("rigid", "fixed"))
     handle = None
     front = track.front if track.front is not None and _fits(track.front, high - low, warnings) else None
@@ -107,7 +116,7 @@ def measure_object(
         placed_pose=pose,
         warnings=tuple(warnings),
     )
-    return _corrected(replace(measured, spec=spec.at_width(float(measured.dimensions_m[0]))), override)
+    return _corrected(replace(measured, spec=spec.variant(float(measured.dimensions_m[0]), handle)), override)
 
 
 def _drawn_out(track: MaskTrack) -> float | None:
@@ -154,11 +163,16 @@ def front_face_y(points: Points, normals: Points) -> float:
     return float(np.median(near))
 
 
-def _mesh_rotation(samples: SurfaceSamples, outward: Vector3) -> np.ndarray:
-    """The mesh's own upright box, turned by the quarter turn whose front is nearest to `outward`."""
-    box = upright_box(samples.points, samples.normals, trim=_TRIM)
-    fronts = [box.world_from_box.rotation @ d for d in ([0, -1.0, 0], [1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0])]
-    return front_rotation(max(fronts, key=lambda d: float(d @ outward)))
+def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch) -> np.ndarray:
+    """Upright axes along the mesh's own box, turned by the quarter turn whose front is nearest to `outward`."""
+    if search == "upright":
+        axes = upright_box(samples.points, samples.normals, trim=_TRIM).world_from_box.rotation
+    else:
+        free = smallest_box(samples.points) if search == "hull" else powell_box(samples.points)
+        axes = free.world_from_box.rotation
+    level = [sign * axis for axis in axes.T for sign in (-1.0, 1.0) if abs(axis[2]) < _LEVEL]
+    front = max(level, key=lambda d: float(d @ outward), default=outward)
+    return front_rotation(np.array([front[0], front[1], 0.0]))
 
 
 def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:

@@ -26,6 +26,7 @@ class Hinge:
     source: Source
     reason: str
     confidence: float | None  # 0..1; None where the category leaves no choice
+    by_handle: bool = False  # its handle was seen, on the other side
 
 
 def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> dict[str, Hinge]:
@@ -61,11 +62,11 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
         side: HingeSide = "left" if x > 0 else "right"
         trust = handle.confidence * min(abs(x) / (_CERTAIN_OFF_CENTRE * half[0]), 1.0)
         reason = f"the handle is on the {'right' if x > 0 else 'left'}"
-        return Hinge(side=side, source="inferred", reason=reason, confidence=0.5 + 0.5 * float(trust))
+        return Hinge(side=side, source="inferred", reason=reason, confidence=0.5 + 0.5 * float(trust), by_handle=True)
     wide = item.dimensions_m[0] > 1.15 * item.dimensions_m[2]
     if item.spec.name == "wall_cabinet" and wide and not handle.is_vertical and z < -0.4 * half[1]:
         reason, trust = "a wide flap with its handle at the lower edge", 0.5 + 0.5 * handle.confidence
-        return Hinge(side="top", source="inferred", reason=reason, confidence=trust)
+        return Hinge(side="top", source="inferred", reason=reason, confidence=trust, by_handle=True)
     return None
 
 

@@ -26,13 +26,15 @@ def open_all(
 ) -> list[SceneObject]:
     """The objects with free upper limits; a door that cannot open is hung on its other side where that one opens.
 
-    `rebuild` makes object k anew with another hinge. A person's hinge stays; every turned one carries a warning.
+    `rebuild` makes object k anew with another hinge. A person's hinge stays, and one that a handle told: there something
+    else was measured wrong. Every turned one carries a warning.
     """
     fixtures = list(built)
     opened = open_freely(fixtures, walls, kept)
     for index, item in enumerate(built):
         hinge = hinges.get(item.name)
-        if hinge is None or hinge.source == "person" or hinge.side not in _OTHER or _travel(opened[index]) > _BLOCKED_RAD:
+        told = hinge is None or hinge.source == "person" or hinge.by_handle or hinge.side not in _OTHER
+        if hinge is None or told or _travel(opened[index]) > _BLOCKED_RAD:
             continue
         reason = f"hung on the {hinge.side} it could not open"
         turned = rebuild(index, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=_OPENS))

@@ -14,7 +14,7 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
+from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_for, normalised
 from r2c2r_core.synthesize.fixtures.thing import DEFAULT_DENSITY_KG_M3, DENSITY_KG_M3
@@ -34,6 +34,7 @@ class SynthesizeConfig:
 
     version: int = 2  # of the stage's code, so that a changed method re-runs
     seed: int = 0
+    box: BoxSearch = "upright"  # "powell" is the paper's, for comparison (benchmarks/boxes.json)
 
 
 def build_scene(
@@ -52,7 +53,9 @@ def build_scene(
         list(zip(tracks, placements, assets, strict=True)), "measuring"
     ):
         spec, notice = fixture_for(track.category)
-        item = measure_object(capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed)
+        item = measure_object(
+            capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed, box_search=config.box
+        )
         measured.append(replace(item, warnings=(*([notice] if notice else []), *asset.warnings, *item.warnings)))
     progress.at(0.5, "arranging")
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)

@@ -147,6 +147,25 @@ def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
     assert at_edge > 0.9 > off_centre > without == 0.5
 
 
+def test_a_handle_tells_the_hinge_even_where_a_neighbour_is_in_the_way() -> None:
+    """Without a handle the door is hung so that it opens; a handle is seen, and a neighbour may be measured wrong."""
+    block = Unit("block", "counter", (0.25, -0.43, 0.5), (0.06, 0.15, 0.7), kind="thing")
+    sides = []
+    for handle in (None, Handle(0.24, 0.2)):
+        joint = built(Unit("cab", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle), block).objects[0].joints[0]
+        sides.append("left" if joint.origin_object[0] < 0 else "right")
+    assert sides == ["right", "left"]
+
+
+def test_a_wall_that_only_just_touches_an_edge_is_not_in_the_way() -> None:
+    """The free edge of a thick door passes 2 mm beyond its closed place: less than a wall is known to."""
+    wall = Wall(normal=np.array([1.0, 0.0, 0.0]), offset_m=-0.3, area_m2=6.0)
+    fridge = Unit("f", "fridge", (0, 0, 0.9), (0.6, 0.6, 1.8), handle=Handle(-0.24, 0.2), kind="appliance")
+    joint = built(fridge, walls=(wall,)).objects[0].joints[0]
+    assert joint.origin_object[0] > 0
+    assert joint.upper > np.deg2rad(90)
+
+
 def test_an_unknown_category_is_a_rigid_object_with_advice() -> None:
     scene = built(Unit("m", "Micro wave", (0, 0, 0.05), (0.09, 0.09, 0.1), kind="thing"))
     assert scene.objects[0].category == "Micro wave"

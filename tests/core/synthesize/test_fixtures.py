@@ -17,7 +17,7 @@ from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
 from r2c2r_core.synthesize.handles import handles_of_mesh
 from r2c2r_core.synthesize.surface import sampled
 from tests.core.export.conftest import write_folder
-from tests.core.synthesize.kitchen_units import Unit
+from tests.core.synthesize.kitchen_units import Handle, Unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
 from tests.core.synthesize.test_build_scene import built
 
@@ -124,6 +124,11 @@ def test_a_sink_cabinet_is_open_at_the_top(every_fixture: ArticulatedScene) -> N
 def test_a_wide_unit_gets_two_doors(category: str, width: float, fixture: str, doors: int) -> None:
     item = built(Unit("a", category, (0, 0, 0.9), (width, 0.6, 0.8), kind="appliance")).objects[0]
     assert (item.fixture, len(item.joints)) == (fixture, doors)
+
+
+def test_a_wide_fridge_with_its_handle_at_one_edge_has_one_door() -> None:
+    unit = Unit("a", "fridge", (0, 0, 0.9), (0.85, 0.6, 1.8), kind="appliance", handle=Handle(0.36, 0.1))
+    assert len(built(unit).objects[0].joints) == 1
 
 
 def handle_at(z: float, *, x: float = 0.0) -> FrontHandle:
