@@ -1,17 +1,20 @@
 """report.json and report.html: the certificate and the accuracy of a bundle, for programs and for people."""
 
 import html
+from pathlib import Path
 from typing import Any
 
 from r2c2r_core.export.alone import ALLOWED_DRIFT_M
 from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
 from r2c2r_core.export.rules.table import RULES, SIMULATION_RULES
-from r2c2r_core.export.sweeps import NEEDED_TRAVEL
+from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import FORMATS
 from r2c2r_core.model.report import Certificate
 
 REPORT_VERSION = 1
+
+_ASSETS = Path(__file__).parent / "report_page"
 
 
 def report_of(manifest: dict[str, Any], certificate: Certificate, failures: dict[str, str]) -> dict[str, Any]:
@@ -44,13 +47,22 @@ def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict
             _failures(report["failures"]),
             _objects(manifest["objects"], pictures),
             _joints(manifest["objects"], certificate["joints"]),
+            _things(certificate["things"]),
             _loaders(certificate["loaders"]),
             _stages(manifest["stages"]),
             _losses(report["losses"]),
         )
         if part
     )
-    return _PAGE.format(title=f"{name}: report", style=_STYLE, body=body)
+    page = (_ASSETS / "page.html").read_text(encoding="utf-8")
+    marks = {
+        "<!--TITLE-->": f"{name}: report",
+        "/*STYLE*/": (_ASSETS / "page.css").read_text(encoding="utf-8"),
+        "<!--BODY-->": body,
+    }
+    for mark, content in marks.items():
+        page = page.replace(mark, content)
+    return page
 
 
 def _object_row(entry: dict[str, Any]) -> dict[str, Any]:
@@ -75,6 +87,7 @@ def _headline(manifest: dict[str, Any], certificate: dict[str, Any]) -> str:
     verdict = '<span class="badge good">passed</span>' if passed else '<span class="badge bad">failed</span>'
     travels = [j["travel_reached"] for j in certificate["joints"] if j["travel_reached"] is not None]
     sweeps = [j["deepest_penetration_m"] for j in certificate["joints"] if j["deepest_penetration_m"] is not None]
+    cavities = [j["cavity_open"] for j in certificate["joints"] if j["cavity_open"] is not None]
     tried = [r for r in certificate["loaders"] if r["state"] != "not tried"]
     rest, drift = certificate["rest_penetration_m"], certificate["drift_m"]
     tiles = [
@@ -84,6 +97,7 @@ def _headline(manifest: dict[str, Any], certificate: dict[str, Any]) -> str:
         ("deepest in any sweep", _millimetres(max(sweeps, default=None)), f"at most {1000 * ALLOWED_PENETRATION_M:.1f} mm"),
         ("deepest at rest", _millimetres(rest), f"at most {1000 * ALLOWED_PENETRATION_M:.1f} mm"),
         ("drift in 5 s", _millimetres(drift), f"at most {1000 * ALLOWED_DRIFT_M:.0f} mm"),
+        ("least inside free", _percent(min(cavities, default=None)), f"needs {100 * NEEDED_CAVITY:.0f} %"),
         ("loaders passed", f"{sum(r['state'] == 'passed' for r in tried)} of {len(tried)} tried", ""),
     ]
     cells = "".join(f"<div><dt>{label}</dt><dd>{value}</dd><small>{note}</small></div>" for label, value, note in tiles)
@@ -104,7 +118,7 @@ def _findings(findings: list[dict[str, Any]]) -> str:
     rows = [
         [
             _severity(f["severity"]),
-            f"<code>{_text(f['where'])}</code>",
+            _name(f["where"]),
             _text(f["message"]),
             f'<span class="quiet">{_text(f["rule"])}: {_text(protects[f["rule"]].protects)}</span>',
         ]
@@ -131,19 +145,19 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
             for size, source in zip(entry["dimensions_m"], entry["dimension_source"], strict=True)
         )
         notes = "".join(f"<li>{_text(line)}</li>" for line in entry["warnings"])
+        remarks = f'<ul class="quiet">{notes}</ul>' if notes else ""
         rows.append(
             [
                 image,
-                f'<strong>{_text(entry["name"])}</strong><br><span class="quiet">{_text(entry["category"])}</span>',
+                f'<strong>{_text(entry["name"])}</strong><br><span class="quiet">{_text(entry["category"])}</span>{remarks}',
                 f'<span class="sizes">{sizes}</span>',
                 f"{entry['mass_kg']:.1f}",
                 _text((entry["mask"] or {}).get("frames", "–")),
                 _millimetres(placement.get("rms_m")),
                 _millimetres(entry["warp"]["residual_m"]),
-                f"<ul>{notes}</ul>" if notes else "",
             ]
         )
-    head = ["", "object", "width × depth × height, mm", "kg", "frames", "placed within", "front fits within", "notes"]
+    head = ["", "object", "width × depth × height, mm", "kg", "frames", "placed within", "front fits within"]
     legend = '<p class="quiet">m measured · i inferred · d default of the category · p given by a person. '
     pair = "Pictures: the photo, and the closed model from the same camera.</p>" if pictures else "</p>"
     return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6)) + legend + pair
@@ -161,17 +175,52 @@ def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str
             travel, deepest = result.get("travel_reached"), result.get("deepest_penetration_m")
             rows.append(
                 [
-                    f"<code>{_text(joint['name'])}</code>",
+                    _name(joint["name"]),
                     "hinge" if turning else "slide",
                     reach,
                     _judged(_percent(travel), travel is not None and travel >= NEEDED_TRAVEL),
                     _judged(_millimetres(deepest), deepest is not None and deepest <= ALLOWED_PENETRATION_M),
                     _percent(result.get("cavity_open")),
+                    _in_the_way(result.get("blocked_by", []), turning),
                     f'<span class="quiet">{source}</span>',
                 ]
             )
-    head = ["joint", "kind", "opens", "travel reached", "deepest in sweep", "inside free", "where its numbers come from"]
+    head = [
+        "joint",
+        "kind",
+        "opens",
+        "travel reached",
+        "deepest in sweep",
+        "inside free",
+        "in its way",
+        "where its numbers come from",
+    ]
     return "<h2>Joints</h2>" + _table(head, rows, numeric=(2, 3, 4, 5)) if rows else ""
+
+
+def _in_the_way(blockers: list[dict[str, Any]], turning: bool) -> str:
+    """What a joint meets, and from which position on; another joint's part only when that is open too."""
+    lines = []
+    for blocker in blockers:
+        at = f"{blocker['position'] * 57.29578:.0f}°" if turning else f"{1000 * blocker['position']:.0f} mm"
+        when = " when open" if blocker["kind"] == "joint" else ""
+        lines.append(f"<li>{_name(blocker['name'])}{when}, from {at}</li>")
+    return f"<ul>{''.join(lines)}</ul>" if lines else "–"
+
+
+def _things(things: list[dict[str, Any]]) -> str:
+    if not things:
+        return ""
+    rows = [
+        [
+            _name(thing["name"]),
+            _judged(_millimetres(thing["drift_m"]), thing["drift_m"] is not None and thing["drift_m"] <= ALLOWED_DRIFT_M),
+            _percent(thing["opening_free"]),
+        ]
+        for thing in things
+    ]
+    head = ["free-standing", "moved in 5 s, left alone", "its hollow free of colliders"]
+    return "<h2>Free-standing things</h2>" + _table(head, rows, numeric=(1, 2))
 
 
 def _loaders(loaders: list[dict[str, Any]]) -> str:
@@ -202,6 +251,11 @@ def _table(head: list[str], rows: list[list[str]], numeric: tuple[int, ...] = ()
     return f'<div class="scroll"><table><thead><tr>{cells("th", head)}</tr></thead><tbody>{lines}</tbody></table></div>'
 
 
+def _name(name: str) -> str:
+    """A name of the bundle, which may wrap after its underscores."""
+    return f"<code>{_text(name).replace('_', '_<wbr>')}</code>"
+
+
 def _severity(severity: str) -> str:
     return f'<span class="badge {"bad" if severity == "error" else "warn"}">{_text(severity)}</span>'
 
@@ -223,59 +277,3 @@ def _text(value: object) -> str:
 
 
 _SHORT = {"measured": "m", "inferred": "i", "default": "d", "person": "p"}
-
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<main>
-{body}
-</main>
-</body>
-</html>
-"""
-
-_STYLE = """
-:root { color-scheme: light dark; --ink: #22262b; --quiet: #667079; --line: #e1e5e9; --paper: #fff; --tile: #f5f6f8;
-  --good: #13693a; --good-paper: #e0f3e8; --bad: #a3211c; --bad-paper: #fbe4e2; --warn: #7a5200; --warn-paper: #fdf0d3; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e6e9ec; --quiet: #9aa4ae; --line: #363d44; --paper: #1b1f23;
-  --tile: #24292e; --good: #7fd6a4; --good-paper: #153524; --bad: #ff9d96; --bad-paper: #451c1a; --warn: #f3cb7b;
-  --warn-paper: #3c2f12; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--paper); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 1080px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { margin: 0; font-size: 28px; overflow-wrap: anywhere; }
-h2 { margin: 40px 0 12px; font-size: 18px; }
-header p { margin: 6px 0 0; }
-.quiet, small { color: var(--quiet); font-size: 13px; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(132px, 1fr)); gap: 10px; margin: 24px 0; }
-.tiles div { background: var(--tile); border-radius: 8px; padding: 10px 12px; }
-.tiles dt { color: var(--quiet); font-size: 13px; }
-.tiles dd { margin: 2px 0 0; font-size: 20px; font-variant-numeric: tabular-nums; white-space: nowrap; }
-figure { margin: 0; }
-.wide img { width: 100%; height: auto; border-radius: 8px; border: 1px solid var(--line); display: block; }
-.thumb { width: 200px; height: auto; border-radius: 4px; display: block; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; }
-th { text-align: left; font-weight: 600; font-size: 13px; color: var(--quiet); }
-th, td { padding: 8px 10px; border-bottom: 1px solid var(--line); vertical-align: top; }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td ul { margin: 0; padding-left: 18px; }
-.sizes { white-space: nowrap; }
-sup { color: var(--quiet); font-size: 11px; }
-code { font: 13px/1.4 ui-monospace, monospace; overflow-wrap: anywhere; }
-.badge { display: inline-block; padding: 1px 9px; border-radius: 10px; font-size: 13px; white-space: nowrap; }
-.good { color: var(--good); background: var(--good-paper); }
-.bad { color: var(--bad); background: var(--bad-paper); }
-.warn { color: var(--warn); background: var(--warn-paper); }
-.none { color: var(--quiet); background: var(--tile); }
-.wrong { color: var(--bad); font-weight: 600; }
-.losses dt { margin-top: 8px; }
-.losses dd { margin: 2px 0 0; }
-"""

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from r2c2r_core.arrays import Image
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.meshes import box_mesh
 
@@ -17,27 +18,26 @@ def write_glb(plan: Plan, path: Path) -> None:
 
     scene = trimesh.Scene(base_frame="root")
     scene.graph.update(frame_to=WORLD, frame_from="root", matrix=Y_UP_FROM_WORLD)
+    pictures: dict[str, Any] = {}  # one material a texture: encoding pictures is what takes the time
     for body in plan.bodies:
         scene.graph.update(frame_to=body.name, frame_from=body.parent, matrix=body.parent_from_body.matrix)
-        mesh = _mesh_of(body)
+        mesh = _mesh_of(body, pictures)
         if mesh is not None:
             scene.add_geometry(mesh, node_name=f"{body.name}_vis", geom_name=f"{body.name}_vis", parent_node_name=body.name)
     path.write_bytes(scene.export(file_type="glb"))
 
 
-def _mesh_of(body: Body) -> Any:
+def _mesh_of(body: Body, pictures: dict[str, Any]) -> Any:
     import trimesh
-    from PIL import Image
     from trimesh.visual.material import PBRMaterial
     from trimesh.visual.texture import TextureVisuals
 
     visual = body.link.visual
     if visual is not None:
-        picture = Image.fromarray(np.ascontiguousarray(visual.texture))
-        material = PBRMaterial(
-            name=f"{body.name}_vis", baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True
-        )
-        dressed = TextureVisuals(uv=visual.uv, material=material)
+        file = body.texture_file or body.name
+        if file not in pictures:
+            pictures[file] = _material(file, visual.texture)
+        dressed = TextureVisuals(uv=visual.uv, material=pictures[file])
         return trimesh.Trimesh(visual.vertices, visual.faces, visual=dressed, process=False)
     vertices, faces = box_mesh(body)
     if len(faces) == 0:
@@ -48,3 +48,12 @@ def _mesh_of(body: Body) -> Any:
     mesh = trimesh.Trimesh(vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3), process=False)
     mesh.visual = TextureVisuals(material=material)
     return mesh
+
+
+def _material(file: str, texture: Image) -> Any:
+    from PIL.Image import fromarray
+    from trimesh.visual.material import PBRMaterial
+
+    picture = fromarray(np.ascontiguousarray(texture))
+    name = Path(file).stem
+    return PBRMaterial(name=name, baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True)

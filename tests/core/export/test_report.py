@@ -7,7 +7,7 @@ from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.rules.table import finding
-from r2c2r_core.model.report import Certificate, JointResult, LoaderResult
+from r2c2r_core.model.report import Blocker, Certificate, JointResult, LoaderResult, ThingResult
 from tests.core.export.kitchen import kitchen, reconstruction
 
 EVIL = '<script>alert("x")</script>'
@@ -85,3 +85,19 @@ def test_the_json_report_repeats_certificate_objects_and_losses_without_the_mach
     assert report["failures"] == {"mug_1": "not seen"}
     assert set(report["losses"]) == {"scene.urdf", "scene.xml", "scene.usda", "scene.glb"}
     assert np.isfinite(report["objects"][0]["placement_rms_m"])
+
+
+def test_what_stands_in_a_joints_way_and_how_things_stand_is_on_the_page() -> None:
+    joint = JointResult(
+        joint="cabinet_1_hinge",
+        deepest_penetration_m=0.0,
+        travel_reached=1.0,
+        blocked_by=(
+            Blocker(name="drawer_1_slide", kind="joint", position=1.6),
+            Blocker(name="chair_body", kind="thing", position=0.5),
+        ),
+    )
+    thing = ThingResult(name="mug_1_body", drift_m=0.0002, opening_free=0.97)
+    text = page(certificate(joints=(joint,), things=(thing,))).replace("<wbr>", "")
+    for words in ("drawer_1_slide</code> when open, from 92°", "chair_body</code>, from 29°", "mug_1_body", "0.2 mm", "97 %"):
+        assert words in text
