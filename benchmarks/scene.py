@@ -3,8 +3,9 @@
     python benchmarks/scene.py --workdir DIR [--seeds 0-9] [--json FILE] [--update]
 
 DIR holds seed<N> and kitchen, the workdirs of finished `r2c2r run`s (of `r2c2r sample` and of the real kitchen); what is not
-there is left out. Seconds are scaled to 20 objects by their number. Only the stages after the alignment are run again, into a temporary folder; the workdirs stay as they
-are. --update writes benchmarks/scene.json. SAPIEN is tried when R2C2R_SAPIEN_PYTHON names its environment.
+there is left out. Only the stages after the alignment are run again, into a temporary folder; the workdirs stay as they
+are. Seconds are scaled to 20 objects by their number. --update writes benchmarks/scene.json. SAPIEN is tried when
+R2C2R_SAPIEN_PYTHON names its environment.
 """
 
 import argparse
