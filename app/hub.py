@@ -19,6 +19,10 @@ class Listener:
     queue: "asyncio.Queue[Message]"
     loop: asyncio.AbstractEventLoop
     project: str | None = None
+    who: str = ""  # the person; nobody's listener is not shown to others
+    page: str = ""
+    object: int | None = None  # the one it works on
+    tab: str = field(default_factory=lambda: secrets.token_hex(4))
 
     def take(self, message: Message, epoch: str) -> None:
         """Queue the message; a tab that does not keep up is told to fetch everything anew instead."""
@@ -56,21 +60,31 @@ class Hub:
                 if listener.wants(message):
                     self._hand(listener, message)
 
-    def join(self, project: str | None, since: int | None, epoch: str | None) -> tuple[Listener, bool]:
+    def join(self, project: str | None, since: int | None, epoch: str | None, who: str = "") -> tuple[Listener, bool]:
         """A new listener with what it missed after `since` queued, and whether it must fetch everything anew."""
-        listener = Listener(asyncio.Queue(), asyncio.get_running_loop(), project)
+        listener = Listener(asyncio.Queue(), asyncio.get_running_loop(), project, who)
         with self._lock:
             missed, complete = self._missed(since, epoch)
             for message in missed:
                 if listener.wants(message):
                     listener.queue.put_nowait(message)
             self._listeners.add(listener)
+            self._tell_who_is_here(project)
         return listener, not complete
 
     def leave(self, listener: Listener) -> None:
         """Forget a tab."""
         with self._lock:
             self._listeners.discard(listener)
+            self._tell_who_is_here(listener.project)
+
+    def move(self, listener: Listener, project: str | None, page: str, number: int | None) -> None:
+        """The tab looks at something else; everybody at the projects it comes from and goes to is told."""
+        with self._lock:
+            before = listener.project
+            listener.project, listener.page, listener.object = project, page, number
+            for told in {before, project}:
+                self._tell_who_is_here(told)
 
     def watched(self, project: str) -> bool:
         """Whether any tab looks at the project."""
@@ -81,6 +95,15 @@ class Hub:
     def seq(self) -> int:
         """Number of the last message."""
         return self._seq
+
+    def _tell_who_is_here(self, project: str | None) -> None:
+        """Presence is a state, not an event: it is told as it is now, and never told again to a tab that was away."""
+        here = [
+            listener for listener in self._listeners if listener.who and project is not None and listener.project == project
+        ]
+        people = [{"tab": each.tab, "who": each.who, "page": each.page, "object": each.object} for each in here]
+        for listener in here:
+            self._hand(listener, {"type": "presence", "seq": self._seq, "project": project, "people": people})
 
     def _missed(self, since: int | None, epoch: str | None) -> tuple[list[Message], bool]:
         if since is None or not epoch:  # its first visit: there is nothing it could have missed

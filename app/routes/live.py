@@ -1,4 +1,4 @@
-"""One connection per tab: jobs, masks, saved changes."""
+"""One connection per tab: jobs, masks, saved changes, and who else is here."""
 
 import asyncio
 import contextlib
@@ -19,10 +19,11 @@ async def live(socket: WebSocket, project: str | None = None, since: int | None 
     """Messages as they happen; `since` and `epoch` (of the last hello) bring what was missed, or a reset."""
     context: Context = socket.app.state.context
     await socket.accept()
-    listener, must_fetch = context.hub.join(project, since, epoch)
+    listener, must_fetch = context.hub.join(project, since, epoch, socket.state.person.name)
     try:
-        await socket.send_json({"type": "hello", "epoch": context.hub.epoch, "seq": context.hub.seq, "reset": must_fetch})
-        listening = asyncio.create_task(_listen(socket, listener))
+        hello = {"type": "hello", "epoch": context.hub.epoch, "seq": context.hub.seq, "reset": must_fetch, "tab": listener.tab}
+        await socket.send_json(hello)
+        listening = asyncio.create_task(_listen(socket, listener, context.hub))
         speaking = asyncio.create_task(_speak(socket, listener, context.hub))
         _, pending = await asyncio.wait({listening, speaking}, return_when=asyncio.FIRST_COMPLETED)
         for task in pending:
@@ -43,11 +44,16 @@ async def _speak(socket: WebSocket, listener: Listener, hub: Hub) -> None:
         await socket.send_json(message)
 
 
-async def _listen(socket: WebSocket, listener: Listener) -> None:
+async def _listen(socket: WebSocket, listener: Listener, hub: Hub) -> None:
     while True:
         text = await socket.receive_text()
         with contextlib.suppress(ValueError, AttributeError):
             said = json.loads(text)
             if said.get("type") == "watch":
-                wanted = said.get("project")
-                listener.project = wanted if isinstance(wanted, str) else None
+                project, page, number = (said.get(name) for name in ("project", "page", "object"))
+                hub.move(
+                    listener,
+                    project if isinstance(project, str) else None,
+                    page[:20] if isinstance(page, str) else "",
+                    number if isinstance(number, int) else None,
+                )

@@ -7,6 +7,9 @@ class Live extends EventTarget {
   #socket = null;
   /** @type {string | null} */
   #project = null;
+  #page = "";
+  /** @type {number | null} */
+  #object = null;
   #epoch = "";
   #seq = 0;
   #wait = 500;
@@ -16,6 +19,9 @@ class Live extends EventTarget {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
 
+  /** What the server calls this tab. */
+  tab = "";
+
   /**
    * Look at a project; null for none.
    * @param {string | null} project
@@ -23,7 +29,24 @@ class Live extends EventTarget {
   watch(project) {
     this.#project = project;
     if (!this.#socket) this.#open();
-    else if (this.connected) this.#socket.send(JSON.stringify({ type: "watch", project }));
+    else this.#tell();
+  }
+
+  /**
+   * Be at a page and on an object, for the others to see.
+   * @param {string} page
+   * @param {number | null} object
+   */
+  stand(page, object) {
+    if (page === this.#page && object === this.#object) return;
+    this.#page = page;
+    this.#object = object;
+    this.#tell();
+  }
+
+  #tell() {
+    const where = { type: "watch", project: this.#project, page: this.#page, object: this.#object };
+    if (this.connected) this.#socket?.send(JSON.stringify(where));
   }
 
   #open() {
@@ -31,10 +54,9 @@ class Live extends EventTarget {
     if (this.#project) query.set("project", this.#project);
     const socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/api/live?${query}`);
     this.#socket = socket;
-    const asked = this.#project;
     socket.addEventListener("open", () => {
       this.#wait = 500;
-      if (this.#project !== asked) socket.send(JSON.stringify({ type: "watch", project: this.#project }));
+      this.#tell();
       this.dispatchEvent(new Event("online"));
     });
     socket.addEventListener("message", (event) => this.#receive(JSON.parse(String(event.data))));
@@ -49,6 +71,7 @@ class Live extends EventTarget {
   #receive(message) {
     if (message.type === "hello") {
       this.#epoch = String(message.epoch);
+      this.tab = String(message.tab);
       if (message.reset || this.#seq === 0) this.#seq = Number(message.seq);
     }
     if (message.seq !== undefined) this.#seq = Math.max(this.#seq, message.seq);

@@ -24,10 +24,12 @@ import { OverviewPage } from "./pages/overview.js";
 import { ProjectsPage } from "./pages/projects.js";
 import { ReviewPage } from "./pages/review.js";
 import { RunPage } from "./pages/run.js";
+import { Presence } from "./presence.js";
 import { startRouter } from "./router.js";
 
 customElements.define("r2c2r-toasts", Toasts);
 customElements.define("r2c2r-who", WhoIsIn);
+customElements.define("r2c2r-presence", Presence);
 customElements.define("r2c2r-help", HelpOverlay);
 customElements.define("r2c2r-palette", CommandPalette);
 customElements.define("r2c2r-comments", CommentList);

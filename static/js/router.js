@@ -51,4 +51,5 @@ export function remember(values) {
     else url.searchParams.set(name, String(value));
   }
   history.replaceState(null, "", url);
+  window.dispatchEvent(new Event("r2c2r-remember"));
 }

@@ -1,6 +1,6 @@
 import asyncio
 
-from app.hub import QUEUE_LIMIT, Hub
+from app.hub import QUEUE_LIMIT, Hub, Listener
 
 
 def test_a_listener_gets_what_it_missed_while_it_is_remembered() -> None:
@@ -51,3 +51,32 @@ def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew() -> None:
         assert listener.queue.empty()
 
     asyncio.run(scene())
+
+
+def test_everybody_at_a_project_knows_who_else_is_there_and_on_what() -> None:
+    async def scene() -> None:
+        hub = Hub()
+        ann, _ = hub.join("kitchen", None, None, "ann")
+        bob, _ = hub.join(None, None, None, "bob")
+        hub.move(bob, "kitchen", "annotate", 7)
+        await asyncio.sleep(0)
+        both = {("ann", "", None), ("bob", "annotate", 7)}
+        assert _told(ann) == both
+        assert _told(bob) == both
+        hub.leave(bob)
+        await asyncio.sleep(0)
+        assert _told(ann) == {("ann", "", None)}
+        hub.publish("object", "kitchen")
+        again, _ = hub.join("kitchen", 0, hub.epoch, "eve")
+        await asyncio.sleep(0)
+        kinds = [again.queue.get_nowait()["type"] for _ in range(again.queue.qsize())]
+        assert kinds == ["object", "presence"]  # of presence only what is now
+
+    asyncio.run(scene())
+
+
+def _told(listener: Listener) -> set[tuple[str, str, int | None]]:
+    """Who is here by the last message."""
+    messages = [listener.queue.get_nowait() for _ in range(listener.queue.qsize())]
+    assert messages[-1]["type"] == "presence"
+    return {(each["who"], each["page"], each["object"]) for each in messages[-1]["people"]}

@@ -11,6 +11,7 @@ import { nextDoubtful, worstFirst } from "../../static/js/lib/lanes.js";
 import { disagreements } from "../../static/js/lib/merge.js";
 import { project } from "../../static/js/lib/points.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
+import { together } from "../../static/js/lib/together.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
 const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
@@ -197,4 +198,14 @@ test("of two points behind each other the nearer one is drawn", () => {
   const picture = { width: 21, height: 21, data: new Uint8ClampedArray(4 * 21 * 21) };
   project(cloud, { yaw: 0, pitch: 0 }, picture);
   assert.deepEqual([...picture.data.slice(4 * (11 * 21 + 11), 4 * (11 * 21 + 11) + 4)], [9, 9, 9, 255]);
+});
+
+test("the others are named once each, with where they are, and oneself not at all", () => {
+  const here = (tab, who, page, object = null) => ({ tab, who, page, object });
+  const people = [here("a", "ann", "annotate", 3), here("b", "bob", "review", 4), here("c", "bob", "download"), here("d", "ann", "run")];
+  assert.deepEqual(together(people, "a"), [
+    { who: "bob", where: "review #4, download" },
+    { who: "you, in another tab", where: "run" },
+  ]);
+  assert.deepEqual(together([here("a", "ann", "annotate")], "a"), []);
 });

@@ -6,6 +6,7 @@ import { actionOf, KEYMAP } from "../lib/keymap.js";
 import { counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
+import { Presence } from "../presence.js";
 import { go } from "../router.js";
 import { CommandPalette } from "./command-palette.js";
 import { HelpOverlay } from "./help-overlay.js";
@@ -58,6 +59,7 @@ export class AppShell extends LiveElement {
         this.#state,
         this.#tabs,
         h("span", { class: "spring" }),
+        new Presence(),
         new WhoIsIn(),
         palette,
         help,
