@@ -12,7 +12,7 @@ from r2c2r_core.synthesize.fixtures.spec import FRONT_GAP_M
 from r2c2r_core.synthesize.runs import built_in
 from r2c2r_core.synthesize.solve import Face, Tie
 
-_LINE_M = 0.02  # tops within this of each other are one line
+_LINE_M, _LINES_M = 0.02, 0.04  # tops this near to the next, and this near in all, are one line: a scan sags along a run
 _SEAM_M = (-0.010, 0.011)  # edges that overlap or stand apart by this much are one seam; real gaps are 2-4 mm
 _COPLANAR_M = 0.002
 
@@ -49,12 +49,13 @@ def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
 
 
 def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) -> Iterator[Tie]:
-    """Tops (+1) or bottoms (-1) within 2 cm of each other are on one line."""
+    """Tops (+1) or bottoms (-1) that follow each other closely are on one line."""
     left = sorted(plane, key=lambda i: _edge(items[i], 2, sign))
     while left:
-        first = _edge(items[left[0]], 2, sign)
-        line = [i for i in left if _edge(items[i], 2, sign) - first <= _LINE_M]
-        left = left[len(line) :]
+        line = [left.pop(0)]
+        lowest = _edge(items[line[0]], 2, sign)
+        while left and _edge(items[left[0]], 2, sign) < min(_edge(items[line[-1]], 2, sign) + _LINE_M, lowest + _LINES_M):
+            line.append(left.pop(0))
         yield from (Tie(first=Face(a, 2, sign), second=Face(b, 2, sign)) for a, b in pairwise(line))
 
 

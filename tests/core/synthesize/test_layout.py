@@ -145,6 +145,15 @@ def test_noisy_edges_of_a_run_end_on_shared_lines_and_seams() -> None:
     assert np.abs(sizes[:, 0] - 0.5).mean() <= measured_error
 
 
+def test_a_run_that_sags_along_its_length_is_levelled() -> None:
+    """A degree of roll: each unit 9 mm lower than the one before, 27 mm in all."""
+    units = [Unit(f"d{i}", "cabinet", (0.503 * i, 0, 0.5 - 0.009 * i), (0.5, 0.58, 0.7)) for i in range(4)]
+    layout = arranged(*units, manhattan=0.0)
+    assert np.ptp([o.world_from_object.translation[2] for o in layout.objects]) < 1e-6
+    assert max(layout.moves_m.values()) < 0.015
+    np.testing.assert_allclose([o.dimensions_m[2] for o in layout.objects], 0.7, atol=1e-3)
+
+
 def test_a_shorter_neighbour_keeps_its_own_height() -> None:
     layout = arranged(
         Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.503, 0, 0.45), (0.5, 0.58, 0.6))
