@@ -6,6 +6,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.model.scene import ConvexPiece
+from r2c2r_core.synthesize.vessels import staves
 
 _OPENNESS = 1.35  # hull volume over solid volume: above it the thing has a cavity or legs that a gripper needs
 _FLAT_M = 0.006  # what lies this near the underside belongs to it: reconstructed feet are uneven
@@ -21,13 +22,13 @@ class Solid:
 
 
 def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
-    """The hull, or a convex decomposition where the hull would fill a cavity; all with one flat underside."""
+    """The hull, or where it would fill a cavity staves round it or a convex decomposition; all with one flat underside."""
     from trimesh import Trimesh
 
     shape = Trimesh(solid.vertices, solid.faces, process=True)
     hull = shape.convex_hull
     if shape.is_volume and float(hull.volume) > _OPENNESS * float(shape.volume):
-        parts = _decomposed(shape, seed)
+        parts = staves(solid.vertices, solid.faces) or _decomposed(shape, seed)
     else:
         parts = [np.asarray(hull.vertices)]
     pieces = []
