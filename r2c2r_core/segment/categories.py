@@ -22,6 +22,7 @@ class CategoryHint:
 
 
 _FRONTS = {"drawer", "cabinet", "door", "cupboard", "oven", "range", "dishwasher", "stove", "washer", "sink"}
+_FRONTS |= {"panel", "filler", "plinth", "kickboard"}  # nothing behind them opens, but they are cut like fronts
 _FRIDGE = ApplianceSize(width=(0.42, 0.65, 1.25), height=(0.75, 1.7, 2.2), depth=0.64, spread=0.35)
 _APPLIANCES = {
     **dict.fromkeys(("refrigerator", "fridge", "freezer"), _FRIDGE),
@@ -35,6 +36,7 @@ _RADII_M = {  # half the largest side
     **dict.fromkeys(("kettle", "toaster", "pot", "pan", "blender", "plant"), 0.2),
     **dict.fromkeys(("box", "book", "bag"), 0.18),
     **dict.fromkeys(("chair", "stool", "bin", "trash"), 0.5),
+    **dict.fromkeys(("shelf", "shelve", "bookcase", "bookshelf", "rack"), 0.6),
     **dict.fromkeys(("table", "sofa", "desk", "bench", "counter", "worktop", "countertop"), 1.0),
 }
 _ROUND_WIDTHS_M = {
