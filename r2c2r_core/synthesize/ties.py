@@ -7,6 +7,8 @@ from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.fixtures.spec import FRONT_GAP_M
 from r2c2r_core.synthesize.runs import built_in
@@ -15,6 +17,7 @@ from r2c2r_core.synthesize.solve import Face, Tie
 _LINE_M, _LINES_M = 0.02, 0.04  # tops this near to the next, and this near in all, are one line: a scan sags along a run
 _SEAM_M = (-0.010, 0.011)  # edges that overlap or stand apart by this much are one seam; real gaps are 2-4 mm
 _COPLANAR_M = 0.002
+_SLIT_M = 0.02  # between a unit and what closes it above or below: more is a real step
 
 
 def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
@@ -26,7 +29,32 @@ def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
             ties += _levels(items, plane, sign)
         for axis in (0, 2):
             ties += _seams(items, plane, axis)
-    return ties
+    return [*ties, *_closed(items)]
+
+
+def _closed(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
+    """Worktops lie on the highest unit below them, and plinths end under the lowest one above: no slit in between."""
+    units = [i for i, item in enumerate(items) if built_in(item) and item.spec.opening != "rigid"]
+    for i, item in enumerate(items):
+        if item.spec.opening != "fixed" or item.fixed_by_person:
+            continue
+        near = [j for j in units if _one_above_the_other(items[j], item)]
+        below = [j for j in near if abs(_edge(item, 2, -1.0) - _edge(items[j], 2, 1.0)) < _SLIT_M]
+        above = [j for j in near if abs(_edge(items[j], 2, -1.0) - _edge(item, 2, 1.0)) < _SLIT_M]
+        if below:
+            highest = max(below, key=lambda j: _edge(items[j], 2, 1.0))
+            yield Tie(first=Face(highest, 2, 1.0), second=Face(i, 2, -1.0), gap_m=FRONT_GAP_M)
+        elif above:
+            lowest = min(above, key=lambda j: _edge(items[j], 2, -1.0))
+            yield Tie(first=Face(i, 2, 1.0), second=Face(lowest, 2, -1.0), gap_m=FRONT_GAP_M)
+
+
+def _one_above_the_other(a: MeasuredObject, b: MeasuredObject) -> bool:
+    """Whether their plans overlap."""
+    turn = b.world_from_object.rotation.T
+    apart = np.abs(turn @ (a.world_from_object.translation - b.world_from_object.translation))
+    reach = (b.dimensions_m + np.abs(turn @ a.world_from_object.rotation) @ a.dimensions_m) / 2
+    return bool((apart[:2] < reach[:2] - _SLIT_M / 2).all())
 
 
 def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:

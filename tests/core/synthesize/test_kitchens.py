@@ -100,3 +100,23 @@ def test_units_back_to_back_give_up_depth_not_place() -> None:
     layout = arranged(*measured(BACK_TO_BACK, np.random.default_rng(1), noise_m=0.0), manhattan=0.0)
     assert max(layout.moves_m.values()) < 0.008
     assert overlapping_pairs(layout.objects) == []
+
+
+def test_a_worktop_closes_on_the_run_and_a_plinth_under_it() -> None:
+    """Measured 9 mm above the units and 7 mm into them; a shelf half a metre higher is left alone."""
+    worktop = Unit("top", "worktop", (1.6, 0.29, 0.85 + 0.009 + 0.02), (2.02, 0.62, 0.04), kind="thing")
+    plinth = Unit("plinth", "plinth", (1.6, 0.05, 0.15 + 0.007 - 0.05), (2.0, 0.018, 0.1), kind="thing")
+    shelf = Unit("shelf", "open shelf", (1.6, 0.4, 1.5), (0.8, 0.25, 0.3), kind="thing")
+    layout = arranged(*NORTH, worktop, plinth, shelf, manhattan=0.0)
+    top = max(item.world_from_object.translation[2] + item.dimensions_m[2] / 2 for item in fronts(layout, "n"))
+    bottom = min(item.world_from_object.translation[2] - item.dimensions_m[2] / 2 for item in fronts(layout, "n"))
+    placed = {item.name: item for item in layout.objects}
+    assert low(placed["top"]) - top == pytest.approx(GAP, abs=2e-4)
+    assert bottom - (low(placed["plinth"]) + placed["plinth"].dimensions_m[2]) == pytest.approx(GAP, abs=2e-4)
+    assert layout.moves_m["shelf"] < 1e-6
+    assert max(layout.moves_m[item.name] for item in fronts(layout, "n")) < 0.003
+    assert overlapping_pairs(layout.objects) == []
+
+
+def low(item: MeasuredObject) -> float:
+    return float(item.world_from_object.translation[2] - item.dimensions_m[2] / 2)
