@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -81,7 +82,7 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
     )
     for module in ROUTERS:
         app.include_router(module.router)
-    app.mount("/static", RevalidatedFiles(directory=static), name="static")
+    app.mount("/static", GZipMiddleware(RevalidatedFiles(directory=static)), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)

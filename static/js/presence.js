@@ -29,7 +29,7 @@ export class Presence extends LiveElement {
   /** @param {Here[]} people */
   #show(people) {
     const chips = together(people, live.tab).map(({ who, where }) =>
-      h("span", { class: "chip", title: where }, h("span", { class: "dot", "aria-hidden": "true" }), who, " ", where),
+      h("span", { class: "chip", title: `${who}: ${where}` }, who, " · ", where),
     );
     this.replaceChildren(...chips);
   }

@@ -11,7 +11,7 @@ def test_no_operation_ends_in_a_server_error(tmp_path: Path, monkeypatch: pytest
     monkeypatch.syspath_prepend(BENCHMARKS)
     from any_request import send_anything
 
-    figures = send_anything(tmp_path, examples=2, seed=0)
+    figures = send_anything(tmp_path, examples=2, seed=0, thorough=False)
     assert figures["failures"] == []
     assert figures["operations"] > 50
-    assert figures["requests"] > 4 * figures["operations"]
+    assert figures["requests"] > 3 * figures["operations"]

@@ -11,6 +11,6 @@ def test_each_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, monkeypa
     monkeypatch.syspath_prepend(BENCHMARKS)
     from hostile_uploads import KINDS, send_all
 
-    figures = send_all(tmp_path, 3 * len(KINDS), seed=1)
+    figures = send_all(tmp_path, 2 * len(KINDS), seed=1)
     assert figures["wrong"] == []
-    assert sum(figures["statuses"].values()) == 3 * len(KINDS)
+    assert sum(figures["statuses"].values()) == 2 * len(KINDS)

@@ -10,7 +10,7 @@ export class WhoIsIn extends LiveElement {
       const { user, role, account } = await getSystem();
       if (!account) return;
       const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave() }, "Sign out");
-      this.replaceChildren(h("span", { class: "muted" }, `${user} · ${role}`), leave);
+      this.replaceChildren(h("span", { class: "muted", title: role }, user), leave);
     } catch (error) {
       sayError(error);
     }

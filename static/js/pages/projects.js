@@ -26,6 +26,8 @@ export class ProjectsPage extends LiveElement {
   #stopped = h("ul", { class: "cards stopped", "aria-label": "Uploads that stopped" });
   #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
   #folders = new FolderDialog();
+  #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
+  #admin = true;
   #limit = Infinity;
 
   connected() {
@@ -38,7 +40,7 @@ export class ProjectsPage extends LiveElement {
           {},
           h("h1", {}, "Projects"),
           h("button", { type: "button", onClick: () => this.#sample() }, "Sample kitchen"),
-          h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…"),
+          this.#browse,
           h(
             "button",
             { type: "button", class: "primary", onClick: () => this.#picker.click() },
@@ -60,9 +62,17 @@ export class ProjectsPage extends LiveElement {
     this.addEventListener("dragleave", () => this.classList.remove("dropping"), { signal });
     this.addEventListener("drop", (event) => this.#drop(event), { signal });
     for (const type of ["projects", "project", "job"]) live.addEventListener(type, () => this.#load(), { signal });
-    getSystem().then((system) => (this.#limit = system.max_upload_bytes), sayError);
+    getSystem().then((system) => this.#allow(system), sayError);
     this.#load();
     this.#showStopped();
+  }
+
+  /** @param {import("../api-types").SystemInfo} system */
+  #allow(system) {
+    this.#limit = system.max_upload_bytes;
+    this.#admin = system.role === "admin";
+    this.#browse.hidden = !this.#admin;
+    if (!this.#admin) this.#load();
   }
 
   async #load() {
@@ -129,12 +139,14 @@ export class ProjectsPage extends LiveElement {
           "div",
           { class: "row" },
           h("button", { type: "button", class: "quiet", onClick: () => this.#rename(project) }, "Rename"),
-          h(
-            "button",
-            { type: "button", class: "quiet danger", onClick: () => this.#delete(project) },
-            icon("trash"),
-            "Delete",
-          ),
+          this.#admin
+            ? h(
+                "button",
+                { type: "button", class: "quiet danger", onClick: () => this.#delete(project) },
+                icon("trash"),
+                "Delete",
+              )
+            : null,
         ),
       ),
     );
