@@ -18,6 +18,7 @@ from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.squaring import squared
 from r2c2r_core.segment.things import ThingConfig, support_height
+from r2c2r_core.segment.trimming import trimmed
 from r2c2r_core.segment.workbench import Workbench
 
 _LOW_M = 0.6  # lower appliances stand on worktops
@@ -48,8 +49,8 @@ def appliance_front(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, 
     lab, seen_colour = as_lab(run.mosaic)
     cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
     handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
-    front = Front(run, cell, handle, hint.depth_m)
-    wall = wall_behind(run, cell, room, hint.depth_m)
+    front = trimmed(Front(run, cell, handle, hint.depth_m), bench.scene)
+    wall = wall_behind(run, front.cell, room, hint.depth_m)
     depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
     front = squared(replace(front, depth_m=depth), bench.scene)
     front, outlined_depth = outlined(front, bench.scene, hint.depth_m, wall)
