@@ -77,8 +77,8 @@ def main() -> None:
                 f"{100 * trial.scale_off:5.2f} % iou {trial.iou:.3f} rival {trial.runner_up} {trial.cpu_s:.1f} s {trial.note}",
                 flush=True,
             )
-    summary = summarise(sorted(trials, key=lambda t: t.number))
-    (HERE / "placement.json").write_text(json.dumps(summary, indent=1) + "\n")
+            summary = summarise(sorted(trials, key=lambda t: t.number))
+            (HERE / "placement.json").write_text(json.dumps(summary, indent=1) + "\n")
     print(json.dumps({k: v for k, v in summary.items() if k != "trials"}, indent=1))
 
 

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from r2c2r_core.align.shape import least_volume_axes
+from r2c2r_core.align.shape import hull_directions, least_volume_axes
 from r2c2r_core.generate.upload import read_upload
-from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.geometry.transforms import Similarity3, rotation_between
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 from r2c2r_core.workspace import Workspace
 
@@ -68,6 +68,8 @@ def _scans(folder: Path) -> Iterator[Article]:
     import trimesh
 
     mug = read_upload(folder / "ycb-025_mug" / "textured.obj", "mug", "c0").mesh
+    base = min(hull_directions(mug.vertices, 8), key=lambda side: float(side[2]))  # as scanned it leans by 15 degrees
+    mug = _moved(mug, Similarity3(1.0, rotation_between(base, np.array([0.0, 0.0, -1.0])), np.zeros(3)))
     yield _standing("mug", "scan", mug, 0.081, by_height=True)
     loaded = trimesh.load(folder / "aws-Refrigerator_01" / "meshes" / "aws_Refrigerator_01_visual.DAE", force="scene")
     yield _standing("refrigerator model", "scan", _patterned(loaded.to_geometry()), 1.75, by_height=True)

@@ -128,15 +128,15 @@ def hull_directions(points: Points, count: int) -> list[np.ndarray]:
 
 
 def _standing_directions(points: Points, frames: tuple[Matrix3, ...]) -> tuple[np.ndarray, ...]:
-    """Directions that may point up: both ways along each box axis, and away from the hull's four largest other sides."""
+    """Directions that may point up: along the first box's axes, away from flat sides of the hull, along other boxes' axes."""
     ups: list[np.ndarray] = []
     candidates = [sign * frames[0][:, k] for k in range(3) for sign in (1.0, -1.0)]
+    candidates += [-n for n in hull_directions(points, 8)]  # a mug's base is among its smaller sides
     candidates += [sign * f[:, k] for f in frames[1:] for k in range(3) for sign in (1.0, -1.0)]
-    candidates += [-n for n in hull_directions(points, 4)]
     for direction in candidates:
         if all(direction @ u < np.cos(np.radians(10)) for u in ups):
             ups.append(direction)
-    return tuple(ups[:12])
+    return tuple(ups[:14])
 
 
 def _polish_axes(normals: Points, axes: Matrix3) -> Matrix3:

@@ -141,7 +141,7 @@ def _upright_axis(shape: Shape, pose: Similarity3) -> np.ndarray | None:
     """The mesh direction that a pose nearly makes vertical, if it is one the thing may stand along."""
     up = pose.rotation.T @ np.array([0.0, 0.0, 1.0])
     nearest = max(shape.ups, key=lambda u: float(u @ up))
-    return nearest if nearest @ up > np.cos(np.radians(15)) else None
+    return nearest if nearest @ up > np.cos(np.radians(5)) else None
 
 
 def _try(
