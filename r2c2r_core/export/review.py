@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from r2c2r_core.export.writers.meshes import box_mesh, convex_hull
 from r2c2r_core.model.report import Certificate, Finding
 
 _ASSETS = Path(__file__).parent / "review_page"
+_MODULES = ("algebra.js", "device.js", "kitchen.js", "eye.js", "painter.js", "hand.js", "panel.js", "main.js")
+_IMPORT, _EXPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE), re.compile(r"^export ", re.MULTILINE)
 _TEXTURE_PX = 1024  # longest side: a page of a few megabytes
 _JPEG_QUALITY = 85
 _STEPS = 65535  # positions are whole steps of their box: 0.03 mm on a fixture of 2 m
@@ -21,12 +24,17 @@ _STEPS = 65535  # positions are whole steps of their box: 0.03 mm on a fixture o
 
 def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> str:
     """The page; `seen_from` is where the camera's path was, in the world, so that fronts face the reader."""
-    parts = {"STYLE": "page.css", "VIEWER": "viewer.js"}
     page = (_ASSETS / "page.html").read_text(encoding="utf-8")
-    for mark, name in parts.items():
-        page = page.replace(f"/*{mark}*/", (_ASSETS / name).read_text(encoding="utf-8"))
+    for mark, content in (("STYLE", (_ASSETS / "page.css").read_text(encoding="utf-8")), ("VIEWER", _script())):
+        page = page.replace(f"/*{mark}*/", content)
     document = json.dumps(_scene(plan, certificate, seen_from), allow_nan=False)
     return page.replace("/*SCENE*/", document.replace("<", "\\u003c"))  # no name can end the script element
+
+
+def _script() -> str:
+    """The viewer's modules as one script: each after what it imports, in one scope of their own."""
+    texts = [_IMPORT.sub("", (_ASSETS / name).read_text(encoding="utf-8")) for name in _MODULES]
+    return "(() => {\n" + "\n".join(_EXPORT.sub("", text) for text in texts) + "})();"
 
 
 def _scene(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> dict[str, Any]:
