@@ -13,19 +13,21 @@ def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, 
 
     shortest, free = _solved(equal, equal_to)
     rows, needed = at_least @ free, bound - at_least @ shortest
-    used = np.abs(rows).max(axis=1, initial=0.0) > 1e-12
+    lengths = np.linalg.norm(rows, axis=1)
+    used = lengths > 1e-12
     if (needed[~used] > 1e-9).any():
         raise ValueError("a bound that nothing can meet")
-    rows, needed = rows[used], needed[used]
+    rows, needed = rows[used] / lengths[used, None], needed[used] / lengths[used]  # distances of planes
     if not (needed > 0).any():
         return shortest
-    stacked = np.vstack([rows.T, needed])
+    scale = float(needed.max())  # the change is at least this long: solved for in these units, or rounding wins
+    stacked = np.vstack([rows.T, needed / scale])
     target = np.append(np.zeros(rows.shape[1]), 1.0)
     multipliers, length = nnls(stacked, target, maxiter=30 * stacked.shape[1])
     if length < 1e-9:
         raise ValueError("bounds that contradict each other")
     residual = stacked @ multipliers - target
-    return np.asarray(shortest - free @ (residual[:-1] / residual[-1]))
+    return np.asarray(shortest - free @ (scale * residual[:-1] / residual[-1]))
 
 
 def _solved(equal: np.ndarray, equal_to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,6 +22,7 @@ from r2c2r_core.synthesize.ties import ties_of
 GAP_M = 0.002  # left between neighbours
 REST_GAP_M = 0.0005  # under a thing that stands on something: no contact at rest, no visible fall
 _DROP_M = 0.015
+_FAR_M = 0.035  # more than fillers and what measuring can be wrong by explain
 _ROUNDS = 6
 
 
@@ -47,6 +48,9 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
         before.name: float(np.linalg.norm(anchor(after) - anchor(before)))
         for before, after in zip(objects, placed, strict=True)
     }
+    warnings += [
+        f"{name} was moved by {1000 * by:.0f} mm: check its size and pose" for name, by in moves.items() if by > _FAR_M
+    ]
     return Layout(objects=tuple(placed), moves_m=moves, warnings=tuple(warnings))
 
 

@@ -171,13 +171,13 @@ def _separation(
 
 
 def _cost(items: Sequence[MeasuredObject], row: np.ndarray, overlap_m: float, sigma: np.ndarray) -> float:
-    """How many sigmas it takes to clear an overlap: unseen backs give way first, but only so far."""
+    """How many sigmas it takes to clear an overlap: unseen backs give way first, but only so far; then the fronts must move."""
     backs = 6 * np.arange(len(items)) + 3
     spare = np.array([_shrink(item, 1) if _unseen_back(item) else 0.0 for item in items])
     beyond = max(overlap_m - float(np.abs(row[backs]) @ spare), 0.0)
     firm = sigma.copy()
-    firm[backs] = np.minimum(firm[backs], _EDGE_M[False])
-    return overlap_m / float(np.linalg.norm(row * sigma)) + beyond / float(np.linalg.norm(row * firm))
+    firm[backs] = np.minimum(firm[backs], sigma[backs - 1])
+    return (overlap_m - beyond) / float(np.linalg.norm(row * sigma)) + beyond / float(np.linalg.norm(row * firm))
 
 
 def _reach(index: int, item: MeasuredObject, direction: Vector3, unknowns: int) -> np.ndarray:

@@ -39,3 +39,12 @@ def test_no_feasible_point_is_nearer() -> None:
 def test_bounds_that_contradict_each_other_are_refused() -> None:
     with pytest.raises(ValueError, match="contradict"):
         least_change(*NONE, np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0]))
+
+
+@pytest.mark.parametrize("far", [1e-3, 1.0, 1e3, 1e5])
+def test_a_far_bound_beside_a_nearly_rigid_one_is_met_all_the_same(far: float) -> None:
+    """Unknowns that cost a thousand times what others do, as a soft bound beside a face."""
+    rows = np.array([[5e-3, 5e-3, 1e-5, 0.0], [-5e-3, 5e-3, 0.0, 1e-5]])
+    y = least_change(np.zeros((0, 4)), np.zeros(0), rows, np.array([5e-3 * far, -1e-4]))
+    assert (rows @ y >= [5e-3 * far * (1 - 1e-9), -1e-4 - 1e-9 * far]).all()
+    np.testing.assert_allclose(y[:2], far / 2, rtol=1e-4)

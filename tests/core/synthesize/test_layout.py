@@ -85,6 +85,14 @@ def test_large_overlaps_are_moved_apart_and_the_moves_are_reported() -> None:
     assert 0.02 < layout.moves_m["b"] < 0.04
 
 
+def test_a_move_larger_than_measuring_explains_is_told() -> None:
+    layout = arranged(
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.38, 0, 0.5), (0.5, 0.58, 0.7))
+    )
+    assert overlapping_pairs(layout.objects) == []
+    assert ["a was moved by" in layout.warnings[0], "b was moved by" in layout.warnings[1]] == [True, True]
+
+
 def test_what_a_person_placed_stays_and_the_other_gives_way() -> None:
     pose = np.eye(4)
     pose[:3, 3] = (0.0, 0.0, 0.5)
