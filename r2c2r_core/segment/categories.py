@@ -6,6 +6,7 @@ from typing import Literal
 
 from r2c2r_core.segment.appliances import ApplianceSize
 from r2c2r_core.segment.things import ThingConfig
+from r2c2r_core.segment.units import FrontSize
 
 Kind = Literal["front", "appliance", "thing"]
 
@@ -16,6 +17,8 @@ class CategoryHint:
 
     kind: Kind
     pair: bool = False  # two doors side by side are one object
+    size: FrontSize | None = None  # of a machine's front
+    stacked: bool = False  # one of a stack of drawers
     depth_m: float = 0.58  # usual distance from the front to the back
     appliance: ApplianceSize | None = None
     thing: ThingConfig = field(default_factory=lambda: ThingConfig(radius_m=0.2))
@@ -23,6 +26,11 @@ class CategoryHint:
 
 _FRONTS = {"drawer", "cabinet", "door", "cupboard", "oven", "range", "dishwasher", "stove", "washer", "sink"}
 _FRONTS |= {"panel", "filler", "plinth", "kickboard"}  # nothing behind them opens, but they are cut like fronts
+_MACHINES = {
+    **dict.fromkeys(("oven", "range", "stove"), FrontSize(width=(0.42, 0.6, 1.0), height=(0.38, 0.68, 0.95))),
+    "dishwasher": FrontSize(width=(0.38, 0.6, 0.68), height=(0.5, 0.74, 0.92)),
+    "washer": FrontSize(width=(0.5, 0.6, 0.75), height=(0.65, 0.82, 1.0)),
+}
 _FRIDGE = ApplianceSize(width=(0.42, 0.65, 1.25), height=(0.75, 1.7, 2.2), depth=0.64, spread=0.35)
 _APPLIANCES = {
     **dict.fromkeys(("refrigerator", "fridge", "freezer"), _FRIDGE),
@@ -58,7 +66,14 @@ def hint_for(category: str) -> CategoryHint:
         )
     if stems & _FRONTS:
         wall = bool(stems & {"wall", "upper", "hanging"})
-        return CategoryHint(kind="front", pair="double" in stems or "sink" in stems, depth_m=0.35 if wall else 0.58)
+        machines = [_MACHINES[stem] for stem in sorted(stems) if stem in _MACHINES]
+        return CategoryHint(
+            kind="front",
+            pair="double" in stems or "sink" in stems,
+            size=machines[0] if machines else None,
+            stacked="drawer" in stems,
+            depth_m=0.35 if wall else 0.58,
+        )
     named = [_RADII_M[stem] for stem in sorted(stems) if stem in _RADII_M]
     radius = named[0] if named else 0.2
     widths = [_ROUND_WIDTHS_M[stem] for stem in sorted(stems) if stem in _ROUND_WIDTHS_M]

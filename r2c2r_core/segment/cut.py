@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -37,6 +38,9 @@ class Cell:
 _SHORT_BLOCKS = 15  # lines across fewer blocks must be clearer: a knob alone is a third of a drawer
 _UNEVEN_M = 0.025  # neighbours may be cut that differently across
 _ENOUGH_Z = 3.2  # scores end at 6
+_WIDEST_FRONT_M = 0.98
+_UNITS_FIRST = 2.0
+_CLEAR_Z, _HARDLY = 2.0, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +80,18 @@ class _Cutter:
         rows, columns = self.seen.shape
         cells: list[Cell] = []
         self._divide(Cell(0, 0, columns, rows), 0, cells)
-        return self._merge(self._merge(cells, self._frame_line), self._strip)
+        return self._merge(self._merge(self._parted(cells), self._frame_line), self._strip)
+
+    def _parted(self, cells: list[Cell]) -> list[Cell]:
+        """The cells, level strips parted where the panels below or above them are: a shadow falls on several fronts at once."""
+        found: list[Cell] = []
+        for cell in cells:
+            beside = [other for other in cells if other.top == cell.bottom or other.bottom == cell.top]
+            at = {other.left for other in beside if cell.left < other.left < cell.right and other.height > cell.height}
+            edges = [cell.left, *sorted(at), cell.right] if cell.height * self.cell_m < self.config.strip_m else []
+            parts = [Cell(left, cell.top, right, cell.bottom) for left, right in pairwise(edges)]
+            found += parts or [cell]
+        return found
 
     def _divide(self, cell: Cell, depth: int, out: list[Cell]) -> None:
         candidates = [found for axis in (0, 1) if (found := self._best_line(cell, axis, self.config)) is not None]
@@ -86,13 +101,29 @@ class _Cutter:
         if not candidates or depth >= self.config.deepest:
             out.append(cell)
             return
-        _, axis, position = max(candidates)
+        _, axis, position = self._units_first(cell, candidates)
         if axis == 0:
             halves = Cell(cell.left, cell.top, position, cell.bottom), Cell(position, cell.top, cell.right, cell.bottom)
         else:
             halves = Cell(cell.left, cell.top, cell.right, position), Cell(cell.left, position, cell.right, cell.bottom)
         for half in halves:
             self._divide(half, depth + 1, out)
+
+    def _units_first(self, cell: Cell, candidates: list[tuple[float, int, float]]) -> tuple[float, int, float]:
+        """The best line, unless it is level, stops where an upright one crosses it, and that one is hardly worse.
+
+        Handles of two units that happen to be level make such a line: it must not cut them before they are apart.
+        """
+        best = max(candidates)
+        if best[1] == 0 or len(candidates) < 2 or cell.width * self.cell_m <= _WIDEST_FRONT_M:
+            return best
+        upright = min(candidates, key=lambda found: found[1])
+        evidence, at = self.evidence[1], round(best[2] - 0.5)
+        block = round(upright[2] / evidence.block)
+        line = evidence.score[:, max(at - 2, 0) : at + 3].max(axis=1)
+        first, last = round(cell.left / evidence.block), round(cell.right / evidence.block)
+        broken = line[max(block - 1, 0) : block + 1].min() < _HARDLY * np.median(line[first:last])
+        return upright if broken and upright[0] * _UNITS_FIRST > best[0] else best
 
     def _best_line(self, cell: Cell, axis: int, config: CutConfig) -> tuple[float, int, float] | None:
         low, high = (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
@@ -109,9 +140,16 @@ class _Cutter:
         for i in np.argsort(-rank, kind="stable")[:40]:
             if rank[i] <= 0:
                 return None
-            if self._legal(cell, axis, int(i), stop - start):
+            if self._legal(cell, axis, int(i), stop - start) and not self._is_relief(cell, axis, start + int(i)):
                 return float(rank[i]), axis, start + _peak_near(profile, int(i)) + 0.5
         return None
+
+    def _is_relief(self, cell: Cell, axis: int, position: int) -> bool:
+        """Whether a line belongs to something on a front, as a handle or a window: it ends short of both edges."""
+        if cell.width * self.cell_m > _WIDEST_FRONT_M:
+            return False
+        across = (cell.top, cell.bottom) if axis == 0 else (cell.left, cell.right)
+        return _stops_short(self.evidence[axis], position, *across)
 
     def _line_scores(
         self, cell: Cell, axis: int, start: int, stop: int, config: CutConfig
@@ -208,19 +246,8 @@ class _Cutter:
         """Whether the line between them is clear in its middle and ends short of both its ends, as in a framed door."""
         axis = _side_by_side(a, b, _UNEVEN_M / self.cell_m) or 0
         position = max(a.left, b.left) if axis == 0 else max(a.top, b.top)
-        evidence = self.evidence[axis]
         low, high = (a.top, a.bottom) if axis == 0 else (a.left, a.right)
-        at = min(max(round(position - 0.5), 2), evidence.score.shape[1] - 3)
-        first, last = int(np.ceil(low / evidence.block)), int(high // evidence.block)
-        if last - first < 6:
-            return False
-        line = evidence.score[first:last, at - 2 : at + 3].max(axis=1)
-        known = evidence.known[first:last, at]
-        ends = (line[:2][known[:2]], line[-2:][known[-2:]])
-        if not (len(ends[0]) and len(ends[1])):
-            return False
-        middle = float(np.median(line[3:-3][known[3:-3]])) if known[3:-3].any() else 0.0
-        return middle > 2.0 and max(float(end.mean()) for end in ends) < 0.35 * middle and self._similar(a, b)
+        return _stops_short(self.evidence[axis], round(position - 0.5), low, high) and self._similar(a, b)
 
     def _similar(self, a: Cell, b: Cell) -> bool:
         first, second = self._colour(a), self._colour(b)
@@ -230,6 +257,21 @@ class _Cutter:
             same_hue = hue_a @ hue_b > chroma_a * chroma_b * np.cos(np.radians(18))
             return bool(same_hue and abs(first[0] - second[0]) < 60)
         return bool(max(chroma_a, chroma_b) < 16 and abs(first[0] - second[0]) < 30)
+
+
+def _stops_short(evidence: Evidence, position: int, low: float, high: float) -> bool:
+    """Whether a line across low..high is clear in its middle and hardly there at both of its ends."""
+    first, last = round(low / evidence.block), min(round(high / evidence.block), len(evidence.score))
+    if last - first < 3:
+        return False
+    at = min(max(position, 2), evidence.score.shape[1] - 3)
+    known = evidence.known[first:last, at]
+    line = evidence.score[first:last, at - 2 : at + 3].max(axis=1)
+    inner = line[1:-1][known[1:-1]]
+    if not (known[0] and known[-1] and len(inner)):
+        return False
+    middle = float(np.median(inner))
+    return middle > _CLEAR_Z and float(line[[0, -1]].max()) < _HARDLY * middle
 
 
 def joined(cells: list[Cell]) -> Cell:

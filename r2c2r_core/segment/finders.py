@@ -166,7 +166,7 @@ def _front(bench: Workbench, hint: CategoryHint, positives: Points, negatives: P
     run = bench.run_of(region) if region is not None else None
     if run is None:
         return None
-    front = find_front(run, positives, negatives, pair=hint.pair)
+    front = find_front(run, positives, negatives, pair=hint.pair, size=hint.size, stacked=hint.stacked)
     if front is None:
         return None
     front = replace(front, depth_m=wall_behind(run, front.cell, bench.scene.capture.room, hint.depth_m) or hint.depth_m)

@@ -10,11 +10,12 @@ from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.cut import Cell, joined
 from r2c2r_core.segment.edges import as_lab, panel_edges
-from r2c2r_core.segment.handles import GridHandle
+from r2c2r_core.segment.handles import GridHandle, find_handles
 from r2c2r_core.segment.mosaic import PlaneGrid
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.units import FrontSize, drawer_cell, line_clarity, machine_cell
 
 _USUAL_PROTRUSION_M = 0.035
 _PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
@@ -37,12 +38,21 @@ class Front:
     sides: tuple[str, ...] = ()  # of left, right, bottom, top: faces of the carcass in view
 
 
-def find_front(run: Run, positives: Points, negatives: Points, *, pair: bool) -> Front | None:
-    """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels."""
+def find_front(
+    run: Run, positives: Points, negatives: Points, *, pair: bool, size: FrontSize | None = None, stacked: bool = False
+) -> Front | None:
+    """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
+
+    `pair` joins the two doors of a cabinet, `size` says that it is a machine of that size, `stacked` that it is a drawer.
+    """
     on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
     first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
     if first is None:
         return None
+    if size is not None:
+        first = machine_cell(run, float(on[0, 0]), float(on[0, 1]), size) or first
+    if stacked:
+        first = drawer_cell(run, first, float(on[0, 1]))
     cells = [first]
     partner = _partner(run, first) if pair else None
     cells += [partner] if partner is not None else []
@@ -52,8 +62,7 @@ def find_front(run: Run, positives: Points, negatives: Points, *, pair: bool) ->
         cells += taken
     for column, row in off:
         cell = _without(cell, float(column), float(row), run, on)
-    handles = (run.handles[run.cells.index(part)] for part in cells)
-    handle = next((handle for handle in handles if handle is not None), None)
+    handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
     lab, seen = as_lab(run.mosaic)
     return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
 
@@ -251,6 +260,12 @@ def _supported(cell: Cell, run: Run) -> Cell:
     return Cell(left, top, right, bottom)
 
 
+def _handle_on(run: Run, cell: Cell) -> GridHandle | None:
+    if cell in run.cells:
+        return run.handles[run.cells.index(cell)]
+    return find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+
+
 def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
     assert front.handle is not None
     cell_m, handle = front.run.grid.cell_m, front.handle
@@ -267,15 +282,7 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
 
 def edge_strengths(front: Front) -> tuple[float, ...]:
     """How clearly each edge shows, 0..1: left, right, top, bottom."""
-    cell, values = front.cell, []
-    for axis, position in ((0, cell.left), (0, cell.right), (1, cell.top), (1, cell.bottom)):
-        evidence = front.run.vertical if axis == 0 else front.run.horizontal
-        across = (cell.top, cell.bottom) if axis == 0 else (cell.left, cell.right)
-        first = int(across[0] // evidence.block)
-        last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
-        at = min(max(round(position), 1), evidence.score.shape[1] - 2)
-        values.append(float(np.clip(evidence.score[first:last, at - 1 : at + 2].max(axis=1).mean() / 4, 0, 1)))
-    return tuple(values)
+    return line_clarity(front.run, front.cell)
 
 
 def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:
