@@ -40,6 +40,7 @@ _UNEVEN_M = 0.025  # neighbours may be cut that differently across
 _ENOUGH_Z = 3.2  # scores end at 6
 _WIDEST_FRONT_M = 0.98
 _UNITS_FIRST = 2.0
+_SHADOW_M = 0.025  # below a worktop; the edge of the worktop itself is 3-4 cm high
 _CLEAR_Z, _HARDLY = 2.0, 0.5
 
 
@@ -88,7 +89,7 @@ class _Cutter:
         for cell in cells:
             beside = [other for other in cells if other.top == cell.bottom or other.bottom == cell.top]
             at = {other.left for other in beside if cell.left < other.left < cell.right and other.height > cell.height}
-            edges = [cell.left, *sorted(at), cell.right] if cell.height * self.cell_m < self.config.strip_m else []
+            edges = [cell.left, *sorted(at), cell.right] if cell.height * self.cell_m < _SHADOW_M else []
             parts = [Cell(left, cell.top, right, cell.bottom) for left, right in pairwise(edges)]
             found += parts or [cell]
         return found

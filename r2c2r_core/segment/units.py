@@ -15,7 +15,7 @@ _ROW_M = 0.015  # how exactly the fronts of a row line up
 _TALL_M = 0.35
 _LOWEST_DRAWER_M = 0.09
 _DRAWN_SHARE = 0.3  # quantile over the blocks beside a handle: a seam shows in most of them
-_PROMINENT = 6.0  # robust deviations
+_PROMINENT = 5.0  # robust deviations
 _LEAST_Z = 0.35
 _RIM_M = 0.02
 
