@@ -17,7 +17,7 @@ class CategoryHint:
 
     kind: Kind
     pair: bool = False  # two doors side by side are one object
-    size: FrontSize | None = None  # of a machine's front
+    size: FrontSize | None = None  # of a unit's whole front: a machine, a stack of drawers
     stacked: bool = False  # one of a stack of drawers
     depth_m: float = 0.58  # usual distance from the front to the back
     appliance: ApplianceSize | None = None
@@ -26,9 +26,10 @@ class CategoryHint:
 
 _FRONTS = {"drawer", "cabinet", "door", "cupboard", "oven", "range", "dishwasher", "stove", "washer", "sink"}
 _FRONTS |= {"panel", "filler", "plinth", "kickboard"}  # nothing behind them opens, but they are cut like fronts
-_MACHINES = {
+_UNITS = {  # one front whatever lines it carries
     **dict.fromkeys(("oven", "range", "stove"), FrontSize(width=(0.42, 0.6, 1.0), height=(0.38, 0.68, 0.95))),
     "dishwasher": FrontSize(width=(0.38, 0.6, 0.68), height=(0.5, 0.74, 0.92)),
+    "stack": FrontSize(width=(0.25, 0.55, 1.25), height=(0.35, 0.72, 0.95)),
     "washer": FrontSize(width=(0.5, 0.6, 0.75), height=(0.65, 0.82, 1.0)),
 }
 _FRIDGE = ApplianceSize(width=(0.42, 0.65, 1.25), height=(0.75, 1.7, 2.2), depth=0.64, spread=0.35)
@@ -66,12 +67,12 @@ def hint_for(category: str) -> CategoryHint:
         )
     if stems & _FRONTS:
         wall = bool(stems & {"wall", "upper", "hanging"})
-        machines = [_MACHINES[stem] for stem in sorted(stems) if stem in _MACHINES]
+        units = [_UNITS[stem] for stem in sorted(stems) if stem in _UNITS]
         return CategoryHint(
             kind="front",
             pair="double" in stems or "sink" in stems,
-            size=machines[0] if machines else None,
-            stacked="drawer" in stems,
+            size=units[0] if units else None,
+            stacked="drawer" in stems and "stack" not in stems,
             depth_m=0.35 if wall else 0.58,
         )
     named = [_RADII_M[stem] for stem in sorted(stems) if stem in _RADII_M]

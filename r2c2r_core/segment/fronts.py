@@ -15,7 +15,7 @@ from r2c2r_core.segment.mosaic import PlaneGrid
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.units import FrontSize, drawer_cell, line_clarity, machine_cell
+from r2c2r_core.segment.units import FrontSize, drawer_cell, line_clarity, unit_cell
 
 _USUAL_PROTRUSION_M = 0.035
 _PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
@@ -43,14 +43,14 @@ def find_front(
 ) -> Front | None:
     """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
 
-    `pair` joins the two doors of a cabinet, `size` says that it is a machine of that size, `stacked` that it is a drawer.
+    `pair` joins the two doors of a cabinet, `size` says that it is a unit of about that size, `stacked` that it is a drawer.
     """
     on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
     first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
     if first is None:
         return None
     if size is not None:
-        first = machine_cell(run, float(on[0, 0]), float(on[0, 1]), size) or first
+        first = unit_cell(run, float(on[0, 0]), float(on[0, 1]), size) or first
     if stacked:
         first = drawer_cell(run, first, float(on[0, 1]))
     cells = [first]

@@ -10,6 +10,7 @@ from r2c2r_core.segment.runs import Run
 _USUAL_WORTH = 0.6  # a usual size weighs as much as two and a half clear edges
 _SPREAD = 0.22  # of sizes about the usual one, as a share
 _ROW_WORTH = 0.15
+_SAME_AREA = 0.85  # less is nested, more differs by a strip of shadow
 _NESTED_WORTH = 0.08  # a window and its frame lie inside a front, as clear as it: of equals the outermost is the front
 _ROW_M = 0.015  # how exactly the fronts of a row line up
 _TALL_M = 0.35
@@ -28,8 +29,8 @@ class FrontSize:
     height: tuple[float, float, float]
 
 
-def machine_cell(run: Run, column: float, row: float, size: FrontSize) -> Cell | None:
-    """The rectangle between lines of the run around a click that has the size of a machine's front and the clearest edges."""
+def unit_cell(run: Run, column: float, row: float, size: FrontSize) -> Cell | None:
+    """The rectangle between lines of the run around a click of the size of such a unit, with the clearest edges."""
     cell_m = run.grid.cell_m
     lefts = sorted({cell.left for cell in run.cells if cell.left < column and (column - cell.left) * cell_m < size.width[2]})
     rights = sorted(
@@ -46,9 +47,12 @@ def machine_cell(run: Run, column: float, row: float, size: FrontSize) -> Cell |
         for bottom in bottoms
         if size.height[0] <= (bottom - top) * cell_m <= size.height[2]
     ]
-    worths = [_worth(run, cell, size) for cell in options]
-    equal = [cell for cell, worth in zip(options, worths, strict=True) if worth > max(worths) - _NESTED_WORTH]
-    return max(equal, key=lambda cell: cell.width * cell.height, default=None)
+    rated = [(_worth(run, cell, size), cell) for cell in options]
+    best = max((worth for worth, _ in rated), default=0.0)
+    equal = [(worth, cell) for worth, cell in rated if worth > best - _NESTED_WORTH]
+    largest = max((cell.width * cell.height for _, cell in equal), default=0.0)
+    outer = [(worth, cell) for worth, cell in equal if cell.width * cell.height > _SAME_AREA * largest]
+    return max(outer, key=lambda option: option[0])[1] if outer else None
 
 
 def drawer_cell(run: Run, cell: Cell, row: float) -> Cell:
@@ -81,7 +85,7 @@ def _worth(run: Run, cell: Cell, size: FrontSize) -> float:
 
 
 def _in_row(run: Run, cell: Cell) -> int:
-    """How many of a rectangle's upper and lower edges a front beside it shares: machines are made to fit a row of cupboards."""
+    """How many of a rectangle's upper and lower edges a front beside it shares: units are made to fit a row of cupboards."""
     slack, tall = _ROW_M / run.grid.cell_m, _TALL_M / run.grid.cell_m
     beside = [
         other

@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.segment.categories import hint_for
 from r2c2r_core.segment.cut import Cell, cut_panels
 from r2c2r_core.segment.lines import Evidence
-from r2c2r_core.segment.units import drawer_cell, machine_cell
+from r2c2r_core.segment.units import drawer_cell, unit_cell
 
 CELL_M, BLOCK = 0.0025, 12
 Line = tuple[int, int, int]  # position, and from where to where it runs, in cells
@@ -50,7 +50,7 @@ def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), vertical=upright, horizontal=level)
     size = hint_for("oven").size
     assert size is not None
-    assert machine_cell(run, 120.0, 150.0, size) == frame
+    assert unit_cell(run, 120.0, 150.0, size) == frame
 
 
 def test_a_drawer_is_parted_from_its_stack_by_a_seam_that_shows_only_beside_the_handles() -> None:
