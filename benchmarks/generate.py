@@ -6,8 +6,9 @@
 holds samples named seedN. --update rewrites benchmarks/generate.json. Parts: scene, ranking, seconds.
 
 Truth of the scene are the sample's boxes; of the ranking the solids the sample was drawn from (a bottle's profile, else the
-box without its handle). The paper's tables are given beside, in its metrics: E_avg (eq. 17-20, along the object's axes
-instead of the world's) and IoU, here of exact solids instead of voxels of unstated size (a point cloud has no volume).
+box without its handle), round things with their middles laid upon each other. The paper's tables are given beside, in its
+metrics: E_avg (eq. 17-20, along the object's axes instead of the world's) and IoU, here of exact solids instead of voxels
+of unstated size (a point cloud has no volume).
 """
 
 import argparse
@@ -87,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         document["ranking"] = ranking_figures(kitchens, options.processes)
     if "seconds" in options.parts:
         document["seconds"] = seconds_figures(kitchens[0])
-    text = json.dumps(document, indent=1) + "\n"
+    text = json.dumps(_rounded(document), indent=1) + "\n"
     print(json.dumps({key: _headline(value) for key, value in document.items()}, indent=1))
     if options.json:
         options.json.write_text(text, encoding="utf-8")
@@ -196,7 +197,7 @@ def _judged(capture: Capture, track: MaskTrack, solid: Any) -> dict[str, Any]:
         except R2C2RError:
             continue
         assets.append(_asset(track.name, f"c{k}", metrics))
-        overlaps.append(overlap(shape.vertices_world, shape.faces, solid))
+        overlaps.append(overlap(solid.recentred(shape.vertices_world), shape.faces, solid))
         errors.append(100 * solid.extents_error(shape.vertices_world))
     by_id = {asset.candidate_id: k for k, asset in enumerate(assets)}
     ours = choose_candidate(assets)
@@ -270,6 +271,15 @@ def seconds_figures(kitchen: Kitchen) -> dict[str, Any]:
             "cpu": time.process_time() - cpu,
         }
     return {"candidates": COUNT, "cores": os.cpu_count(), "by_category": figures}
+
+
+def _rounded(value: Any) -> Any:
+    """The document with four decimals, and null where a figure does not exist."""
+    if isinstance(value, float):
+        return round(value, 4) if np.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    return [_rounded(part) for part in value] if isinstance(value, list) else value
 
 
 def _headline(value: Any) -> Any:

@@ -31,6 +31,16 @@ class TrueSolid:
             low[1] = max(low[1], _front_face(local[:, 1]))
         return float((np.abs(high - low - self.record.dimensions_m) / self.record.dimensions_m).mean())
 
+    def recentred(self, vertices_world: np.ndarray) -> np.ndarray:
+        """The vertices with a round thing's middle where it truly is: a candidate leaves its place behind, alignment finds it.
+
+        A round thing a centimetre off would be judged by that alone; furniture keeps its place, for its handle is part of it.
+        """
+        if not self.record.turns_freely:
+            return vertices_world
+        middle = (vertices_world.min(axis=0) + vertices_world.max(axis=0)) / 2
+        return vertices_world - middle + self.record.world_from_object.translation
+
 
 def true_solids(seed: int, truth: Path, world_from_capture: Rigid3) -> dict[str, TrueSolid]:
     """Every object's solid: bottles by their profile, the rest as boxes (a cupboard is the space it takes)."""
