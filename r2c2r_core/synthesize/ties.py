@@ -15,7 +15,7 @@ from r2c2r_core.synthesize.runs import built_in
 from r2c2r_core.synthesize.solve import Face, Tie
 
 _LINE_M, _LINES_M = 0.02, 0.04  # tops this near to the next, and this near in all, are one line: a scan sags along a run
-_SEAM_M = (-0.010, 0.011)  # edges that overlap or stand apart by this much are one seam; real gaps are 2-4 mm
+_SEAM_M = (-0.012, 0.015)  # edges this far past or short of each other are one seam: gaps are 2-4 mm, end panels 16-19 mm
 _COPLANAR_M = 0.002
 _SLIT_M = 0.02  # between a unit and what closes it above or below: more is a real step
 
