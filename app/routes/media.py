@@ -13,6 +13,7 @@ from app.services import bundles, media, overlays
 
 router = APIRouter(prefix="/media/{project}", tags=["media"], default_response_class=Response)
 
+Formats = Annotated[tuple[Literal["urdf", "mjcf", "usd", "glb"], ...], Query()]
 Width = Annotated[int | None, Query(ge=16, le=4096)]
 
 
@@ -101,9 +102,9 @@ def scene_review(context: Ctx, request: Request, project: str, v: str = "") -> R
 
 
 @router.get("/bundles/{version}.zip", operation_id="downloadBundle")
-def download_bundle(context: Ctx, project: str, version: RowId) -> FileResponse:
-    """A bundle; ranges are answered, so a download can go on where it stopped."""
-    bundle = bundles.file(context, project, version)
+def download_bundle(context: Ctx, project: str, version: RowId, formats: Formats = ()) -> FileResponse:
+    """A bundle, or some formats of it; ranges are answered, so a download can go on where it stopped."""
+    bundle = bundles.part(context, project, version, frozenset(formats)) if formats else bundles.file(context, project, version)
     return FileResponse(
         bundle.path,
         media_type="application/zip",

@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from app import schemas
 from app.deps import Ctx
+from app.routes.numbers import RowId
 from app.services import bundles, scenes
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["scenes"])
@@ -25,3 +26,15 @@ def get_certificate(context: Ctx, project: str) -> schemas.Certificate:
 def list_bundles(context: Ctx, project: str) -> list[schemas.Bundle]:
     """All versions, newest first."""
     return bundles.list_bundles(context, project)
+
+
+@router.get("/bundles/{version}/check", operation_id="checkBundle")
+def check_bundle(context: Ctx, project: str, version: RowId) -> schemas.BundleCheck:
+    """Look at a bundle now: its bytes against its checksum, and the linter's findings."""
+    return bundles.check(context, project, version)
+
+
+@router.get("/bundles/{version}/changes", operation_id="compareBundles")
+def compare_bundles(context: Ctx, project: str, version: RowId, since: RowId) -> list[schemas.BundleChange]:
+    """What became different since another version."""
+    return bundles.compare(context, project, since, version)

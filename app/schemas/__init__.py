@@ -1,7 +1,7 @@
 """What goes over the wire. Times are seconds since 1970; lengths are metres; pixels are of the stored RGB frame."""
 
 from app.schemas.base import ErrorBody
-from app.schemas.bundles import Bundle, Certificate
+from app.schemas.bundles import Bundle, BundleChange, BundleCheck, Certificate, Finding
 from app.schemas.captures import CaptureFacts, FrameInfo
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
 from app.schemas.masks import FrameMask, Lane, LaneEntry, LiveState, LiveStatus, MaskBits
@@ -36,6 +36,8 @@ from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerSho
 __all__ = [
     "Backend",
     "Bundle",
+    "BundleChange",
+    "BundleCheck",
     "Candidate",
     "CandidateGroup",
     "CaptureFacts",
@@ -48,6 +50,7 @@ __all__ = [
     "Deleted",
     "ErrorBody",
     "Figures",
+    "Finding",
     "FolderEntry",
     "FolderListing",
     "FrameInfo",

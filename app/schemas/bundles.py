@@ -16,6 +16,21 @@ class Bundle(Shape):
     current: bool  # nothing was changed since
 
 
+class BundleChange(Shape):
+    """One difference between two bundles; an empty object is the whole."""
+
+    object: str
+    text: str
+
+
+class BundleCheck(Shape):
+    """A bundle looked at again, now."""
+
+    version: int
+    intact: bool  # its bytes are those that were certified
+    findings: list["Finding"]
+
+
 class Finding(Shape):
     """One thing the linter or the simulation has to say."""
 

@@ -1,5 +1,7 @@
 """Finished bundles: versions, their certificate, and single files out of the newest one."""
 
+import hashlib
+import io
 import tempfile
 import zipfile
 from dataclasses import dataclass
@@ -14,8 +16,14 @@ from app.db.documents import inputs_key
 from app.db.engine import reading
 from app.db.tables import Bundle
 from app.errors import NotFound, NotReady
+from app.jobs.plain import plain
+from app.services.bundle_changes import changes
 from app.services.context import Context
+from app.services.media import kept_file
+from app.services.scenes import manifest
 from r2c2r_core.workspace import write_atomically
+
+FORMATS = {"urdf": "scene.urdf", "mjcf": "scene.xml", "usd": "scene.usda", "glb": "scene.glb"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +53,37 @@ def file(context: Context, project_id: str, version: int) -> BundleFile:
         if row is None or path is None or not path.is_file():
             raise NotFound(f"no bundle of version {version}", hint="see the list of versions")
         return BundleFile(path, queries.bundle_file_name(project.name, row.version, row.sha256), row.sha256)
+
+
+def part(context: Context, project_id: str, version: int, formats: frozenset[str]) -> BundleFile:
+    """A bundle with some formats only, made once, so that a download of it can go on where it stopped."""
+    whole = file(context, project_id, version)
+    if formats >= FORMATS.keys():
+        return whole
+    with reading(context.engine) as session:
+        files = context.files(queries.project_row(session, project_id))
+    key = "-".join(sorted(formats))
+    target = files.previews / f"bundle-v{version}" / f"{key}.zip"
+    kept_file(target, lambda: _with_formats(whole.path, formats))
+    return BundleFile(target, whole.file_name.replace(".zip", f"-{key}.zip"), f"{whole.sha256}-{key}")
+
+
+def check(context: Context, project_id: str, version: int) -> schemas.BundleCheck:
+    """Look at a bundle now: are its bytes those that were certified, and what does the linter say."""
+    from r2c2r_core.export.archive import opened_bundle
+    from r2c2r_core.export.lint import lint
+
+    found = file(context, project_id, version)
+    with found.path.open("rb") as handle:
+        intact = hashlib.file_digest(handle, "sha256").hexdigest() == found.sha256
+    with opened_bundle(found.path) as folder:
+        findings = [schemas.Finding.model_validate(plain(finding)) for finding in lint(folder)]
+    return schemas.BundleCheck(version=version, intact=intact, findings=findings)
+
+
+def compare(context: Context, project_id: str, older: int, newer: int) -> list[schemas.BundleChange]:
+    """What differs between two versions."""
+    return changes(*(manifest(file(context, project_id, version).path) for version in (older, newer)))
 
 
 def certificate(context: Context, project_id: str) -> schemas.Certificate:
@@ -117,3 +156,16 @@ def _inside(archive: zipfile.ZipFile, name: str) -> str:
         if member_name == name or member_name.endswith(f"/{name}"):
             return member_name
     raise KeyError(name)
+
+
+def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
+    """The zip without the other formats' scenes; without their meshes too, where no chosen format has use for them."""
+    left_out = {scene for name, scene in FORMATS.items() if name not in formats}
+    made = io.BytesIO()
+    with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
+        for entry in archive.infolist():
+            parts = entry.filename.split("/")
+            if parts[-1] in left_out or ("meshes" in parts and not formats & {"urdf", "mjcf", "usd"}):
+                continue
+            out.writestr(entry, archive.read(entry))
+    return made.getvalue()

@@ -30,13 +30,13 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
     scene = fitted(files)
     if scene is None:
         raise NotReady("there is no finished scene yet", hint="run the project first")
-    manifest = _manifest(files.bundles / bundle.path) if bundle else {}
-    failures = manifest.get("failures") if isinstance(manifest.get("failures"), dict) else {}
+    described = manifest(files.bundles / bundle.path) if bundle else {}
+    failures = described.get("failures") if isinstance(described.get("failures"), dict) else {}
     return schemas.SceneSummary(
         items=[_item(entry, ids.get(entry["name"]), files) for entry in scene["objects"]],
         failures={str(name): str(line) for name, line in (failures or {}).items()},
         warnings=scene["warnings"],
-        stages=[_stage(entry) for entry in manifest.get("stages", [])],
+        stages=[_stage(entry) for entry in described.get("stages", [])],
         glb=f"/media/{project_id}/scene.glb?v={bundle.version}" if bundle else None,
         preview=f"/media/{project_id}/preview.png?v={bundle.version}" if bundle else None,
     )
@@ -119,7 +119,8 @@ def _stage(entry: dict[str, Any]) -> schemas.StageInfo:
     )
 
 
-def _manifest(bundle: Path) -> dict[str, Any]:
+def manifest(bundle: Path) -> dict[str, Any]:
+    """A bundle's manifest; empty when it has none."""
     try:
         return _manifest_at(bundle, bundle.stat().st_mtime_ns)
     except FileNotFoundError:

@@ -29,6 +29,19 @@ export interface Bundle {
   current: boolean;
 }
 
+/** One difference between two bundles; an empty object is the whole. */
+export interface BundleChange {
+  object: string;
+  text: string;
+}
+
+/** A bundle looked at again, now. */
+export interface BundleCheck {
+  version: number;
+  intact: boolean;
+  findings: Finding[];
+}
+
 /** One candidate mesh with its evidence. */
 export interface Candidate {
   id: string;
@@ -795,6 +808,10 @@ export interface Operations {
   changeProject: { parameters: { project: string }; body: ProjectPatch; answer: Project };
   /** GET /api/projects/{project}/bundles */
   listBundles: { parameters: { project: string }; body: undefined; answer: Bundle[] };
+  /** GET /api/projects/{project}/bundles/{version}/changes */
+  compareBundles: { parameters: { project: string; version: number; since: number }; body: undefined; answer: BundleChange[] };
+  /** GET /api/projects/{project}/bundles/{version}/check */
+  checkBundle: { parameters: { project: string; version: number }; body: undefined; answer: BundleCheck };
   /** GET /api/projects/{project}/candidates */
   listCandidates: { parameters: { project: string }; body: undefined; answer: CandidateGroup[] };
   /** GET /api/projects/{project}/certificate */
@@ -898,7 +915,7 @@ export interface Operations {
   /** POST /api/uploads/{upload}/finish */
   finishUpload: { parameters: { upload: string }; body: undefined; answer: Project };
   /** GET /media/{project}/bundles/{version}.zip */
-  downloadBundle: { parameters: { project: string; version: number }; body: undefined; answer: unknown };
+  downloadBundle: { parameters: { project: string; version: number; formats?: ("urdf" | "mjcf" | "usd" | "glb")[] }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.glb */
   candidateMesh: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.png */

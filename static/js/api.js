@@ -4,7 +4,7 @@
  *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
  *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ObjectPhotos, ViewerSession, ViewerShown, ViewerShow,
- *   RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload
+ *   BundleChange, BundleCheck, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload
  * } from "./api-types" */
 
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
@@ -226,6 +226,10 @@ export const getScene = (id) => get(`${of(id)}/scene`);
 export const getCertificate = (id) => get(`${of(id)}/certificate`);
 /** @param {string} id @returns {Promise<Bundle[]>} */
 export const listBundles = (id) => get(`${of(id)}/bundles`);
+/** @param {string} id @param {number} version @returns {Promise<BundleCheck>} */
+export const checkBundle = (id, version) => get(`${of(id)}/bundles/${version}/check`);
+/** @param {string} id @param {number} version @param {number} since @returns {Promise<BundleChange[]>} */
+export const compareBundles = (id, version, since) => get(`${of(id)}/bundles/${version}/changes?since=${since}`);
 /** @param {string} id @returns {Promise<ViewerSession>} */
 export const openViewer = (id) => send("POST", `${of(id)}/viewer`);
 /** @param {string} id @param {Partial<ViewerShow>} what @returns {Promise<ViewerShown>} */

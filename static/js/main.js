@@ -1,6 +1,7 @@
 /** The only file with side effects: defines the elements and starts the router. */
 
 import { AppShell } from "./elements/app-shell.js";
+import { BackendChoice } from "./elements/backend-choice.js";
 import { CommandPalette } from "./elements/command-palette.js";
 import { CommentList } from "./elements/comment-list.js";
 import { FilmStrip } from "./elements/film-strip.js";
@@ -14,7 +15,6 @@ import { ObjectList } from "./elements/object-list.js";
 import { PhotoCheck } from "./elements/photo-check.js";
 import { ProposalList } from "./elements/proposal-list.js";
 import { ReviewState } from "./elements/review-state.js";
-import { SegmenterChoice } from "./elements/segmenter-choice.js";
 import { Toasts } from "./elements/toasts.js";
 import { ViewerFrame } from "./elements/viewer-frame.js";
 import { WhoIsIn } from "./elements/who.js";
@@ -42,7 +42,7 @@ customElements.define("r2c2r-job", JobPanel);
 customElements.define("r2c2r-frame-canvas", FrameCanvas);
 customElements.define("r2c2r-film-strip", FilmStrip);
 customElements.define("r2c2r-object-list", ObjectList);
-customElements.define("r2c2r-segmenter", SegmenterChoice);
+customElements.define("r2c2r-backend", BackendChoice);
 customElements.define("r2c2r-proposal-list", ProposalList);
 customElements.define("r2c2r-viewer", ViewerFrame);
 customElements.define("r2c2r-projects", ProjectsPage);

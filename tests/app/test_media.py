@@ -76,3 +76,16 @@ def test_the_scenes_page_runs_in_an_origin_of_its_own_and_reaches_nothing(web: R
     assert policy.startswith("sandbox allow-scripts; default-src 'none'")
     assert "allow-same-origin" not in policy
     assert "connect-src" not in policy
+
+
+def test_chosen_formats_are_a_download_of_their_own_that_can_go_on(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    address = f"/media/{project}/bundles/1.zip?formats=urdf"
+    part = web.client.get(address)
+    assert part.headers["etag"] != web.client.get(f"/media/{project}/bundles/1.zip").headers["etag"]
+    tail = web.client.get(address, headers={"range": "bytes=20-", "if-range": part.headers["etag"]})
+    assert (tail.status_code, tail.content) == (206, part.content[20:])
+    assert web.client.get(f"/media/{project}/bundles/1.zip?formats=exe").status_code == 422
+    assert web.get(f"/api/projects/{project}/bundles/1/changes?since=1") == []
+    web.get(f"/api/projects/{project}/bundles/1/changes?since=7", 404)

@@ -1,19 +1,22 @@
 /** The bundle: formats, certificate, versions with checksums. */
 
-import { ApiError, getCertificate, listBundles } from "../api.js";
+import { ApiError, checkBundle, compareBundles, getCertificate, listBundles } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
 import { certificateCard } from "../elements/results.js";
-import { sayError } from "../elements/toasts.js";
-import { bytes } from "../lib/format.js";
+import { say, sayError } from "../elements/toasts.js";
+import { bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Bundle} Bundle */
 
+/** @type {[string, string, string][]} format, file, who opens it */
+const FORMATS = [
+  ["urdf", "scene.urdf", "ROS, PyBullet, SAPIEN, MuJoCo, Isaac's importer"],
+  ["mjcf", "scene.xml", "MuJoCo, with textures"],
+  ["usd", "scene.usda", "Isaac Sim, Omniverse"],
+  ["glb", "scene.glb", "the web, editors"],
+];
 const CONTENT = [
-  ["scene.urdf", "URDF for ROS, PyBullet, SAPIEN, MuJoCo and Isaac's importer"],
-  ["scene.xml", "MJCF with textures, for MuJoCo"],
-  ["scene.usda", "USD with physics, for Isaac Sim and Omniverse"],
-  ["scene.glb", "the scene for the web and for editors"],
   ["meshes/", "textured OBJ visuals and convex colliders, relative paths"],
   ["manifest.json", "every dimension and joint with where it came from"],
   ["review.html", "the scene to open and turn, in any browser, without a server"],
@@ -40,12 +43,17 @@ export class DownloadPage extends LiveElement {
         throw error;
       });
       this.#body.replaceChildren(
-        h("header", {}, h("h1", {}, "Download"), button(newest)),
+        h(
+          "header",
+          {},
+          h("h1", {}, "Download"),
+          h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
+        ),
         newest.current
           ? ""
           : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
-        h("div", { class: "split" }, content(this.project), certificate ? certificateCard(certificate) : ""),
-        versions(bundles),
+        h("div", { class: "split" }, this.#choice(newest), certificate ? certificateCard(certificate) : ""),
+        this.#versions(bundles),
       );
     } catch (error) {
       sayError(error);
@@ -64,55 +72,136 @@ export class DownloadPage extends LiveElement {
       ),
     );
   }
-}
 
-/** @param {Bundle} bundle */
-function button(bundle) {
-  const link = h("a", { class: "button primary", href: bundle.url, download: bundle.file_name });
-  link.append(icon("download"), `Bundle ${bundle.version}, ${bytes(bundle.size)}`);
-  return link;
-}
+  /** Which formats, and the button that fetches them. @param {Bundle} bundle */
+  #choice(bundle) {
+    const boxes = FORMATS.map(([name]) => h("input", { type: "checkbox", value: name, checked: true }));
+    const link = h(
+      "a",
+      { class: "button primary", download: "" },
+      icon("download"),
+      `Bundle ${bundle.version}, ${bytes(bundle.size)}`,
+    );
+    const draw = () => {
+      const chosen = boxes.filter((box) => box.checked).map((box) => ["formats", box.value]);
+      const all = chosen.length === boxes.length;
+      link.href = all ? bundle.url : `${bundle.url}?${new URLSearchParams(chosen)}`;
+      link.toggleAttribute("inert", !chosen.length);
+      link.lastChild?.replaceWith(
+        all ? `Bundle ${bundle.version}, ${bytes(bundle.size)}` : `Bundle ${bundle.version}, chosen formats`,
+      );
+    };
+    for (const box of boxes) box.addEventListener("change", draw);
+    draw();
+    const lines = FORMATS.map(([, file, who], k) =>
+      h("label", { class: "row" }, boxes[k], h("code", {}, file), h("span", { class: "muted" }, who)),
+    );
+    return h(
+      "section",
+      { class: "card stack" },
+      h("h2", {}, "What is inside"),
+      h("fieldset", { class: "choices" }, h("legend", {}, "Formats"), ...lines),
+      h(
+        "dl",
+        { class: "facts" },
+        ...CONTENT.flatMap(([name, text]) => [h("dt", {}, h("code", {}, name ?? "")), h("dd", {}, text ?? "")]),
+      ),
+      h("p", { class: "row" }, link, ...looks(this.project)),
+      this.#check(bundle),
+    );
+  }
 
-/** @param {string} project */
-function content(project) {
-  const report = h("a", { href: `/media/${project}/report.html`, target: "_blank" }, "Open the report");
-  const scene = h("a", { href: `/media/${project}/review.html`, target: "_blank" }, "Open the scene in 3D");
-  return h(
-    "section",
-    { class: "card stack" },
-    h("h2", {}, "What is inside"),
-    h(
-      "dl",
-      { class: "facts" },
-      ...CONTENT.flatMap(([name, text]) => [h("dt", {}, h("code", {}, name ?? "")), h("dd", {}, text ?? "")]),
-    ),
-    h("p", { class: "row" }, report, scene),
-  );
-}
+  /** The linter and the checksum, run when asked. @param {Bundle} bundle */
+  #check(bundle) {
+    const said = h("div", { role: "status" });
+    const ask = h("button", { type: "button" }, "Check it now");
+    ask.addEventListener("click", async () => {
+      said.replaceChildren("Reading every file…");
+      try {
+        const { intact, findings } = await checkBundle(this.project, bundle.version);
+        const errors = findings.filter((finding) => finding.severity === "error");
+        said.replaceChildren(
+          h(
+            "span",
+            { class: `chip ${intact ? "good" : "bad"}` },
+            intact ? "bytes as certified" : "bytes changed since",
+          ),
+          h(
+            "span",
+            { class: `chip ${errors.length ? "bad" : "good"}` },
+            errors.length ? counted(errors.length, "error") : "lint passed",
+          ),
+          ...findings.map(({ where, message }) => h("p", { class: "muted" }, `${where}: ${message}`)),
+        );
+      } catch (error) {
+        said.replaceChildren();
+        sayError(error);
+      }
+    });
+    return h("div", { class: "row" }, ask, said);
+  }
 
-/** @param {Bundle[]} bundles */
-function versions(bundles) {
-  const rows = bundles.map((bundle) =>
-    h(
+  /** @param {Bundle[]} bundles newest first */
+  #versions(bundles) {
+    const rows = bundles.map((bundle, k) => this.#row(bundle, bundles[k + 1]));
+    const titles = ["Bundle", "Made", "Certificate", "Size", "SHA-256", "Since the one before"];
+    return h(
+      "section",
+      { class: "card stack scroll" },
+      h("h2", {}, "Versions"),
+      h(
+        "table",
+        {},
+        h("thead", {}, h("tr", {}, ...titles.map((title) => h("th", { scope: "col" }, title)))),
+        h("tbody", {}, ...rows),
+      ),
+    );
+  }
+
+  /**
+   * @param {Bundle} bundle
+   * @param {Bundle | undefined} before
+   */
+  #row(bundle, before) {
+    const changes = h(
+      "td",
+      {},
+      before ? h("button", { type: "button", class: "quiet" }, "What changed?") : "the first",
+    );
+    changes.querySelector("button")?.addEventListener("click", async () => {
+      try {
+        const found = await compareBundles(this.project, bundle.version, before?.version ?? bundle.version);
+        const lines = found.map(({ object, text }) => h("li", {}, object ? h("strong", {}, object) : "", ` ${text}`));
+        changes.replaceChildren(lines.length ? h("ul", { class: "plain" }, ...lines) : "nothing a person would see");
+      } catch (error) {
+        sayError(error);
+      }
+    });
+    const copy = h(
+      "button",
+      { type: "button", class: "quiet", "aria-label": `Copy the checksum of version ${bundle.version}` },
+      "Copy",
+    );
+    copy.addEventListener("click", () =>
+      navigator.clipboard.writeText(bundle.sha256).then(() => say("Checksum copied"), sayError),
+    );
+    return h(
       "tr",
       {},
       h("td", {}, h("a", { href: bundle.url, download: bundle.file_name }, `version ${bundle.version}`)),
       h("td", {}, new Date(bundle.created * 1000).toLocaleString()),
       h("td", {}, bundle.passed === null ? "–" : bundle.passed ? "certified" : "with findings"),
       h("td", { class: "number" }, bytes(bundle.size)),
-      h("td", { class: "mono", title: bundle.sha256 }, `${bundle.sha256.slice(0, 16)}…`),
-    ),
-  );
-  const titles = ["Bundle", "Made", "Certificate", "Size", "SHA-256"];
-  return h(
-    "section",
-    { class: "card stack" },
-    h("h2", {}, "Versions"),
-    h(
-      "table",
-      {},
-      h("thead", {}, h("tr", {}, ...titles.map((title) => h("th", { scope: "col" }, title)))),
-      h("tbody", {}, ...rows),
-    ),
-  );
+      h("td", { class: "mono", title: bundle.sha256 }, `${bundle.sha256.slice(0, 16)}… `, copy),
+      changes,
+    );
+  }
+}
+
+/** @param {string} project */
+function looks(project) {
+  return [
+    h("a", { href: `/media/${project}/report.html`, target: "_blank" }, "Open the report"),
+    h("a", { href: `/media/${project}/review.html`, target: "_blank" }, "Open the scene in 3D"),
+  ];
 }

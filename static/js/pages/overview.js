@@ -3,8 +3,8 @@
 import { changeProject, getHistory, getProject, getSystem } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
+import { BackendChoice } from "../elements/backend-choice.js";
 import { JobPanel } from "../elements/job-panel.js";
-import { SegmenterChoice } from "../elements/segmenter-choice.js";
 import { sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
 import { ago, bytes, counted } from "../lib/format.js";
@@ -12,21 +12,25 @@ import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Project} Project */
 
+const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher"]);
+
 export class OverviewPage extends LiveElement {
   project = "";
   #body = h("div", { class: "page" });
   #job = new JobPanel();
   #viewer = new ViewerFrame();
-  #segmenter = new SegmenterChoice();
+  #choices = SEAMS.map((seam) => Object.assign(new BackendChoice(), { seam }));
   #shown = false;
 
   connected() {
     this.replaceChildren(this.#body);
     const { signal } = this;
-    this.#segmenter.addEventListener("choose", (event) => this.#choose(/** @type {string} */ (detailOf(event))), {
-      signal,
-    });
-    getSystem().then((system) => (this.#segmenter.backends = system.segmenters), sayError);
+    for (const choice of this.#choices) {
+      choice.addEventListener("choose", (event) => this.#choose(detailOf(event)), { signal });
+    }
+    getSystem().then((system) => {
+      for (const choice of this.#choices) choice.backends = system[`${choice.seam}s`];
+    }, sayError);
     live.addEventListener("project", () => this.#load(), { signal });
     live.addEventListener("job", () => this.#load(), { signal });
     this.#load();
@@ -40,10 +44,10 @@ export class OverviewPage extends LiveElement {
     }
   }
 
-  /** @param {string} segmenter */
-  async #choose(segmenter) {
+  /** @param {{ seam: string, name: string }} chosen */
+  async #choose({ seam, name }) {
     try {
-      this.#draw(await changeProject(this.project, { segmenter }));
+      this.#draw(await changeProject(this.project, { [seam]: name }));
     } catch (error) {
       sayError(error);
       this.#load();
@@ -53,7 +57,7 @@ export class OverviewPage extends LiveElement {
   /** @param {Project} project */
   #draw(project) {
     if (project.id !== this.project) return;
-    this.#segmenter.chosen = project.segmenter;
+    for (const choice of this.#choices) choice.chosen = project[choice.seam];
     this.#job.job = project.status === "ready" ? null : project.job;
     const capture = project.capture;
     this.#body.replaceChildren(
@@ -64,7 +68,7 @@ export class OverviewPage extends LiveElement {
       ...(capture && project.status === "ready"
         ? [
             h("div", { class: "split" }, this.#facts(project, capture), scanCard(project)),
-            h("div", { class: "split" }, this.#segmenter, this.#cloud()),
+            h("div", { class: "split" }, h("div", { class: "stack" }, ...this.#choices), this.#cloud()),
           ]
         : []),
       h("section", { class: "stack" }, h("h2", {}, "History"), this.#history()),

@@ -13,6 +13,7 @@ import {
 } from "../api.js";
 import { detailOf, h, icon, LiveElement } from "../dom.js";
 import { FolderDialog } from "../elements/folder-dialog.js";
+import { stateChip as stateOf } from "../elements/review-state.js";
 import { say, sayError } from "../elements/toasts.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
@@ -132,7 +133,7 @@ export class ProjectsPage extends LiveElement {
         "div",
         { class: "body" },
         h("h2", {}, h("a", { href: `/p/${project.id}` }, project.name)),
-        h("div", { class: "row" }, stateChip(project)),
+        h("div", { class: "row" }, stateChip(project), reviewChip(project)),
         busy ? h("progress", { value: busy.progress, max: 1, "aria-label": `${busy.kind} ${project.name}` }) : null,
         h("div", { class: "muted" }, line.filter(Boolean).join(" · ")),
         h(
@@ -287,4 +288,15 @@ function stateChip(project) {
   }
   if (project.result === "stale") return h("span", { class: "chip warn" }, "changed since the last run");
   return h("span", { class: "chip" }, project.counts.objects ? "annotating" : "new");
+}
+
+/** Where it stands between annotator and reviewer, and what waits for an answer. @param {Project} project */
+function reviewChip(project) {
+  const open = project.counts.open_comments;
+  return h(
+    "span",
+    { class: "row" },
+    stateOf(project.review_state),
+    open ? h("span", { class: "chip warn" }, counted(open, "open comment")) : "",
+  );
 }

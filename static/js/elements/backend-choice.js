@@ -1,10 +1,21 @@
-/** Which segmenter draws a project's masks, under which licence, and what is missing for the others. Emits "choose" name. */
+/** Who does a stage of a project's work, under which licence, and what is missing for the others. Emits "choose" {seam, name}. */
 
 import { h, LiveElement } from "../dom.js";
 
 /** @typedef {import("../api-types").Backend} Backend */
 
-export class SegmenterChoice extends LiveElement {
+/** @typedef {"segmenter" | "generator" | "matcher"} Seam */
+
+/** @type {Record<Seam, [string, string]>} title and what to know */
+const TITLES = {
+  segmenter: ["Masks", "Who draws them; both sets are kept when you change your mind"],
+  generator: ["Candidates", "Who makes the meshes; the next run uses it"],
+  matcher: ["Alignment", "Who finds a mesh's place in the photos; the next run uses it"],
+};
+
+export class BackendChoice extends LiveElement {
+  /** @type {Seam} */
+  seam = "segmenter";
   /** @type {Backend[]} */
   #backends = [];
   #chosen = "";
@@ -30,11 +41,11 @@ export class SegmenterChoice extends LiveElement {
       h(
         "section",
         { class: "card stack" },
-        h("h2", {}, "Masks"),
+        h("h2", {}, TITLES[this.seam][0]),
         h(
           "fieldset",
           { class: "choices" },
-          h("legend", {}, "Who draws them; both sets are kept when you change your mind"),
+          h("legend", {}, TITLES[this.seam][1]),
           ...this.#backends.map((backend) => this.#choice(backend)),
         ),
       ),
@@ -43,10 +54,10 @@ export class SegmenterChoice extends LiveElement {
 
   /** @param {Backend} backend */
   #choice(backend) {
-    const radio = h("input", { type: "radio", name: "segmenter", value: backend.name });
+    const radio = h("input", { type: "radio", name: this.seam, value: backend.name });
     radio.checked = backend.name === this.#chosen;
     radio.disabled = !backend.available;
-    radio.addEventListener("change", () => this.emit("choose", backend.name));
+    radio.addEventListener("change", () => this.emit("choose", { seam: this.seam, name: backend.name }));
     const tone = backend.licence_class === "open" ? "good" : "warn";
     return h(
       "label",
