@@ -8,3 +8,4 @@ RowId = Annotated[int, Path(ge=0, lt=2**63)]
 FrameNumber = Annotated[int, Path(ge=0, lt=2**31)]
 Count = Annotated[int, Query(ge=0, lt=2**31)]
 OptionalId = Annotated[int | None, Query(ge=0, lt=2**63)]
+OtherId = Annotated[int, Query(ge=0, lt=2**63)]  # of a second row, in the query

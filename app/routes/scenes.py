@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from app import schemas
 from app.deps import Ctx
-from app.routes.numbers import RowId
+from app.routes.numbers import OtherId, RowId
 from app.services import bundles, scenes
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["scenes"])
@@ -35,6 +35,6 @@ def check_bundle(context: Ctx, project: str, version: RowId) -> schemas.BundleCh
 
 
 @router.get("/bundles/{version}/changes", operation_id="compareBundles")
-def compare_bundles(context: Ctx, project: str, version: RowId, since: RowId) -> list[schemas.BundleChange]:
+def compare_bundles(context: Ctx, project: str, version: RowId, since: OtherId) -> list[schemas.BundleChange]:
     """What became different since another version."""
     return bundles.compare(context, project, since, version)

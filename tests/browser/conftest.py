@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,13 @@ def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[
     """The app on a free port, with an empty database; the sample lies where it may be imported from by path."""
     data = tmp_path_factory.mktemp("data")
     shutil.copy(sample / "scan.r3d", data / "scan.r3d")
+    with served(data) as found:
+        yield found
+
+
+@contextmanager
+def served(data: Path) -> Iterator[str]:
+    """The app on a free port over a data folder; the address it prints."""
     serve = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(data)!r}))"
     code = f"from pathlib import Path; from app.serve import serve; {serve}"
     server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)

@@ -2,6 +2,7 @@
 
 import { getProject } from "../api.js";
 import { h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { fetched } from "../later.js";
 import { actionOf, KEYMAP } from "../lib/keymap.js";
 import { counted } from "../lib/format.js";
 import { live } from "../live.js";
@@ -86,6 +87,13 @@ export class AppShell extends LiveElement {
     live.watch(route.project);
     if (same) return;
     this.#drawTabs(route);
+    const waiting = fetched(route.page);
+    if (!waiting) return this.#enter(route);
+    waiting.then(() => this.#route === route && this.#enter(route), sayError);
+  }
+
+  /** @param {Route} route */
+  #enter(route) {
     const page = /** @type {PageElement} */ (document.createElement(`r2c2r-${route.page}`));
     if (route.project) page.project = route.project;
     page.query = route.query;
