@@ -24,17 +24,26 @@ from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts
 from app.main import create_app
 from app.services import accounts
 from app.services.projects import new_project
-from app.settings import LOOPBACK, Settings
+from app.settings import LOOPBACK, MAX_UPLOAD_BYTES, Settings
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
 
-def serve(*, host: str, port: int, data_dir: Path, names: Sequence[str] = (), open_project: str | None = None) -> None:
+def serve(
+    *,
+    host: str,
+    port: int,
+    data_dir: Path,
+    names: Sequence[str] = (),
+    open_project: str | None = None,
+    heavy_jobs: int = 1,
+    max_upload_bytes: int = MAX_UPLOAD_BYTES,
+) -> None:
     """Run the app until it is stopped; the address is printed first, with its key when only this machine reaches it.
 
     `names` are host names by which people reach it, where they differ from the address it listens on.
     """
     data_dir = data_dir.expanduser().resolve()
-    settings = _settings(data_dir, host, names)
+    settings = replace(_settings(data_dir, host, names), heavy_jobs=heavy_jobs, max_upload_bytes=max_upload_bytes)
     with _only_server(data_dir), _bound(host, port) as listening:
         if settings.accounts_only:
             _require_accounts(settings)

@@ -9,6 +9,7 @@ from pathlib import Path
 import app
 
 MEBIBYTE = 1024 * 1024
+MAX_UPLOAD_BYTES = 16 * 1024 * MEBIBYTE
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -22,14 +23,15 @@ class Settings:
     allowed_hosts: tuple[str, ...] = LOOPBACK
     accounts_only: bool = False  # others can reach it: the printed key opens nothing, people sign in
     import_roots: tuple[Path, ...] = ()
-    max_upload_bytes: int = 16 * 1024 * MEBIBYTE
+    max_upload_bytes: int = MAX_UPLOAD_BYTES
     upload_kept_s: float = 7 * 24 * 3600.0  # an upload that stopped may go on for this long
     max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE
     max_unpacked_files: int = 200_000
     min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
     job_memory_bytes: int = 2048 * MEBIBYTE  # free before a job starts: what a kitchen of a recording of minutes takes
     heavy_jobs: int = 1
-    job_attempts: int = 3  # how often a job that lost its server or its process is taken up again without getting further
+    job_attempts: int = 3  # how often a job whose process vanishes is begun without getting further
+    job_losses: int = 10  # the same when its server vanishes, which is hardly the job's doing
     kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0

@@ -145,9 +145,11 @@ class Journey:
         known = [number for number, item in self.objects.items() if not item["deleted"]]
         number = self.rng.choice(known) if known else 0
         where = f"{at}/objects/{number}"
-        actions = [self._add, self._add, self._upload, self._run]
+        actions = [self._upload, self._run]
+        if not self.server.real:  # a click anywhere would be an object more to reconstruct
+            actions += [self._add] * 2
+            actions += [lambda: self._take("POST", f"{where}/points", self._click())] * (4 if number else 0)
         if number:
-            actions += [lambda: self._take("POST", f"{where}/points", self._click())] * 4
             actions += [lambda: self._take("PATCH", where, {"category": self.rng.choice(["drawer", "oven", "mug"])})]
             actions += [lambda: self._take("POST", f"{at}/undo", {"object": number})]
             actions += [lambda: self._correct(where, number)] * 2

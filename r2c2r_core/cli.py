@@ -200,7 +200,8 @@ def doctor(options: argparse.Namespace) -> int:
 
 def serve(options: argparse.Namespace) -> int:
     """The web app."""
-    _web("serve").serve(host=options.host, port=options.port, data_dir=options.data, names=options.name)
+    limits = {"heavy_jobs": options.jobs, "max_upload_bytes": options.max_upload * 2**30}
+    _web("serve").serve(host=options.host, port=options.port, data_dir=options.data, names=options.name, **limits)
     return 0
 
 
@@ -274,6 +275,8 @@ def _parser() -> argparse.ArgumentParser:
         web.add_argument("--port", type=int, default=8000)
         web.add_argument("--data", type=Path, default=data, help="folder of the projects (default: %(default)s)")
         if name == "serve":
+            web.add_argument("--jobs", type=_positive, default=1, help="heavy jobs at a time (default: %(default)s)")
+            web.add_argument("--max-upload", type=_positive, default=16, metavar="GB", help="default: %(default)s")
             web.add_argument("--name", action="append", default=[], metavar="HOST", help="another name people reach it by")
         if name == "demo":
             web.add_argument("--no-serve", action="store_true", help="stop after the bundle is written")

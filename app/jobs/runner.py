@@ -134,7 +134,7 @@ class Runner:
                 row.worker_pid = row.worker_started = row.owner_pid = None
                 if row.state == "cancelling":
                     row.state, row.finished = "cancelled", time.time()
-                elif row.attempts >= self.settings.job_attempts:
+                elif row.attempts >= self.settings.job_losses:
                     row.state, row.finished = "failed", time.time()
                     hint = "look at its log, then retry"
                     row.error = {

@@ -234,5 +234,5 @@ def _refuse_size(context: Context, size: int) -> None:
     limit = context.settings.max_upload_bytes
     if size > limit:
         raise TooLarge(
-            f"the file is larger than {limit / 1e9:.1f} GB", hint="import it by its path on this machine, or raise the limit"
+            f"the file is larger than {limit / 1e9:.1f} GB", hint="import it by its path, or serve with a larger --max-upload"
         )

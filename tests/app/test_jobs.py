@@ -209,7 +209,7 @@ def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Calla
         settings: Settings = web.settings
     engine = open_engine(settings.database)
     with writing(engine) as session:
-        session.add(Job(project_id=project, kind="run", state="running", created=time.time(), attempts=3))
+        session.add(Job(project_id=project, kind="run", state="running", created=time.time(), attempts=10))
     engine.dispose()
     with start() as web:
         job = web.get(f"/api/jobs?project={project}")[0]
