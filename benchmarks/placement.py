@@ -23,6 +23,7 @@ from staged import film, outlines, place_for
 from stock import Article, as_candidate, assortment
 
 from r2c2r_core.align.hypotheses import signed_permutations
+from r2c2r_core.align.render import render_views
 from r2c2r_core.align.shape import Shape, prepare_shape
 from r2c2r_core.align.stage import AlignConfig, place_mesh
 from r2c2r_core.errors import PlacementFailed
@@ -67,6 +68,7 @@ def main() -> None:
     articles = assortment(options.meshes, options.candidates)
     numbers = range(options.first, options.first + options.trials)
     work = [(number, articles[number % len(articles)], options.overlays) for number in numbers]
+    views = hundred_views(max((a for a in articles if a.kind != "scan"), key=lambda a: len(a.mesh.faces)))
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
         trials = []
         for trial in pool.imap_unordered(attempt, work):
@@ -77,9 +79,18 @@ def main() -> None:
                 f"{100 * trial.scale_off:5.2f} % iou {trial.iou:.3f} rival {trial.runner_up} {trial.cpu_s:.1f} s {trial.note}",
                 flush=True,
             )
-            summary = summarise(sorted(trials, key=lambda t: t.number))
+            summary = {"views": views, **summarise(sorted(trials, key=lambda t: t.number))}
             (HERE / "placement.json").write_text(json.dumps(summary, indent=1) + "\n")
     print(json.dumps({k: v for k, v in summary.items() if k != "trials"}, indent=1))
+
+
+def hundred_views(article: Article) -> dict[str, object]:
+    """CPU time of a hundred views with colour and depth at the size they are matched at."""
+    config = AlignConfig()
+    started = time.process_time()
+    render_views(article.mesh, count=100, size_px=config.match_px)
+    seconds = time.process_time() - started
+    return {"of": article.name, "faces": len(article.mesh.faces), "size_px": config.match_px, "cpu_s": round(seconds, 3)}
 
 
 def attempt(work: tuple[int, Article, Path | None]) -> Trial:

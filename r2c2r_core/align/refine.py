@@ -77,7 +77,7 @@ def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anch
     strength = 1.0 if track.kind != "thing" else 0.3
     return Anchors(
         up_mesh=up_mesh,
-        up_weight=strength if box_axis else 0.1,
+        up_weight=strength if box_axis else 0.01,  # the mean normal of a flat side is a degree off
         front=track.front if track.kind == "front" else None,
         support_z_m=track.box.support_z_m if track.box is not None and track.kind == "thing" else None,
     )
