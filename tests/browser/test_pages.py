@@ -1,4 +1,4 @@
-"""Our pages under axe-core, dark and light, at laptop and tablet size: nothing serious, and what loads first is small."""
+"""Our pages on a finished project: nothing serious for axe-core, a small first load, and nothing lost without a connection."""
 
 import json
 import zipfile
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from app.serve import register_finished
 from tests.app.nouns import finish
@@ -85,3 +85,21 @@ def serious(page: Page, where: str) -> list[str]:
         if v["impact"] in ("serious", "critical")
         for node in v["nodes"]
     ]
+
+
+def test_a_change_made_without_a_connection_is_stored_when_it_is_back(browser: Browser, finished: tuple[str, str]) -> None:
+    address, project = finished
+    context = browser.new_context()
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    page.get_by_role("button", name="drawer_1", exact=True).click()
+    context.set_offline(True)
+    page.get_by_label("Name of drawer_1").fill("top_drawer")
+    page.get_by_label("Name of drawer_1").press("Enter")
+    expect(page.locator(".banner")).to_contain_text("1 change not stored yet")
+    context.set_offline(False)
+    expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
+    expect(page.locator(".banner")).to_be_hidden()
+    context.close()
