@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from r2c2r_core.align.stage import AlignConfig
 from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.errors import BackendUnavailable
 from r2c2r_core.generate.consensus import choose_candidate
@@ -30,7 +31,8 @@ def two_bottles():
 
 
 def request_for(address: str, overrides: Overrides | None = None) -> Request:
-    config = ReconstructConfig(generate=GenerateConfig(count=1, pool_frames=6, url=f"{address}/v1/infer"))
+    quick = AlignConfig(views=4, match_photos=1, match_views=8, settled=8, refined=2, points=400, surface_points=1500)
+    config = ReconstructConfig(generate=GenerateConfig(count=1, pool_frames=6, url=f"{address}/v1/infer"), align=quick)
     return Request(
         source=Path("scan"),
         prompts=Prompts(objects=()),
