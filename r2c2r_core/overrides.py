@@ -12,7 +12,7 @@ from r2c2r_core.model.inputs import HingeSide, ObjectOverride, Overrides
 NO_OVERRIDES = Overrides(objects={})
 
 _OBJECT_KEYS = ("candidate", "hinge", "dimensions_m", "pose", "joint_limits", "front", "rejected", "regenerate")
-_MOST_BATCHES = 20
+MOST_BATCHES = 20  # of further candidates
 _SCENE_KEYS = ("up", "floor", "manhattan_yaw", "walls")
 
 
@@ -72,8 +72,8 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
     if dimensions is not None and (dimensions <= 0).any():
         raise OverrideError(f"{where}: {name}.dimensions_m is {dimensions.tolist()}", hint="expected three positive metres")
     regenerate = entry.get("regenerate", 0)
-    if not isinstance(regenerate, int) or not 0 <= regenerate <= _MOST_BATCHES:
-        raise OverrideError(f"{where}: {name}.regenerate is {regenerate!r}", hint=f"expected 0 to {_MOST_BATCHES}")
+    if not isinstance(regenerate, int) or not 0 <= regenerate <= MOST_BATCHES:
+        raise OverrideError(f"{where}: {name}.regenerate is {regenerate!r}", hint=f"expected 0 to {MOST_BATCHES}")
     candidate = entry.get("candidate")
     if candidate is not None and (folder / candidate).is_file():
         candidate = str((folder / candidate).resolve())

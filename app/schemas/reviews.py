@@ -6,6 +6,7 @@ from pydantic import Field
 
 from app.schemas.base import Shape
 from app.schemas.jobs import Job
+from r2c2r_core.overrides import MOST_BATCHES
 
 
 class Candidate(Shape):
@@ -64,7 +65,7 @@ class CandidateGroup(Shape):
 
 
 class VerdictIn(Shape):
-    """What a reviewer says. Rejecting makes new candidates; accepting another one aligns it anew."""
+    """What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew."""
 
     candidate: str = Field(min_length=1, max_length=60)
     verdict: Literal["accepted", "rejected", "cleared"]
@@ -82,6 +83,7 @@ class OverrideData(Shape):
     joint_lower: float | None = None
     joint_upper: float | None = None
     rejected: list[str] = Field(default_factory=list)
+    regenerate: int = 0
 
 
 class OverridePatch(Shape):
@@ -93,6 +95,7 @@ class OverridePatch(Shape):
     pose: list[list[float]] | None = None
     joint_lower: float | None = Field(default=None, allow_inf_nan=False)
     joint_upper: float | None = Field(default=None, allow_inf_nan=False)
+    regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES)  # times further candidates were asked for
     rerun: bool = True
 
 

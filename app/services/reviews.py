@@ -23,6 +23,7 @@ from app.services import jobs
 from app.services.context import Context
 from app.services.prompts import tell_object
 from r2c2r_core.errors import OverrideError, PromptError
+from r2c2r_core.overrides import MOST_BATCHES
 from r2c2r_core.workspace import Workspace
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -167,6 +168,9 @@ def _override_after(before: dict[str, Any], body: schemas.VerdictIn, facts: dict
     after["rejected"] = rejected
     if not rejected:
         after.pop("rejected")
+    known = {candidate["candidate_id"] for candidate in (facts or {}).get("candidates", [])}
+    if body.verdict == "rejected" and known and known <= set(rejected):  # none is left to choose
+        after["regenerate"] = min(before.get("regenerate", 0) + 1, MOST_BATCHES)
     return after
 
 

@@ -393,6 +393,7 @@ export interface OverrideData {
   joint_lower: number | null;
   joint_upper: number | null;
   rejected: string[];
+  regenerate: number;
 }
 
 /** The fields that are present are set; null clears. */
@@ -403,6 +404,7 @@ export interface OverridePatch {
   pose?: number[][] | null;
   joint_lower?: number | null;
   joint_upper?: number | null;
+  regenerate?: number | null;
   rerun?: boolean;
 }
 
@@ -727,7 +729,7 @@ export interface UploadIn {
   modified?: number | null;
 }
 
-/** What a reviewer says. Rejecting makes new candidates; accepting another one aligns it anew. */
+/** What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew. */
 export interface VerdictIn {
   candidate: string;
   verdict: "accepted" | "rejected" | "cleared";

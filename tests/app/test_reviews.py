@@ -85,6 +85,20 @@ def test_rejecting_is_recorded_with_its_reason_and_makes_new_ones(reviewed: Revi
     assert overrides(web, project) == {"rejected": ["c0"]}
 
 
+def test_rejecting_the_last_candidate_or_asking_makes_further_ones(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    known = [candidate["id"] for candidate in web.get(f"{address}/candidates")["candidates"]]
+    for candidate in known:
+        assert web.get(f"{address}/override")["regenerate"] == 0
+        web.post(f"{address}/verdicts", {"candidate": candidate, "verdict": "rejected", "rerun": False})
+    assert web.get(f"{address}/override")["regenerate"] == 1
+    said = web.patch(f"{address}/override", {"regenerate": 2})
+    web.job(said["job"]["id"], "done")
+    assert overrides(web, project) == {"rejected": known, "regenerate": 2}
+    web.patch(f"{address}/override", {"regenerate": 21}, 422)
+
+
 def test_verdicts_are_undone_and_redone_apart_from_clicks(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"

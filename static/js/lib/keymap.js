@@ -64,6 +64,7 @@ export const KEYMAP = [
   },
   { keys: ["y"], action: "accept", text: "Accept this candidate", page: "review" },
   { keys: ["x"], action: "reject", text: "Reject this candidate", page: "review" },
+  { keys: ["g"], action: "more", text: "Make more candidates of this object", page: "review" },
   { keys: ["n"], action: "next-object", text: "Next object", page: "review" },
   { keys: ["p"], action: "previous-object", text: "Previous object", page: "review" },
   { keys: ["c"], action: "comment", text: "Comment on this object", page: "review" },

@@ -263,6 +263,7 @@ export class ReviewPage extends LiveElement {
       h(
         "div",
         { class: "row" },
+        h("button", { type: "button", onClick: () => this.act("more") }, "More candidates"),
         h("button", { type: "button", onClick: () => upload.click() }, "Upload a mesh…"),
         upload,
         this.#commentButton(),
@@ -389,6 +390,7 @@ export class ReviewPage extends LiveElement {
   #actions = {
     accept: () => this.#onCandidate("accepted"),
     reject: () => this.#onCandidate("rejected"),
+    more: () => this.#more(),
     "next-object": () => this.#step(1),
     "previous-object": () => this.#step(-1),
     "next-photo": () => this.#photos.move(1),
@@ -404,6 +406,14 @@ export class ReviewPage extends LiveElement {
     undo: () => this.#undo("undo"),
     redo: () => this.#undo("redo"),
   };
+
+  /** Another draw of candidates beside those that are there. */
+  #more() {
+    const group = this.#group;
+    if (!group) return;
+    const regenerate = (group.override.regenerate ?? 0) + 1;
+    this.#review(() => changeOverride(this.project, group.object, { regenerate }));
+  }
 
   /** @param {"accepted" | "rejected"} verdict */
   #onCandidate(verdict) {
