@@ -24,7 +24,8 @@ def test_every_endpoint_says_what_is_wrong_in_the_one_shape(web: Running) -> Non
             method, filled, params={"filename": "x.glb"}, json={} if method in ("POST", "PATCH") else None
         )
         assert 400 <= answer.status_code < 500, (method, path, answer.status_code)
-        assert set(answer.json()) == SHAPE, (method, path)
+        if method != "HEAD":  # which has no body
+            assert set(answer.json()) == SHAPE, (method, path)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ def test_the_first_page_is_light_and_asks_no_other_site(web: Running) -> None:
         if path.endswith(".js"):
             found = (one or two for one, two in IMPORT.findall(web.client.get(path).text))
             waiting += [posixpath.normpath(posixpath.join(posixpath.dirname(path), name)) for name in found]
-    assert any(path.endswith("pages/annotate.js") for path in sizes), "the imports are followed"
+    assert any(path.endswith("pages/projects.js") for path in sizes), "the imports are followed"
     assert sum(sizes.values()) < MOST_BYTES, sorted(sizes.items(), key=lambda item: -item[1])[:8]
     foreign = re.findall(r'(?:href|src)="(https?:)?//', page)
     assert foreign == []
