@@ -58,8 +58,12 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
         return None
     normal, offset = _foremost_plane(looking, normals[normals[:, 1] < -0.7])
     inliers = looking[np.abs(looking @ normal - offset) < _INLIER_M]
-    forward = np.unique(faces[face_normals(vertices, faces)[:, 1] < -0.7])
-    rim = vertices[forward][np.abs(vertices[forward] @ normal - offset) < _INLIER_M]
+    forward = faces[face_normals(vertices, faces)[:, 1] < -0.7]
+    flat = forward[(np.abs(vertices[forward] @ normal - offset) < _INLIER_M).all(axis=1)]
+    if len(flat):  # sampled anew, alone: among all faces a sliver along an edge may get no sample
+        inliers, _ = sample_surface(vertices, flat, _SAMPLES, rng)
+    rim = vertices[np.unique(forward)]
+    rim = rim[np.abs(rim @ normal - offset) < _INLIER_M]
     return FrontFace(corners=_rectangle_corners(inliers, rim, normal, offset), outward=normal, inliers=len(inliers))
 
 

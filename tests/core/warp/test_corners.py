@@ -59,3 +59,16 @@ def test_what_looks_nowhere_forwards_has_no_front() -> None:
     assert find_front(*box_mesh(np.zeros(3), np.array([1.0, 1e-4, 1.0]))) is not None
     vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     assert find_front(vertices, np.array([[0, 1, 2]])) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_sliver_along_an_edge_of_the_front_belongs_to_it(seed: int) -> None:
+    # As a cut leaves it: a strip of the same plane, in faces of its own; most of the surface is elsewhere
+    x, y, top = 0.3, -4.0, 1.7
+    body = block((-x, y, 0.0), (x, -y, top))
+    strip = np.array([[-x, y, top], [x, y, top], [x, y, top + 0.0065], [-x, y, top + 0.0065]])
+    vertices = np.concatenate([body[0], strip])
+    faces = np.concatenate([body[1], len(body[0]) + np.array([[0, 1, 2], [0, 2, 3]])])
+    found = find_front(vertices, faces, seed=seed)
+    assert found is not None
+    assert abs(found.corners[:, 2].max() - (top + 0.0065)) < 1e-3
