@@ -1,4 +1,4 @@
-"""Free-standing things: a prior solid, carved by free space and silhouettes, with the fused surface where it was seen.
+"""Things of any shape: a prior solid, carved by free space and silhouettes, with the fused surface where it was seen.
 
 Recipe of backends.md §2.6 and stack.md §8. Every field is a distance in metres, positive outside, on a grid in the thing's
 own gravity-aligned frame, so the zero level is a closed surface whatever was not seen.
@@ -10,11 +10,10 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.errors import GenerationFailed
-from r2c2r_core.generate.consistency import self_consistency, silhouette_iou
+from r2c2r_core.generate.consistency import silhouette_iou
 from r2c2r_core.generate.evidence import Evidence, masked_points
-from r2c2r_core.generate.lathe import fit_lathe, is_round, lathe_mesh
 from r2c2r_core.generate.shape import Shape
-from r2c2r_core.generate.symmetry import Revolution, best_mirror, fit_revolution, is_rounder_than_box
+from r2c2r_core.generate.symmetry import Revolution, best_mirror
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.generate.votes import collect_votes
 from r2c2r_core.geometry.meshes import largest_component, simplify, volume
@@ -28,7 +27,6 @@ _LEVELS_M = (-0.004, -0.002, 0.0, 0.002, 0.004)
 _MOST_FACES = 6000
 _LEAST_POINTS = 60
 _COMPONENT_CELL_M = 0.03
-_LATHE_FIT = 0.75
 
 
 class Grid(NamedTuple):
@@ -44,57 +42,42 @@ class Grid(NamedTuple):
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def carved_shape(evidence: Evidence, variation: Variation) -> Shape:
-    """A thing's solid from its views; frame: its box's, gravity-aligned, origin at the box's centre."""
+class Seen(NamedTuple):
+    """What the frames of one draw show of a thing, in its box's frame (gravity-aligned, origin at the box's centre)."""
+
+    world_from_local: Rigid3
+    points: Points
+    low: Vector3  # corners of what is carved
+    high: Vector3
+    floor: float | None  # the height it stands on; None where unknown
+
+
+def observe_thing(evidence: Evidence, variation: Variation) -> Seen:
+    """The thing's points and box; raises GenerationFailed where there is too little depth."""
     world_from_local = _local_frame(evidence)
     points = _object_points(evidence, variation, world_from_local)
-    low, high, floor = _prior_box(evidence, variation, points, world_from_local)
-    revolution = fit_revolution(points)
-    lathe = None
-    if revolution is not None:
-        span_m = (float(low[2]), float(high[2]))
-        lathe, certain = _lathe_shape(variation, revolution, points, span_m, world_from_local)
-        if lathe is not None and certain and _fit(lathe, evidence) > _LATHE_FIT:
-            return lathe
-        revolution = revolution if is_rounder_than_box(points, revolution) else None
+    return Seen(world_from_local, points, *_prior_box(evidence, variation, points, world_from_local))
+
+
+def carved_shape(evidence: Evidence, variation: Variation, seen: Seen, revolution: Revolution | None) -> Shape:
+    """The solid that masks and free space leave, with the seen surface; about `revolution`'s axis where there is one."""
+    low, high = seen.low, seen.high
     if revolution is not None:
         low, high = _around(revolution, low, high)
     margin = max(0.006, 1.5 * variation.voxel_m)
     grid = _grid(low, high, variation.voxel_m, margin)
-    field, mirrored = _solid_field(grid, low - margin, high + margin, revolution, variation, world_from_local)
-    vertices, faces, level = _best_level(grid, field, floor, evidence, variation, world_from_local)
+    field, mirrored = _solid_field(grid, low - margin, high + margin, revolution, variation, seen.world_from_local)
+    vertices, faces, level = _best_level(grid, field, seen.floor, evidence, variation, seen.world_from_local)
     parameters = {"revolved": float(revolution is not None), "mirrored": float(mirrored), "level_m": level}
-    carved = _thing(vertices, faces, world_from_local, parameters)
-    return lathe if lathe is not None and _fit(lathe, evidence) > _fit(carved, evidence) else carved
-
-
-def _thing(vertices: Points, faces: Faces, world_from_local: Rigid3, parameters: dict[str, float]) -> Shape:
     return Shape(
         vertices_local=vertices,
         faces=faces,
-        world_from_local=world_from_local,
+        world_from_local=seen.world_from_local,
         front_y_m=None,
         maskable=np.ones(len(faces), dtype=bool),
         parameters=parameters,
         warnings=(),
     )
-
-
-def _fit(shape: Shape, evidence: Evidence) -> float:
-    """Mask IoU less twice the depth residual in metres (backends.md §2.7), over the best frames."""
-    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:8])
-    return fit["mask_iou"] - 2.0 * fit.get("depth_residual_m", 0.0)
-
-
-def _lathe_shape(
-    variation: Variation, revolution: Revolution, points: Points, span_m: tuple[float, float], world_from_local: Rigid3
-) -> tuple[Shape | None, bool]:
-    """A clean body of revolution, None where masks do not give one, and whether the depth points lie on it too."""
-    measured = fit_lathe(points, revolution, *span_m, variation.views, world_from_local)
-    if measured is None:
-        return None, False
-    shape = _thing(*lathe_mesh(measured), world_from_local, {"revolved": 1.0, "mirrored": 0.0})
-    return shape, is_round(points, measured)
 
 
 def _local_frame(evidence: Evidence) -> Rigid3:

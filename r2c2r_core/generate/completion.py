@@ -8,11 +8,11 @@ from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.asset import shape_metrics, unposed
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.boxed import appliance_shape, front_shape
-from r2c2r_core.generate.carved import carved_shape
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.shape import Shape
+from r2c2r_core.generate.things import thing_shape
 from r2c2r_core.generate.variation import Variation, draw_variation
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.model.mesh import MeshAsset
@@ -81,7 +81,7 @@ def _make_shape(evidence: Evidence, variation: Variation) -> Shape:
         return front_shape(evidence, variation)
     if track.kind == "appliance" and track.box is not None:
         return appliance_shape(evidence, variation)
-    return carved_shape(evidence, variation)
+    return thing_shape(evidence, variation)
 
 
 def _cut_open(shape: Shape) -> Atlas:

@@ -17,6 +17,7 @@ class Variation:
     carve_votes: int  # frames that must see a voxel free
     voxel_m: float
     depth_scale: float  # of a depth that is assumed, not seen
+    depth_draw: float  # standard deviations off a depth that was measured badly, -1.5..1.5
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -28,6 +29,7 @@ class Variation:
             "carve_votes": float(self.carve_votes),
             "voxel_m": self.voxel_m,
             "depth_scale": self.depth_scale,
+            "depth_draw": self.depth_draw,
         }
 
 
@@ -45,4 +47,18 @@ def draw_variation(evidence: Evidence, rng: np.random.Generator) -> Variation:
         carve_votes=int(rng.integers(2, 4)),
         voxel_m=float(rng.uniform(0.004, 0.006)),
         depth_scale=float(rng.uniform(0.95, 1.05)),
+        depth_draw=float(rng.uniform(-1.5, 1.5)),
+    )
+
+
+def whole_pool(evidence: Evidence) -> Variation:
+    """No draw at all: every good frame and the middle of each range."""
+    return Variation(
+        views=evidence.pool,
+        erosion_px=1.0,
+        bbox_percentile=0.5,
+        carve_votes=2,
+        voxel_m=0.005,
+        depth_scale=1.0,
+        depth_draw=0.0,
     )

@@ -31,6 +31,7 @@ _LEVEL = 0.7  # of a unit axis: an axis that rises more is the one that points u
 BoxSearch = Literal["upright", "hull", "powell"]
 """How a mesh's own axes are found: calipers in plan, where gravity is known; the hull's faces, where it was only assumed; or
 the paper's Powell search (eq. 8-9), for comparison."""
+_SURE_SHARE, _SURE_M = 0.08, 0.004  # a depth known this well, of itself or in metres, was measured
 _TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
 
 
@@ -93,9 +94,12 @@ def measure_object(
         handle = front.handle
     elif track.box is not None and spec.opening != "rigid":
         low, high = _with_box(low, high, track, rotation)
-    low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
-    if track.box is not None and sources[1] == "inferred" and _side_seen(capture, low, high, rotation):
-        sources[1] = "measured"
+    if spec.opening == "rigid":
+        sources[1] = _depth_source(capture, asset, low, high, rotation, warnings)
+    else:
+        low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
+        if track.box is not None and sources[1] == "inferred" and _face_seen(capture, low, high, rotation):
+            sources[1] = "measured"
     if handle is None and spec.opening not in ("rigid", "fixed"):
         handle = handle_of_mesh(samples, rotation, low, high)
     pose = Rigid3(rotation, rotation @ ((low + high) / 2))
@@ -210,8 +214,6 @@ def _believable_depth(
     """The depth, up to the wall where it ends near or beyond it, and within what the category allows."""
     depth, (least, most) = float(high[1] - low[1]), spec.depth_range_m
     low, high = low.copy(), high.copy()
-    if spec.opening == "rigid":
-        return low, high, "measured"
     to_wall = distance_to_wall(capture, rotation, low, high)
     source: Source = "inferred"
     # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
@@ -237,17 +239,31 @@ def distance_to_wall(capture: Capture, rotation: np.ndarray, low: Vector3, high:
     return min((d for d in behind if 0.1 < d < 1.2), default=None)
 
 
-def _side_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:
-    """Whether the scan shows a side face from front to back, so that the depth was observed."""
+def _depth_source(
+    capture: Capture, asset: MeshAsset, low: Vector3, high: Vector3, rotation: np.ndarray, warnings: list[str]
+) -> Source:
+    """Whether a thing's depth was seen: on a face that shows it, or in outlines; a round thing's follows from its width."""
+    if asset.parameters.get("revolved"):
+        return "inferred"
+    depth, sigma = float(high[1] - low[1]), asset.parameters.get("depth_sigma_m")
+    seen = _face_seen(capture, low, high, rotation) if sigma is None else sigma < max(_SURE_SHARE * depth, _SURE_M)
+    if not seen:
+        warnings.append(f"no frame shows how deep it is: {depth:.2f} m is inferred")
+    return "measured" if seen else "inferred"
+
+
+def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:
+    """Whether the scan shows a side or the top from front to back, so that the depth was observed."""
     points = capture.surface.vertices_world @ rotation
     margin = 0.2 * (high - low)
-    inner = (points[:, 2] > low[2] + margin[2]) & (points[:, 2] < high[2] - margin[2])
-    inner &= (points[:, 1] > low[1] - 0.02) & (points[:, 1] < high[1] + 0.02)
-    for side in (low[0], high[0]):
-        y = points[inner & (np.abs(points[:, 0] - side) < 0.02), 1]
-        if len(y) > 30:
-            filled = np.histogram(y, bins=12, range=(low[1], high[1]))[0]
-            if (filled > 0).mean() > 0.85:
+    points = points[(points[:, 1] > low[1] - 0.02) & (points[:, 1] < high[1] + 0.02)]
+    bins = int(np.clip(0.8 * (high[1] - low[1]) / capture.surface.voxel_m, 3, 12))
+    for across, other, faces in ((2, 0, (low[0], high[0])), (0, 2, (high[2],))):
+        inner = points[(points[:, across] > low[across] + margin[across]) & (points[:, across] < high[across] - margin[across])]
+        for face in faces:
+            y = inner[np.abs(inner[:, other] - face) < 0.02, 1]
+            filled = np.histogram(y, bins=bins, range=(low[1], high[1]))[0]
+            if len(y) > 30 and (filled > 0).mean() > 0.85:
                 return True
     return False
 

@@ -11,7 +11,7 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import rasterize, subdivide_long_edges
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.capture import Capture, Depth, Frame, Room, SceneSurface, Wall
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, ThingBox
 
@@ -121,6 +121,24 @@ def chair_scene(seed=0):
     return capture, track("chair_1", "chair", "thing", masks, box=thing)
 
 
+def carton_scene(size, *, arc_deg, elevation_deg, yaw_rad, wall_gap_m=0.05, seed=0):
+    """A carton on a counter before a wall, filmed along an arc; the segmenter's box is square to the room and too deep."""
+    turn = rotation_about_z(yaw_rad)
+    vertices, faces = box_mesh(-size / 2, size / 2)
+    carton = Solid(vertices @ turn.T + [0.0, size[1] / 2, 0.9 + size[2] / 2], faces, (220, 150, 40), 1)
+    wall_y = float(carton.vertices[:, 1].max()) + wall_gap_m
+    counter = box((-0.8, -0.4, 0.86), (0.8, wall_y, 0.9), (150, 110, 70), 0)
+    middle = np.array([0.0, size[1] / 2, 0.9 + size[2] / 2])
+    views = [(np.radians(arc_deg) * (k / 9 - 0.5), np.radians(elevation_deg)) for k in range(10)]
+    capture, masks = scan([carton, counter], target=middle, distance=1.2, seed=seed, wall_y=wall_y, views=views)
+    thing = ThingBox(
+        world_from_object=Rigid3(np.eye(3), middle + np.array([0.0, 0.07, 0.0])),
+        dimensions_m=np.array([1.05 * size[0], size[1] + 0.14, size[2]]),
+        support_z_m=0.9,
+    )
+    return capture, track("carton_1", "box", "thing", masks, box=thing)
+
+
 def track(name, category, kind, masks, *, front=None, box=None):
     packed = {index: pack_mask(mask) for index, mask in masks.items() if mask.any()}
     return MaskTrack(
@@ -137,7 +155,7 @@ def track(name, category, kind, masks, *, front=None, box=None):
     )
 
 
-def scan(solids, *, target, distance, seed, noise_m=0.004, count=10, wall_y=WALL_Y):
+def scan(solids, *, target, distance, seed, noise_m=0.004, count=10, wall_y=WALL_Y, views=None):
     """A capture of the solids before a wall and on a floor, and the masks of part 1 at RGB resolution."""
     rng = np.random.default_rng(seed)
     room = [
@@ -148,6 +166,7 @@ def scan(solids, *, target, distance, seed, noise_m=0.004, count=10, wall_y=WALL
     frames, rgb, depth, masks = [], {}, {}, {}
     for k in range(count):
         azimuth, elevation = np.radians(-45 + 90 * k / (count - 1)), np.radians(rng.uniform(8, 35))
+        azimuth, elevation = (azimuth, elevation) if views is None else views[k]
         pose = looking_at(np.array(target, float), azimuth, elevation, distance * rng.uniform(0.9, 1.1))
         index = 3 * k
         picture = rasterize(vertices, faces, attributes[:, :3], RGB, pose.inverse)

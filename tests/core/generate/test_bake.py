@@ -3,9 +3,9 @@ import pytest
 
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.boxed import appliance_shape, front_shape
-from r2c2r_core.generate.carved import carved_shape
 from r2c2r_core.generate.charts import planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.things import thing_shape
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import render_textured
@@ -68,7 +68,7 @@ def test_a_dark_side_that_was_seen_keeps_its_own_colour(appliance_scene):
 
 
 def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
-    shape, atlas, picture = pictured(chair_scene, carved_shape, lambda v, f: unwrapped_atlas(v, f, 512))
+    shape, atlas, picture = pictured(chair_scene, thing_shape, lambda v, f: unwrapped_atlas(v, f, 512))
     image, depth = seen_from(shape, atlas, picture, FACING)
     back, seat_edge = image[200 - round(0.3 * 800 / 2.2), 200], image[200 + 1, 200]
     assert depth[200 + 1, 200] > 0

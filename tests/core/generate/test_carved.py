@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2c2r_core.generate.carved import carved_shape
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.things import thing_shape
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 
 
 def carve(scene, seed=0):
     evidence = gather_evidence(*scene, 10)
-    return evidence, carved_shape(evidence, draw_variation(evidence, np.random.default_rng(seed)))
+    return evidence, thing_shape(evidence, draw_variation(evidence, np.random.default_rng(seed)))
 
 
 def test_a_bottle_is_round_again_though_only_its_front_was_seen(bottle_scene):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,46 @@ def test_a_persons_size_leaves_the_front_face_where_it_was() -> None:
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
     found = measure(unit, override=ObjectOverride(dimensions_m=np.array([0.5, 0.4, 0.6])))
     np.testing.assert_allclose(found.front_centre, [0.0, -0.29, 0.5], atol=1e-6)
+
+
+CARTON = Unit("a", "box", (0, 0, 1.0), (0.19, 0.08, 0.29), kind="thing")
+
+
+def carton_seen(points: np.ndarray, parameters: dict[str, float] | None = None) -> MeasuredObject:
+    """The carton, in a scan that shows these points of it."""
+    track, placement, asset = placed_unit(CARTON, np.random.default_rng(0))
+    scan = capture()
+    scan = replace(scan, surface=replace(scan.surface, vertices_world=points))
+    asset = replace(asset, parameters=parameters or {})
+    return measure_object(scan, track, placement, asset, fixture_for("box")[0], ObjectOverride())
+
+
+def face(axis: int, at: float) -> np.ndarray:
+    """Points of one face of the carton, half a centimetre apart, with the depth's noise."""
+    half = np.array(CARTON.size) / 2
+    grid = np.meshgrid(*[np.arange(-h, h, 0.005) if k != axis else [at] for k, h in enumerate(half)], indexing="ij")
+    points = np.stack(grid, axis=-1).reshape(-1, 3) + CARTON.centre
+    return np.asarray(points + np.random.default_rng(1).normal(scale=0.003, size=points.shape))
+
+
+def test_a_cartons_depth_is_measured_only_where_a_face_shows_it() -> None:
+    front, top, left = face(1, -0.04), face(2, 0.145), face(0, -0.095)
+    alone = carton_seen(front)
+    assert alone.sources == ("measured", "inferred", "measured")
+    assert any("no frame shows how deep" in warning for warning in alone.warnings)
+    for shown in (top, left):
+        seen = carton_seen(np.concatenate([front, shown]))
+        assert seen.sources[1] == "measured"
+        assert not seen.warnings
+
+
+def test_outlines_may_tell_a_depth_that_no_face_shows() -> None:
+    front = face(1, -0.04)
+    assert carton_seen(front, {"boxed": 1.0, "depth_sigma_m": 0.003}).sources[1] == "measured"
+    assert carton_seen(front, {"boxed": 1.0, "depth_sigma_m": 0.03}).sources[1] == "inferred"
+
+
+def test_a_round_things_depth_follows_from_its_width() -> None:
+    found = carton_seen(face(1, -0.04), {"revolved": 1.0})
+    assert found.sources[1] == "inferred"
+    assert not found.warnings

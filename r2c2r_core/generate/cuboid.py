@@ -1,0 +1,245 @@
+"""The upright box that fits an object's masks and depth best: its outline in slanted frames tells the depth nobody faced.
+
+A front seen squarely says nothing of the depth behind it, and a phone's depth near an outline is a mixture with the wall, so
+extents of points are wrong where a side is seen at a flat angle only. The outline of a box, however, is that of its corners:
+one joint robust least-squares fit over all frames to outline pixels and depth points, with each frame's pose error (a shift
+of its outline) projected out, finds yaw and sides together, and its covariance says which side the scan really fixes.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.geometry.boxes import box_corners, upright_box
+from r2c2r_core.geometry.camera import project, sample_nearest, unproject
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.model.capture import Wall
+
+_OUTLINE_SAMPLES = 80  # of a view
+_POINTS = 1200
+_OUTLINE_M, _DEPTH_M = 0.004, 0.008  # noise of an outline and of a depth point
+_INDEPENDENT = 12.0  # outline pixels, and depth points, of one frame that err on their own: neighbours err together
+_ROBUST = 2.5  # of the noise: further off is something else
+_SHIFT_M = 0.006  # a frame's pose error, across the view
+_WALL_M = 0.003  # how far a box may stand in a wall
+_USUAL_DEPTH, _DEPTH_SPREAD = 0.5, 0.35  # of the width: all that is known of a box seen squarely
+_STARTS = (0.25, 0.5, 1.0)  # depths to start from, of the width
+_SAME_YAW = np.radians(2.0)
+_ROUGH_ROUNDS, _ROUNDS = 8, 12
+_ALONG_PX = 2.5  # depth pixels to either side of an outline, where it is judged whose outline it is
+_BEFORE_M = 0.03
+
+
+class Cuboid(NamedTuple):
+    """An upright box, and how well the scan fixes its sides."""
+
+    world_from_cuboid: Rigid3  # origin at its centre, +Z up, -Y towards the cameras
+    size_m: Vector3
+    sigma_m: Vector3  # standard deviation of each size
+    cost: float
+
+
+class _Outline(NamedTuple):
+    """Outline pixels of one view that are the object's own edge."""
+
+    view: View
+    uv_px: np.ndarray
+    metres_per_px: float
+
+
+def fit_cuboid(
+    points_local: Points,
+    low: Vector3,
+    high: Vector3,
+    views: Sequence[View],
+    world_from_local: Rigid3,
+    walls: Sequence[Wall],
+    *,
+    yaw_sigma_rad: float = np.pi,
+) -> Cuboid | None:
+    """The box nearest to points and outlines, from the box `low`..`high` of the local frame; None without three outlines.
+
+    The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame. `yaw_sigma_rad` is how
+    well the local frame's own yaw is known.
+    """
+    outlines = [found for view in views if (found := _own_outline(view)) is not None]
+    if len(outlines) < 3:
+        return None
+    chosen = points_local[:: max(len(points_local) // _POINTS, 1)]
+    bottom = float(low[2])
+    coarse = [o._replace(uv_px=o.uv_px[::4]) for o in outlines]
+    rough = _Problem(chosen[::4], coarse, world_from_local, walls, bottom, yaw_sigma_rad)
+    tried = [rough.fitted(start, _ROUGH_ROUNDS) for start in _starts(chosen, float(high[2]))]
+    problem = _Problem(chosen, outlines, world_from_local, walls, bottom, yaw_sigma_rad)
+    best, cost = problem.fitted(min(tried, key=lambda found: found[1])[0], _ROUNDS)
+    sizes = np.array([best[2] - best[1], best[4] - best[3], best[5] - low[2]])
+    if (sizes < 0.005).any():
+        return None
+    rotation = rotation_about_z(float(best[0]))
+    middle = np.array([best[1] + best[2], best[3] + best[4], best[5] + low[2]]) / 2
+    return Cuboid(world_from_local @ Rigid3(rotation, rotation @ middle), sizes, problem.size_sigma(best), cost)
+
+
+def _starts(points: Points, top_m: float) -> list[np.ndarray]:
+    """Boxes of several depths behind the points, along the frame and along the points' own smallest rectangle."""
+    own = (upright_box(points, trim=0.01).yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    starts = []
+    for yaw in (0.0, own) if abs(own) > _SAME_YAW else (0.0,):
+        turned = points @ rotation_about_z(yaw)
+        start, end = np.quantile(turned, 0.01, axis=0), np.quantile(turned, 0.99, axis=0)
+        for share in _STARTS:
+            starts.append(np.array([yaw, start[0], end[0], start[1], start[1] + share * (end[0] - start[0]), top_m]))
+    return starts
+
+
+def surface_distance(cuboid: Cuboid, points_world: Points) -> np.ndarray:
+    """Signed distance of points to the box's surface, positive outside."""
+    return _box_distance(cuboid.world_from_cuboid.inverse.apply(points_world), np.asarray(cuboid.size_m) / 2)
+
+
+class _Problem:
+    """Residuals of a box (yaw, left, right, front, back, top; local frame) and their weights."""
+
+    def __init__(
+        self,
+        points: Points,
+        outlines: list[_Outline],
+        world_from_local: Rigid3,
+        walls: Sequence[Wall],
+        bottom_m: float,
+        yaw_sigma_rad: float,
+    ) -> None:
+        self._points, self._outlines, self._bottom_m = points, outlines, bottom_m
+        self._cameras = [o.view.world_from_camera.inverse @ world_from_local for o in outlines]
+        local_from_world = world_from_local.inverse
+        self._walls = [
+            (local_from_world.rotation @ wall.normal, float(wall.offset_m - wall.normal @ world_from_local.translation))
+            for wall in walls
+        ]
+        counts = [len(o.uv_px) for o in outlines]
+        depth = np.full(len(points), _INDEPENDENT * len(outlines) / max(len(points), 1) / _DEPTH_M**2)
+        outline = [np.full(n, _INDEPENDENT / n / _OUTLINE_M**2) for n in counts]
+        self._weights = np.concatenate([depth, *outline, [1.0 / _WALL_M**2, 1.0 / yaw_sigma_rad**2, 1.0]])
+        scales = np.repeat([_ROBUST * _DEPTH_M, _ROBUST * _OUTLINE_M, np.inf], [len(points), sum(counts), 3])
+        self._scales: np.ndarray = scales
+
+    def fitted(self, start: np.ndarray, rounds: int) -> tuple[np.ndarray, float]:
+        """Parameters after damped Gauss-Newton steps with Cauchy weights, and their robust cost."""
+        current, damping = start, 1e-3
+        residual = self._residuals(current)
+        cost = self._cost(residual)
+        for _ in range(rounds):
+            slope = self._slope(current, residual)
+            weight = self._weights / (1.0 + (residual / self._scales) ** 2)
+            system = slope.T @ (slope * weight[:, None])
+            step = np.linalg.solve(system + damping * np.diag(np.diag(system) + 1e-9), -slope.T @ (residual * weight))
+            tried = current + np.clip(step, -0.1, 0.1)
+            tried_residual = self._residuals(tried)
+            tried_cost = self._cost(tried_residual)
+            if tried_cost < cost:
+                gain, current, residual, cost = cost - tried_cost, tried, tried_residual, tried_cost
+                damping = max(damping / 5, 1e-6)
+                if gain < 1e-4 * cost:
+                    break
+            else:
+                damping *= 10
+                if damping > 1e3:
+                    break
+        return current, cost
+
+    def size_sigma(self, parameters: np.ndarray) -> Vector3:
+        """Standard deviation of width, depth and height by the curvature at the fit, the depth's prior left out."""
+        residual = self._residuals(parameters)
+        slope = self._slope(parameters, residual)[:-1]
+        weight = (self._weights / (1.0 + (residual / self._scales) ** 2))[:-1]
+        covariance = np.linalg.pinv(slope.T @ (slope * weight[:, None]) + 1e-3 * np.eye(6))
+        difference = np.array([[0, -1, 1, 0, 0, 0], [0, 0, 0, -1, 1, 0], [0, 0, 0, 0, 0, 1]], dtype=np.float64)
+        return np.asarray(np.sqrt(np.diag(difference @ covariance @ difference.T)))
+
+    def _cost(self, residual: np.ndarray) -> float:
+        bounded = np.isfinite(self._scales)
+        scale = np.where(bounded, self._scales, 1.0)
+        loss = np.where(bounded, scale**2 * np.log1p((residual / scale) ** 2), residual**2)
+        return float(self._weights @ loss)
+
+    def _slope(self, parameters: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        step = 1e-4
+        columns = [(self._residuals(parameters + step * np.eye(6)[k]) - residual) / step for k in range(6)]
+        return np.stack(columns, axis=1)
+
+    def _residuals(self, parameters: np.ndarray) -> np.ndarray:
+        yaw, left, right, front, back, top = parameters
+        rotation = rotation_about_z(float(yaw))
+        low, high = np.array([left, front, self._bottom_m]), np.array([right, back, top])
+        half, middle = (high - low) / 2, (high + low) / 2
+        off = _box_distance(self._points @ rotation - middle, half)
+        corners = (box_corners(high - low) + middle) @ rotation.T
+        outline = [_outline_residual(camera.apply(corners), o) for camera, o in zip(self._cameras, self._outlines, strict=True)]
+        inside = [min(float((corners @ normal).min() - offset), 0.0) for normal, offset in self._walls]
+        width = max(right - left, 1e-3)
+        usual = (back - front - _USUAL_DEPTH * width) / (_DEPTH_SPREAD * width)
+        return np.concatenate([off, *outline, [min(inside, default=0.0), yaw, usual]])
+
+
+def _box_distance(points: Points, half: np.ndarray) -> np.ndarray:
+    """Signed distance to a centred box."""
+    beyond = np.abs(points) - half
+    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0))
+
+
+def _outline_residual(corners_camera: Points, outline: _Outline) -> np.ndarray:
+    """Metres of each outline pixel outside the corners' silhouette, without what a shift of the whole frame explains."""
+    if corners_camera[:, 2].min() < 0.05:
+        return np.full(len(outline.uv_px), 1.0)
+    corners = project(corners_camera, outline.view.rgb_camera)
+    hull = cv2.convexHull(corners.astype(np.float32)).reshape(-1, 2).astype(np.float64)
+    along = np.roll(hull, -1, axis=0) - hull
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    normals *= np.sign(((hull - hull.mean(axis=0)) * normals).sum()) or 1.0
+    distance = outline.uv_px @ normals.T - (hull * normals).sum(axis=1)
+    edge = np.argmax(distance, axis=1)
+    off = distance[np.arange(len(edge)), edge] * outline.metres_per_px
+    across = normals[edge]
+    share = _OUTLINE_M**2 * len(off) / _INDEPENDENT / _SHIFT_M**2
+    shift = np.linalg.solve(across.T @ across + share * np.eye(2), across.T @ np.clip(off, -0.02, 0.02))
+    return np.asarray(off - across @ shift)
+
+
+def _own_outline(view: View) -> _Outline | None:
+    """The outline pixels that are neither at the photo's border nor beside something in front; None for too few."""
+    contours, _ = cv2.findContours(view.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not contours:
+        return None
+    contour = max(contours, key=len).reshape(-1, 2).astype(np.float64)
+    if len(contour) < 40:
+        return None
+    following, before = np.roll(contour, -4, axis=0), np.roll(contour, 4, axis=0)
+    along = following - before
+    out = np.column_stack([along[:, 1], -along[:, 0]]) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    out *= np.sign(((contour - contour.mean(axis=0)) * out).sum()) or 1.0
+    edge = contour + 0.5 + 0.5 * out  # contours run through the centres of the outermost pixels
+    reach = _ALONG_PX * view.rgb_camera.fx / view.depth_camera.fx
+    inner, outer = (_depth_at(view, edge + sign * reach * out) for sign in (-1.0, 1.0))
+    own = inner[inner > 0]
+    if len(own) < 10:
+        return None
+    inner = np.where(inner > 0, inner, np.median(own))
+    blocked = (outer > 0) & (outer < inner - _BEFORE_M)
+    height, width = view.mask.shape
+    border = (contour < 2).any(axis=1) | (contour[:, 0] > width - 3) | (contour[:, 1] > height - 3)
+    kept = np.flatnonzero(~blocked & ~border)
+    if len(kept) < 30:
+        return None
+    kept = kept[:: max(len(kept) // _OUTLINE_SAMPLES, 1)]
+    return _Outline(view, edge[kept], float(np.median(own)) / view.rgb_camera.fx)
+
+
+def _depth_at(view: View, uv_px: np.ndarray) -> np.ndarray:
+    """The measured depth at pixels of the colour crop; 0 where unknown."""
+    rays = unproject(uv_px, np.ones(len(uv_px)), view.rgb_camera)
+    values, inside = sample_nearest(view.depth_m, project(rays, view.depth_camera))
+    return np.where(inside, values, 0.0)

@@ -1,0 +1,48 @@
+"""The depth of a small carton, by how much of it the cameras went round."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.things import thing_shape
+from r2c2r_core.generate.variation import draw_variation, whole_pool
+from r2c2r_core.geometry.meshes import is_manifold, is_watertight
+from tests.core.generate.scenes import carton_scene
+
+SIZE = np.array([0.19, 0.075, 0.29])
+
+
+def shape_of(scene):
+    evidence = gather_evidence(*scene, 12)
+    return thing_shape(evidence, whole_pool(evidence))
+
+
+@pytest.mark.parametrize(("arc_deg", "elevation_deg"), [(35.0, 10.0), (60.0, 30.0), (120.0, 15.0)])
+def test_a_cartons_depth_is_seen_in_its_outlines(arc_deg, elevation_deg):
+    """The segmenter's box is three times too deep: it took the wall's shine for the carton's back."""
+    shape = shape_of(carton_scene(SIZE, arc_deg=arc_deg, elevation_deg=elevation_deg, yaw_rad=0.3))
+    assert shape.parameters["boxed"] == 1.0
+    assert shape.parameters["depth_sigma_m"] < 0.006
+    assert np.ptp(shape.vertices_local, axis=0) == pytest.approx(SIZE, abs=0.006)
+    turn = np.arctan2(*shape.world_from_local.rotation[[1, 0], 0])
+    assert turn == pytest.approx(0.3, abs=np.radians(1.5))
+
+
+def test_a_carton_seen_from_the_front_only_says_that_its_depth_is_open():
+    """Cameras on one axis, level with its middle: any depth would look the same."""
+    shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0))
+    assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])
+    assert np.ptp(shape.vertices_local, axis=0)[[0, 2]] == pytest.approx(SIZE[[0, 2]], abs=0.008)
+
+
+def test_an_open_depth_is_not_carried_through_the_wall():
+    scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0, wall_gap_m=0.0)
+    assert shape_of(scene).vertices_world[:, 1].max() < SIZE[1] + 0.01
+
+
+def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
+    evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=10.0, yaw_rad=0.3), 12)
+    shapes = [thing_shape(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(4)]
+    depths = [np.ptp(shape.vertices_local[:, 1]) for shape in shapes]
+    assert np.std(depths) > 0.2 * shapes[0].parameters["depth_sigma_m"]
+    assert all(is_watertight(s.vertices_local, s.faces) and is_manifold(s.vertices_local, s.faces) for s in shapes)
