@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from r2c2r_core.arrays import DepthMetres, Mask, Points, Vector3
-from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, sample_nearest, unproject
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, sample_nearest, sample_through, unproject
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.views import MaskView, choose_views, stands_open
@@ -141,13 +141,9 @@ def masked_points(frame: Frame, depth: Depth, mask: Mask) -> Points:
     thickness = 2.0 * float(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3).max())
     margin = min(per_depth_px, 0.15 * thickness)  # a thin bottle must keep its middle
     inner = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1] > margin
-    centres = pixel_centres(frame.depth_camera)
-    scale = np.array([frame.rgb_camera.fx / frame.depth_camera.fx, frame.rgb_camera.fy / frame.depth_camera.fy])
-    offset = np.array([frame.depth_camera.cx, frame.depth_camera.cy])
-    uv = (centres - offset) * scale + np.array([frame.rgb_camera.cx, frame.rgb_camera.cy])
-    hit, within = sample_nearest(inner, uv.reshape(-1, 2))
-    valid = (hit & within).reshape(depth.valid.shape) & depth.valid & (depth.metres > 0)
-    return unproject(centres[valid], depth.metres[valid].astype(np.float64), frame.depth_camera)
+    hit, within = sample_through(inner, frame.rgb_camera, frame.depth_camera)
+    valid = hit & within & depth.valid & (depth.metres > 0)
+    return unproject(pixel_centres(frame.depth_camera)[valid], depth.metres[valid].astype(np.float64), frame.depth_camera)
 
 
 def main_body(points: Points) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ class ObjectRecord:
     world_from_object: Rigid3
     joints: tuple[JointRecord, ...]
     observed_axes: tuple[bool, bool, bool] | None = None  # truth only; None: not stated
+    scan_fit: Mapping[str, float] | None = None  # of a bundle: how its mesh fits the scan, as its manifest says; None: unknown
     turns_freely: bool = False  # truth only: round about its vertical axis, so that yaw means nothing
 
 
@@ -113,6 +115,7 @@ def _object(entry: dict[str, Any], world_from_file: Rigid3) -> ObjectRecord:
         world_from_object=world_from_file @ Rigid3.from_matrix(_matrix(_pose(entry))),
         joints=tuple(_joint(joint, world_from_file) for joint in joints),
         observed_axes=None if observed is None else (bool(observed[0]), bool(observed[1]), bool(observed[2])),
+        scan_fit=entry.get("scan_fit"),
         turns_freely=entry.get("symmetry") == "axial",
     )
 

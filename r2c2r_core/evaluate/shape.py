@@ -1,16 +1,37 @@
-"""How much of the space the two boxes share. Both are solids, so the overlap is a plain intersection over union."""
+"""Shape: how much of the space the two boxes share (exactly, for both are solids), and how the mesh fits the scan."""
+
+from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.evaluate.records import ObjectRecord
 from r2c2r_core.model.report import Metric
 
+_SCAN_METRICS: tuple[tuple[str, str, str, Literal["lower", "higher"]], ...] = (
+    ("scan_to_mesh_median", "median_m", "mm", "lower"),
+    ("scan_to_mesh_p95", "p95_m", "mm", "lower"),
+    ("f_score_1cm", "f_score_1cm", "share", "higher"),
+    ("f_score_2cm", "f_score_2cm", "share", "higher"),
+)
 _THINNEST_M = 1e-6  # boxes that share less than this count as apart
 
 
 def shape_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
-    """Solid IoU of the boxes, exact (no voxels)."""
-    return (Metric(name="box_iou", value=box_iou(truth, found), unit="share", better="higher", tolerance=0.01),)
+    """Solid IoU of the boxes, exact (no voxels), and what the bundle says of its mesh beside the scan it was made from."""
+    overlap = Metric(name="box_iou", value=box_iou(truth, found), unit="share", better="higher", tolerance=0.01)
+    return (overlap, *(_scan_metric(found, *entry) for entry in _SCAN_METRICS))
+
+
+def _scan_metric(found: ObjectRecord, name: str, key: str, unit: str, better: Literal["lower", "higher"]) -> Metric:
+    value = None if found.scan_fit is None else found.scan_fit.get(key)
+    return Metric(
+        name=name,
+        value=None if value is None else (1000.0 * value if unit == "mm" else value),
+        unit=unit,
+        better=better,
+        tolerance=1.0 if unit == "mm" else 0.03,
+        note="" if value is not None else "the bundle does not say",
+    )
 
 
 def box_iou(a: ObjectRecord, b: ObjectRecord) -> float:

@@ -18,6 +18,9 @@ _COLUMNS = (
     ("pivot", "pivot mm", "{:.0f}"),
     ("range_ratio", "range", "{:.2f}"),
     ("box_iou", "box IoU", "{:.2f}"),
+    ("scan_to_mesh_median", "scan mm", "{:.1f}"),
+    ("f_score_1cm", "F 1 cm", "{:.2f}"),
+    ("f_score_2cm", "F 2 cm", "{:.2f}"),
 )
 
 

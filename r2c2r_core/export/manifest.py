@@ -1,12 +1,15 @@
 """manifest.json: where every number of the bundle comes from (schema 1)."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 
 from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.reconstruction import Reconstruction
@@ -17,7 +20,9 @@ from r2c2r_core.model.track import MaskTrack
 SCHEMA = 1
 
 
-def manifest_of(reconstruction: Reconstruction, plan: Plan, created: str | None) -> dict[str, Any]:
+def manifest_of(
+    reconstruction: Reconstruction, plan: Plan, created: str | None, fits: Mapping[str, ScanFit] | None = None
+) -> dict[str, Any]:
     """The manifest as a JSON document; `created` is an ISO 8601 time or None where nobody gave one."""
     capture = reconstruction.capture
     return {
@@ -31,7 +36,9 @@ def manifest_of(reconstruction: Reconstruction, plan: Plan, created: str | None)
             "frames": len(capture.frames),
         },
         "world_from_capture": _plain(capture.world_from_capture.matrix),
-        "objects": [_object_entry(reconstruction, plan, item) for item in reconstruction.scene.objects],
+        "objects": [
+            _object_entry(reconstruction, plan, item, (fits or {}).get(item.name)) for item in reconstruction.scene.objects
+        ],
         "stages": [
             {"name": run.name, "backend": run.backend, "config": _plain(run.config), "seconds": round(run.seconds, 3)}
             for run in reconstruction.stages
@@ -64,7 +71,7 @@ def tool_version() -> str:
         return "unknown"
 
 
-def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject) -> dict[str, Any]:
+def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject, fit: ScanFit | None) -> dict[str, Any]:
     bodies = plan.of(item.name)
     joints = [_joint_entry(item, body) for body in bodies if body.joint is not None]
     track = next((t for t in reconstruction.tracks if t.name == item.name), None)
@@ -86,6 +93,7 @@ def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject)
         "chosen": None if candidates is None else {"candidate": candidates.chosen_id, "by": candidates.chosen_by, "at": None},
         "placement": None if placement is None else _placement_entry(placement),
         "warp": {"residual_m": _plain(item.warp_residual_m), "paper_residual_m": _plain(item.warp_residual_paper_m)},
+        "scan_fit": None if fit is None else _plain(asdict(fit)),
         "meshes": {
             "visual": [body.visual_file for body in bodies if body.visual_file is not None],
             "collision": [name for body in bodies for name in body.collision_files],

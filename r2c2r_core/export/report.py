@@ -77,6 +77,7 @@ def _object_row(entry: dict[str, Any]) -> dict[str, Any]:
         "placement_rms_m": placement.get("rms_m"),
         "placement_inliers": placement.get("inliers"),
         "warp_residual_m": entry["warp"]["residual_m"],
+        "scan_fit": entry["scan_fit"],
         "mass_kg": entry["mass_kg"],
         "warnings": entry["warnings"],
     }
@@ -139,7 +140,7 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
     for entry in objects:
         picture = pictures.get(entry["name"])
         image = f'<img class="thumb" src="{_text(picture)}" alt="{_text(entry["name"])}">' if picture else ""
-        placement = entry["placement"] or {}
+        placement, fit = entry["placement"] or {}, entry["scan_fit"] or {}
         sizes = " × ".join(
             f"{1000 * size:.0f}<sup>{_SHORT.get(source, '')}</sup>"
             for size, source in zip(entry["dimensions_m"], entry["dimension_source"], strict=True)
@@ -155,12 +156,27 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
                 _text((entry["mask"] or {}).get("frames", "–")),
                 _millimetres(placement.get("rms_m")),
                 _millimetres(entry["warp"]["residual_m"]),
+                _millimetres(fit.get("median_m")),
+                _percent(fit.get("f_score_1cm")),
             ]
         )
-    head = ["", "object", "width × depth × height, mm", "kg", "frames", "placed within", "front fits within"]
+    head = [
+        "",
+        "object",
+        "width × depth × height, mm",
+        "kg",
+        "frames",
+        "placed within",
+        "front fits within",
+        "scan to mesh",
+        "F at 1 cm",
+    ]
     legend = '<p class="quiet">m measured · i inferred · d default of the category · p given by a person. '
+    legend += (
+        "Scan to mesh: median distance of the depth points to the closed model; F: points and visible surface within 1 cm. "
+    )
     pair = "Pictures: the photo, and the closed model from the same camera.</p>" if pictures else "</p>"
-    return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6)) + legend + pair
+    return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6, 7, 8)) + legend + pair
 
 
 def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str:

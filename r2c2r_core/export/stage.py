@@ -20,6 +20,7 @@ from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.review import review_html
+from r2c2r_core.export.scan_fit import scan_fits
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_meshes
 from r2c2r_core.export.writers.table import FORMATS
@@ -60,9 +61,10 @@ def write_bundle(
         folder.mkdir()
         progress.at(0.0, "writing meshes")
         write_meshes(plan, folder, config.texture_max_px)
-        for entry in progress.part(0.1, 0.2).each(FORMATS, "writing"):
+        for entry in progress.part(0.05, 0.1).each(FORMATS, "writing"):
             entry.write(plan, folder / entry.file)
-        manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build())
+        fits = scan_fits(reconstruction, plan, progress=progress.part(0.1, 0.2))
+        manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build(), fits)
         _write_json(folder / "manifest.json", manifest)
         (folder / "README.txt").write_text(readme_text(plan))
         progress.at(0.2, "drawing the preview")

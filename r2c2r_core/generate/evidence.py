@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Mask, Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
-from r2c2r_core.geometry.camera import Intrinsics, depth_points, pixel_centres, sample_nearest
+from r2c2r_core.geometry.camera import Intrinsics, depth_points, sample_through
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands_open, view_scores
@@ -85,8 +85,8 @@ def depth_mask(view: View, erosion_px: float = 0.0) -> Mask:
     """The mask at depth resolution, eroded by depth pixels (dilated where negative)."""
     ratio = view.rgb_camera.fx / view.depth_camera.fx
     mask = moved_edge(view.mask, -erosion_px * ratio)
-    values, inside = sample_nearest(mask, _rgb_pixels_of_depth(view))
-    return (values & inside).reshape(view.depth_m.shape)
+    values, inside = sample_through(mask, view.rgb_camera, view.depth_camera)
+    return values & inside
 
 
 def moved_edge(mask: Mask, outwards_px: float) -> Mask:
@@ -105,14 +105,6 @@ def depth_edges(depth_m: DepthMetres) -> Mask:
     near = cv2.erode(np.where(np.isnan(filled), np.float32(1e3), filled), np.ones((3, 3), np.uint8))
     far = cv2.dilate(np.where(np.isnan(filled), np.float32(0), filled), np.ones((3, 3), np.uint8))
     return np.asarray((depth_m > 0) & (far - near > _EDGE_STEP * near))
-
-
-def _rgb_pixels_of_depth(view: View) -> np.ndarray:
-    uv = pixel_centres(view.depth_camera).reshape(-1, 2)
-    rgb, depth = view.rgb_camera, view.depth_camera
-    x = (uv[:, 0] - depth.cx) / depth.fx * rgb.fx + rgb.cx
-    y = (uv[:, 1] - depth.cy) / depth.fy * rgb.fy + rgb.cy
-    return np.column_stack([x, y])
 
 
 def _view_of(frame: Frame, track: MaskTrack, centre_world: Vector3) -> MaskView:

@@ -67,3 +67,12 @@ def sample_nearest(image: np.ndarray, uv_px: Pixels) -> tuple[np.ndarray, np.nda
         column = np.where(inside, uv_px[:, 0], 0).astype(np.int64)
         row = np.where(inside, uv_px[:, 1], 0).astype(np.int64)
     return image[row, column], inside
+
+
+def sample_through(image: np.ndarray, camera: Intrinsics, other: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
+    """What each pixel of `other`, a camera at the same place, sees in `camera`'s image: (h, w), and whether it lies inside."""
+    centres = pixel_centres(other).reshape(-1, 2)
+    scale = np.array([camera.fx / other.fx, camera.fy / other.fy])
+    uv = (centres - [other.cx, other.cy]) * scale + [camera.cx, camera.cy]
+    values, inside = sample_nearest(image, uv)
+    return values.reshape(other.height, other.width), inside.reshape(other.height, other.width)

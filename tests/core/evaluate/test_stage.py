@@ -187,3 +187,17 @@ def square(side: int) -> np.ndarray:
     mask = np.zeros((60, 80), np.uint8)
     mask[:side, :side] = 255
     return mask
+
+
+def test_the_fit_to_the_scan_is_what_the_bundle_says(tmp_path: Path) -> None:
+    truth = truth_of(1)
+    manifest = bundle_of(truth)
+    fit = {"median_m": 0.0042, "p95_m": 0.011, "f_score_1cm": 0.93, "f_score_2cm": 0.99, "points": 6000}
+    manifest["objects"][0]["scan_fit"] = fit
+    evaluation = evaluate_bundle(*write(tmp_path, truth, manifest))
+    first = row(evaluation, truth["objects"][0]["name"])
+    assert first["scan_to_mesh_median"] == pytest.approx(4.2)
+    assert first["scan_to_mesh_p95"] == pytest.approx(11.0)
+    assert (first["f_score_1cm"], first["f_score_2cm"]) == (0.93, 0.99)
+    assert row(evaluation, truth["objects"][1]["name"])["f_score_1cm"] is None  # not said, so not scored
+    assert scene(evaluation)["f_score_1cm"] == 0.93

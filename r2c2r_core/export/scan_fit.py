@@ -1,0 +1,161 @@
+"""How far the finished, closed model lies from what the scan measured of it (the metric set's "Shape").
+
+Both ways between the same frames: from the depth points inside an object's mask to its mesh, and from the pixels in which
+the mesh shows to the nearest of those points. What no camera saw, and where the sensor measured nothing, is not judged, so
+the figures need no truth and mean the same for a real kitchen as for a synthetic one. They hold the sensor's noise too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from r2c2r_core.arrays import Faces, Mask, Points
+from r2c2r_core.export.plan import Plan
+from r2c2r_core.export.preview import Soup, scene_soup, soup_faces
+from r2c2r_core.geometry.camera import depth_points, sample_through
+from r2c2r_core.geometry.masks import unpack_mask
+from r2c2r_core.geometry.meshes import distances_to_mesh
+from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.reconstruction import Reconstruction
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+
+FRAMES = 8
+_SHARED_FRAMES = 40
+_POINTS = 6000  # of each side, an object
+_FEWEST_POINTS = 100
+_HIDDEN_M = 0.02  # a surface further behind the measured one is hidden by something that is not in the model
+_SHOWS_SHARE = 0.25  # frames with less than this of the object's largest mask are not asked
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanFit:
+    """One object's mesh beside the scan."""
+
+    median_m: float  # from scan to mesh
+    p95_m: float
+    f_score_1cm: float  # 0..1, harmonic mean of the shares of points and of visible surface within 1 cm of the other
+    f_score_2cm: float
+    points: int
+
+
+class _Seen(NamedTuple):
+    """One frame: what the sensor measured, and what of the model shows, by depth pixel."""
+
+    measured_m: np.ndarray
+    known: Mask
+    drawn_m: np.ndarray
+    bodies: np.ndarray  # number of the body that shows, 0: none
+
+
+def scan_fits(reconstruction: Reconstruction, plan: Plan, *, progress: Progress = SILENT) -> dict[str, ScanFit]:
+    """The fit of every object by its name; objects with too few depth points are left out."""
+    soup = scene_soup(plan, 0.0)
+    capture = reconstruction.capture
+    shared = _spread(capture.frames, _SHARED_FRAMES)
+    seen = lru_cache(maxsize=_SHARED_FRAMES)(lambda frame: _look(capture, frame, soup))
+    found = {}
+    for track in progress.each(reconstruction.tracks, "comparing with the scan"):
+        bodies = [k for k, body in enumerate(plan.bodies, start=1) if body.object_name == track.name and not body.is_support]
+        if not bodies:
+            continue
+        frames = _frames(capture.frames, shared, track)
+        sides = [_sides(seen(frame), frame, track, bodies) for frame in frames]
+        scan, surface = (_thinned([side[k] for side in sides]) for k in (0, 1))
+        if len(scan) >= _FEWEST_POINTS:
+            found[track.name] = _fit(scan, surface, soup, _turned_to(frames, soup, bodies))
+    return found
+
+
+def _fit(scan: Points, surface: Points, soup: Soup, faces: Faces) -> ScanFit:
+    to_mesh = distances_to_mesh(scan, soup.corners, faces)
+    to_scan = cKDTree(scan).query(surface)[0] if len(surface) else np.full(1, np.inf)
+    return ScanFit(
+        median_m=float(np.median(to_mesh)),
+        p95_m=float(np.quantile(to_mesh, 0.95)),
+        f_score_1cm=f_score(to_mesh, to_scan, 0.01),
+        f_score_2cm=f_score(to_mesh, to_scan, 0.02),
+        points=len(scan),
+    )
+
+
+def _turned_to(frames: Sequence[Frame], soup: Soup, bodies: list[int]) -> Faces:
+    """The bodies' faces turned to a camera: a point behind a door must not be near because the door has a back."""
+    corner, normal = soup.corners[::3], soup.normals[::3]
+    own = np.isin(np.rint(soup.ids[::3]), bodies)
+    towards = [np.einsum("ij,ij->i", normal, frame.world_from_camera.translation - corner) > 0 for frame in frames]
+    return soup_faces(soup)[own & np.any(towards, axis=0)]
+
+
+def f_score(to_mesh_m: np.ndarray, to_scan_m: np.ndarray, within_m: float) -> float:
+    """Harmonic mean of recall (scan near mesh) and precision (mesh near scan), 0..1 (Knapitsch et al. 2017)."""
+    recall, precision = float(np.mean(to_mesh_m < within_m)), float(np.mean(to_scan_m < within_m))
+    return 2 * precision * recall / max(precision + recall, 1e-12)
+
+
+def _frames(frames: Sequence[Frame], shared: Sequence[Frame], track: MaskTrack) -> Sequence[Frame]:
+    """Frames that show the object large and closed: of the shared ones, drawn only once, if enough of them do."""
+    largest = max((mask.area_px for mask in track.masks.values()), default=0)
+
+    def shows(frame: Frame) -> bool:
+        mask = track.masks.get(frame.index)
+        return mask is not None and mask.area_px > _SHOWS_SHARE * largest and frame.index not in track.opened_m
+
+    some = [frame for frame in shared if shows(frame)]
+    return _spread(some if len(some) >= FRAMES // 2 else [frame for frame in frames if shows(frame)], FRAMES)
+
+
+def _spread(frames: Sequence[Frame], count: int) -> list[Frame]:
+    """At most `count` of the frames, evenly spread."""
+    if not frames:
+        return []
+    return [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
+
+
+def _look(capture: Capture, frame: Frame, soup: Soup) -> _Seen:
+    depth = capture.images.depth(frame.index)
+    attributes = np.repeat(soup.ids[:, None], 3, axis=1)
+    drawn = rasterize(soup.corners, soup_faces(soup), attributes, frame.depth_camera, frame.world_from_camera.inverse)
+    return _Seen(
+        measured_m=depth.metres,
+        known=depth.valid & (depth.metres > 0),
+        drawn_m=drawn.depth_m,
+        bodies=np.rint(drawn.attributes[..., 0]).astype(int),
+    )
+
+
+def _sides(seen: _Seen, frame: Frame, track: MaskTrack, bodies: list[int]) -> tuple[Points, Points]:
+    """World points of one frame: the scan's inside the mask; the mesh's where it shows and something was measured."""
+    inside = _inside(unpack_mask(track.masks[frame.index]), frame) & seen.known
+    shows = np.isin(seen.bodies, bodies)
+    judged = shows & ~_rim(shows) & seen.known & (seen.drawn_m < seen.measured_m + _HIDDEN_M)
+    return _in_world(frame, seen.measured_m, inside), _in_world(frame, seen.drawn_m, judged)
+
+
+def _inside(mask: Mask, frame: Frame) -> Mask:
+    """The mask in the depth image, without its rim: there the sensor mixes two surfaces."""
+    values, within = sample_through(mask, frame.rgb_camera, frame.depth_camera)
+    inside = values & within
+    return inside & ~_rim(inside)
+
+
+def _rim(mask: Mask) -> Mask:
+    """Pixels of a mask with a neighbour outside it."""
+    return np.asarray(mask & (cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0))
+
+
+def _in_world(frame: Frame, depth_m: np.ndarray, chosen: Mask) -> Points:
+    return frame.world_from_camera.apply(depth_points(depth_m.astype(np.float64), frame.depth_camera)[chosen])
+
+
+def _thinned(parts: list[Points]) -> Points:
+    points = np.concatenate([np.zeros((0, 3)), *parts])
+    if len(points) <= _POINTS:
+        return points
+    return points[np.random.default_rng(0).choice(len(points), _POINTS, replace=False)]

@@ -1,0 +1,77 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.preview import scene_soup, soup_faces
+from r2c2r_core.export.scan_fit import f_score, scan_fits
+from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.model.capture import Depth
+from r2c2r_core.model.reconstruction import Reconstruction
+from tests.core.export.kitchen import GreyImages, kitchen, reconstruction
+
+
+class Filmed(GreyImages):
+    """Depth images of the kitchen itself, everything `behind_m` further away than it is."""
+
+    def __init__(self, item: Reconstruction, behind_m: float, hidden_columns: int) -> None:
+        soup = scene_soup(plan_bundle(item.scene), 0.0)
+        ids = np.repeat(soup.ids[:, None], 3, axis=1)
+        self.drawn = {
+            frame.index: rasterize(soup.corners, soup_faces(soup), ids, frame.depth_camera, frame.world_from_camera.inverse)
+            for frame in item.capture.frames
+        }
+        self.behind_m, self.hidden_columns = behind_m, hidden_columns
+
+    def depth(self, frame_index: int) -> Depth:
+        metres = self.drawn[frame_index].depth_m
+        measured = metres + np.float32(self.behind_m)
+        measured[:, : self.hidden_columns] = 0.5
+        return Depth(measured, measured > np.float32(self.behind_m))
+
+
+def filmed(behind_m: float, hidden_columns: int = 0) -> Reconstruction:
+    """The kitchen filmed; something that is no part of it stands before the left `hidden_columns` of the picture."""
+    item = reconstruction(kitchen())
+    images = Filmed(item, behind_m, hidden_columns)
+    plan = plan_bundle(item.scene)
+
+    def masks(name: str) -> dict:
+        own = [k for k, body in enumerate(plan.bodies, start=1) if body.object_name == name]
+        shows = {index: np.isin(np.rint(d.attributes[..., 0]), own) for index, d in images.drawn.items()}
+        return {index: pack_mask(mask & (np.arange(mask.shape[1]) >= hidden_columns)) for index, mask in shows.items()}
+
+    tracks = tuple(replace(track, masks=masks(track.name)) for track in item.tracks)
+    return replace(item, tracks=tracks, capture=replace(item.capture, images=images))
+
+
+@pytest.mark.parametrize("behind_m", [0.0, 0.004, 0.015])
+def test_a_model_as_far_from_the_scan_as_it_is(behind_m: float) -> None:
+    item = filmed(behind_m)
+    fit = scan_fits(item, plan_bundle(item.scene))["drawer_1"]  # a flat front, filmed straight on
+    assert fit.median_m == pytest.approx(behind_m, abs=0.0015)
+    assert fit.f_score_1cm == pytest.approx(1.0 if behind_m < 0.01 else 0.0, abs=0.02)
+    assert fit.f_score_2cm == pytest.approx(1.0, abs=0.02)
+
+
+def test_surface_that_something_unnamed_hides_is_not_judged() -> None:
+    item = filmed(0.0)
+    name = item.tracks[0].name
+    left, width = item.tracks[0].masks[0].left, item.tracks[0].masks[0].box_width
+    covered = filmed(0.0, hidden_columns=left + width // 2)
+    assert covered.tracks[0].masks[0].area_px < 0.7 * item.tracks[0].masks[0].area_px
+    assert scan_fits(covered, plan_bundle(item.scene))[name].f_score_1cm == pytest.approx(1.0, abs=0.02)
+
+
+def test_objects_without_depth_points_have_no_fit() -> None:
+    item = filmed(0.0)
+    empty = tuple(replace(track, masks={}) for track in item.tracks)
+    assert scan_fits(replace(item, tracks=empty), plan_bundle(item.scene)) == {}
+
+
+def test_the_f_score_is_the_harmonic_mean_of_both_shares() -> None:
+    to_mesh, to_scan = np.array([0.0, 0.0, 0.0, 0.03]), np.array([0.0, 0.03])
+    assert f_score(to_mesh, to_scan, 0.01) == pytest.approx(2 * 0.75 * 0.5 / 1.25)
+    assert f_score(np.array([0.5]), np.array([0.5]), 0.01) == 0.0
