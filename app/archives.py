@@ -8,6 +8,8 @@ from r2c2r_core.errors import CaptureError
 
 MAX_DIRECTORY_BYTES = 64 * 1024 * 1024  # of the archive's own table of contents
 MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth do not compress like this
+LONGEST_NAME = 1000  # characters, folders included
+DEEPEST = 32  # folders in folders
 MIN_SUSPICIOUS = 64 * 1024 * 1024  # bytes unpacked below which no ratio is suspicious
 
 
@@ -43,16 +45,31 @@ def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, 
         raise CaptureError(
             f"the archive unpacks to {total / max(packed, 1):.0f} times its size", hint="this is not a recording"
         )
+    _refuse_two_of_a_name(members)
     for member in members:
         inner = member.filename
         parts = PurePosixPath(inner.replace("\\", "/")).parts
         if inner.startswith(("/", "\\")) or ".." in parts or (parts and ":" in parts[0]) or "\x00" in inner:
             raise CaptureError(f"the archive holds the path {inner[:80]!r}", hint="pack the folder with relative paths")
+        if len(inner) > LONGEST_NAME or len(parts) > DEEPEST:
+            raise CaptureError(
+                f"the archive holds a path of {len(inner)} characters and {len(parts)} folders ({inner[:40]!r}…)",
+                hint="pack the recording's folder only",
+            )
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise CaptureError(f"the archive holds a link or a device ({inner[:80]!r})", hint="pack plain files only")
         if member.flag_bits & 0x1:
             raise CaptureError("the archive is encrypted", hint="pack it without a password")
+
+
+def _refuse_two_of_a_name(members: list[zipfile.ZipInfo]) -> None:
+    """Two files of one name: readers differ in which of them they take."""
+    seen: set[str] = set()
+    for member in members:
+        if member.filename in seen:
+            raise CaptureError(f"the archive holds two files named {member.filename[:80]!r}", hint="pack the folder anew")
+        seen.add(member.filename)
 
 
 def _refuse_large_directory(path: Path, max_files: int) -> None:

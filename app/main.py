@@ -39,8 +39,9 @@ from app.routes import (
     uploads,
     viewer,
 )
+from app.routes.once import Once
 from app.security import Guard, Person
-from app.services import masks
+from app.services import masks, sending
 from app.services.context import Context
 from app.services.people import People
 from app.services.prompts import tell_object
@@ -85,6 +86,7 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
     app.mount("/static", GZipMiddleware(RevalidatedFiles(directory=static)), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
+    app.add_middleware(Once, context_of=lambda: app.state.context)
     app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)
     return app
 
@@ -138,6 +140,7 @@ async def _tidy(context: Context) -> None:
         await asyncio.sleep(TIDY_S)
         await anyio.to_thread.run_sync(context.viewer.close_idle)
         await anyio.to_thread.run_sync(tidy_uploads, context)
+        await anyio.to_thread.run_sync(sending.tidy, context)
 
 
 def _tell(context: Context, project: str, number: int) -> None:

@@ -1,6 +1,6 @@
 """Whatever is sent to whichever operation, with and without a session: never a server error.
 
-    python benchmarks/any_request.py [--examples 100] [--seed 0] [--json benchmarks/app-any-request.json]
+    python benchmarks/any_request.py [--examples 100] [--seed 0] [--json benchmarks/app.json]
 
 Schemathesis makes requests from the app's own OpenAPI document, such as it allows and such as it forbids; each is sent with a
 session and without one, half of them at things that exist (all of them, unless thorough).
@@ -23,6 +23,8 @@ from schemathesis import GenerationMode
 from starlette.testclient import TestClient
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from kept import add_options, report
 
 from app.settings import Settings
 from app.viewer.client import Viewer
@@ -116,15 +118,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--examples", type=int, default=100, help="of each operation, mode and place")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path)
+    add_options(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="r2c2r-any-") as folder:
         figures = send_anything(Path(folder), examples=options.examples, seed=options.seed)
-    text = json.dumps(figures, indent=1)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n")
-    return 1 if figures["failures"] else 0
+    return report("any_request", figures, options.json, failed=bool(figures["failures"]))
 
 
 if __name__ == "__main__":

@@ -1,270 +1,35 @@
 """Uploads that mean harm or are broken: each must end in 4xx with one line, and leave nothing behind.
 
-    python benchmarks/hostile_uploads.py [--count 1000] [--seed 0] [--json benchmarks/app-hostile.json]
+    python benchmarks/hostile_uploads.py [--count 1000] [--seed 0] [--json benchmarks/app.json]
 
-A good recording (a tiny room as a .r3d) is damaged in every way listed in KINDS, each with its own random choices.
+A good recording (a tiny room as a .r3d) is damaged in every way listed in hostile_kinds.py, each with its own random choices,
+and the protocol of resumable uploads is abused. After each: no file, no row, no process; at the end: no memory kept.
 """
 
 import argparse
-import io
-import json
 import random
-import stat
-import struct
 import sys
-import tarfile
 import tempfile
 import time
 import zipfile
-import zlib
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import lzfse
+import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from hostile_kinds import KINDS, Members, packed
+from kept import add_options, report
 
 from app.jobs.plans import Commands
 from tests.app.conftest import Running, running
 from tests.core.ingest.tiny import TinyRoom, write_r3d
 
-Members = dict[str, bytes]
-Kind = Callable[[Members, random.Random], bytes]
+ABUSE = "abused_protocol"
 NAMES = ("scan.r3d", "scan.zip", "../../etc/passwd", "a\nb.r3d", "<img src=x onerror=alert(1)>.zip", "\u202egpj.zip", "x" * 300)
-
-
-def packed(members: Members, method: int = zipfile.ZIP_DEFLATED) -> bytes:
-    """A zip of the members."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", method) as archive:
-        for name, content in members.items():
-            archive.writestr(name, content)
-    return buffer.getvalue()
-
-
-def bomb(good: Members, rng: random.Random) -> bytes:
-    """A member that unpacks to hundreds of times its size."""
-    size = rng.choice([66, 70, 80]) << 20
-    return packed({**good, rng.choice(["metadata", "rgbd/0.jpg", "zeros"]): bytes(size)})
-
-
-def overlapping_bomb(good: Members, rng: random.Random) -> bytes:
-    """Many names in the table of contents, one body (a quoted-overlap bomb)."""
-    body, check, name = *_zeros(), b"a"
-    local = struct.pack("<4sHHHHHIIIHH", b"PK\3\4", 20, 0, 8, 0, 33, check, len(body), 1 << 24, 1, 0) + name + body
-    entry = struct.pack(
-        "<4sHHHHHHIIIHHHHHII",
-        b"PK\1\2",
-        20,
-        20,
-        0,
-        8,
-        0,
-        33,
-        check,
-        len(body),
-        1 << 24,
-        2,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-    )
-    count = rng.randint(300, 900)
-    table = b"".join(entry + struct.pack("<H", 0x3030 + n) for n in range(count))
-    return local + table + struct.pack("<4sHHHHIIH", b"PK\5\6", 0, 0, count, count, len(table), len(local), 0)
-
-
-@cache
-def _zeros() -> tuple[bytes, int]:
-    """16 MB of zeros, deflated, and their checksum."""
-    content = bytes(1 << 24)
-    return zlib.compress(content, 9)[2:-4], zlib.crc32(content)
-
-
-def nested(good: Members, rng: random.Random) -> bytes:
-    """Zips in zips."""
-    content = packed(good)
-    for depth in range(rng.randint(1, 5)):
-        content = packed({f"{depth}.zip": content})
-    return content
-
-
-def traversal(good: Members, rng: random.Random) -> bytes:
-    """A name that leads out."""
-    names = [
-        "../evil",
-        "a/../../evil",
-        "/etc/cron.d/evil",
-        "..\\evil",
-        "C:\\evil",
-        "rgbd/../../../../tmp/evil",
-        "\\\\host\\share\\x",
-    ]
-    return packed({**good, rng.choice(names): b"x"})
-
-
-def link(good: Members, rng: random.Random) -> bytes:
-    """A symbolic link or a device in the archive."""
-    buffer = io.BytesIO(packed(good))
-    info = zipfile.ZipInfo(rng.choice(["rgbd/0.jpg", "metadata", "secret"]) + "x")
-    info.external_attr = (rng.choice([stat.S_IFLNK, stat.S_IFCHR, stat.S_IFIFO, stat.S_IFBLK]) | 0o777) << 16
-    with zipfile.ZipFile(buffer, "a") as archive:
-        archive.writestr(info, rng.choice(["/etc/passwd", "../../../r2c2r.db", "/dev/zero"]))
-    return buffer.getvalue()
-
-
-def truncated(good: Members, rng: random.Random) -> bytes:
-    """Cut short somewhere."""
-    content = packed(good)
-    return content[: rng.randrange(1, len(content) - 30)]
-
-
-def wrong_type(good: Members, rng: random.Random) -> bytes:
-    """Something else altogether."""
-    tar = io.BytesIO()
-    with tarfile.open(fileobj=tar, mode="w:gz") as archive:
-        archive.addfile(tarfile.TarInfo("metadata"), io.BytesIO())
-    others = [
-        b"%PDF-1.7\n" + rng.randbytes(500),
-        b"\x89PNG\r\n\x1a\n" + rng.randbytes(500),
-        b"\x7fELF" + rng.randbytes(500),
-        b"#!/bin/sh\nrm -rf /\n",
-        b"<html><script>alert(1)</script></html>",
-        tar.getvalue(),
-        good["rgbd/0.jpg"],
-        rng.randbytes(rng.randint(1, 5000)),
-        b"PK\3\4" + rng.randbytes(rng.randint(1, 5000)),
-        b"PK\5\6" + bytes(18),
-        packed({"[Content_Types].xml": b"<x/>", "word/document.xml": b"<w/>"}),
-        packed({"readme.txt": rng.randbytes(40)}),
-        packed({f"{n}.jpg": good["rgbd/0.jpg"] for n in range(3)}),
-        b"",
-    ]
-    return rng.choice(others)
-
-
-def poisoned_numbers(good: Members, rng: random.Random) -> bytes:
-    """Calibration or poses that are no numbers."""
-    metadata: dict[str, Any] = json.loads(good["metadata"])
-    value = rng.choice([float("nan"), float("inf"), -float("inf"), 1e308, -1.0, 0.0, None, "1", [], {}, 10**400])
-    where = rng.choice(["K", "w", "h", "poses", "all"])
-    if where == "all":
-        metadata = dict.fromkeys(metadata, value)
-    elif where == "poses":
-        metadata["poses"] = [[value] * 7 for _ in metadata["poses"]]
-        if value in (0.0, -1.0, 1e308):  # legal numbers, impossible poses
-            metadata["poses"] = [[0.0] * 7 for _ in metadata["poses"]]
-    elif where == "K":
-        metadata["K"] = [value] * 9
-        metadata.pop("perFrameIntrinsicCoeffs", None)
-    else:
-        metadata[where] = value if value != 0.0 else -5
-    if isinstance(value, int) and value > 10**300:
-        sys.set_int_max_str_digits(0)
-    return packed({**good, "metadata": json.dumps(metadata).encode()})
-
-
-def poisoned_text(good: Members, rng: random.Random) -> bytes:
-    """Metadata that no parser should follow."""
-    texts = [
-        b"[" * 100_000,
-        b'{"a":' * 50_000 + b"1" + b"}" * 50_000,
-        b"\xff\xfe" + rng.randbytes(100),
-        b"{" + b'"w":' + b"9" * 5000 + b"}",
-        b"null",
-        b"[]",
-        b'"metadata"',
-        b"",
-        json.dumps({"w": 96, "h": 128, "K": [1] * 100_000, "poses": [[0] * 7] * 10}).encode(),
-        json.dumps({"w": 96, "h": 128, "K": [92, 0, 0, 0, 92, 0, 48, 64, 1], "poses": {"__class__": "x"}}).encode(),
-        good["metadata"][: len(good["metadata"]) // 2],
-    ]
-    return packed({**good, "metadata": rng.choice(texts)})
-
-
-def huge_images(good: Members, rng: random.Random) -> bytes:
-    """Colour whose header claims more pixels than any memory holds, or pictures that are none."""
-    jpeg = bytearray(good["rgbd/0.jpg"])
-    at = jpeg.index(b"\xff\xc0")
-    jpeg[at + 5 : at + 9] = b"\xff\xff\xff\xff"
-    png = (
-        b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + struct.pack(">II", 2**31 - 1, 2**31 - 1) + b"\x08\x02\0\0\0" + rng.randbytes(8)
-    )
-    others = [bytes(jpeg), png, rng.randbytes(300), b"", b"<svg xmlns='http://www.w3.org/2000/svg'/>", good["rgbd/0.jpg"][:200]]
-    chosen = rng.choice(others)
-    return packed({name: chosen if name.endswith(".jpg") else content for name, content in good.items()})
-
-
-def huge_depth(good: Members, rng: random.Random) -> bytes:
-    """Depth that is cut, random, of another size, or a bomb in LZFSE."""
-    some = next(content for name, content in good.items() if name.endswith(".depth"))
-    others = [
-        some[: len(some) // 2],
-        rng.randbytes(400),
-        lzfse.compress(bytes(64 << 20)),
-        lzfse.compress(b"\0" * 7),
-        b"bvx2" + b"\xff" * 60,
-        b"bvx-" + struct.pack("<I", 2**32 - 1) + b"x" * 50,
-        b"",
-    ]
-    chosen = rng.choice(others)
-    return packed({name: chosen if name.endswith(".depth") else content for name, content in good.items()})
-
-
-def lying_table(good: Members, rng: random.Random) -> bytes:
-    """A table of contents that does not tell the truth."""
-    content = bytearray(packed(good))
-    choice = rng.randrange(5)
-    first = content.index(b"PK\1\2")
-    if choice == 0:
-        content[first + 8] |= 1  # encrypted
-    elif choice == 1:
-        at = first
-        while (at := content.find(b"PK\1\2", at)) >= 0:
-            struct.pack_into("<H", content, at + 10, rng.choice([12345, 99, 6]))  # a method nobody knows
-            at += 4
-    elif choice == 2:
-        at = first
-        while (at := content.find(b"PK\1\2", at)) >= 0:
-            struct.pack_into("<I", content, at + 42, rng.randrange(2**31))  # bodies elsewhere
-            at += 4
-    elif choice == 3:
-        end = content.rindex(b"PK\5\6")
-        struct.pack_into("<I", content, end + 12, 0xFFFFFFF0)  # a table of 4 GB
-    else:
-        at = first
-        while (at := content.find(b"PK\1\2", at)) >= 0:
-            struct.pack_into("<I", content, at + 24, 0x70000000)  # 1.8 GB each
-            at += 4
-    return bytes(content)
-
-
-def damaged_bodies(good: Members, rng: random.Random) -> bytes:
-    """Every body of the archive has wrong bytes in it."""
-    content = bytearray(packed(good, zipfile.ZIP_STORED))
-    for info in zipfile.ZipFile(io.BytesIO(bytes(content))).infolist():
-        at = info.header_offset + 30 + len(info.filename) + rng.randrange(max(info.file_size, 1))
-        content[at] ^= 0xFF
-    return bytes(content)
-
-
-def stripped(good: Members, rng: random.Random) -> bytes:
-    """A part that is needed is missing."""
-    part = rng.choice(["metadata", ".jpg", ".depth", "rgbd"])
-    return packed({name: content for name, content in good.items() if part not in name})
-
-
-KINDS: tuple[Kind, ...] = (
-    bomb, overlapping_bomb, nested, traversal, link, truncated, wrong_type, poisoned_numbers, poisoned_text,
-    huge_images, huge_depth, lying_table, damaged_bodies, stripped,
-)  # fmt: skip
 
 
 def good_members(folder: Path) -> Members:
@@ -275,32 +40,40 @@ def good_members(folder: Path) -> Members:
 
 
 def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
-    """Send `count` of them to an app of its own; what was wrong, and how long it took."""
+    """Send `count` of them to an app of its own; what was wrong, what was left, and how long it took."""
     rng = random.Random(seed)
     good = good_members(folder)
     statuses, wrong, slowest, by_kind = Counter[int](), [], 0.0, Counter[str]()
+    names = [kind.__name__ for kind in KINDS] + [ABUSE]
     began = time.monotonic()
     with running(folder / "data", commands=Commands(), run_jobs=False) as web:
         assert upload(web, packed(good), "good.r3d").status_code == 202, "the undamaged recording is taken"
         for project in web.get("/api/projects"):
             web.delete(f"/api/projects/{project['id']}")
+        memory = [_memory_mb()]
         for number in range(count):
-            kind = KINDS[number % len(KINDS)]
-            content = kind(good, rng)
+            name = names[number % len(names)]
             sent = time.monotonic()
-            answer = upload(web, content, rng.choice(NAMES))
+            if name == ABUSE:
+                answers = abused_protocol(web, good, rng)
+            else:
+                answers = [upload(web, KINDS[names.index(name)](good, rng), rng.choice(NAMES))]
             slowest = max(slowest, time.monotonic() - sent)
-            statuses[answer.status_code] += 1
-            by_kind[kind.__name__] += 1
-            problem = complaint(web, answer)
+            by_kind[name] += 1
+            statuses.update(answer.status_code for answer in answers)
+            problem = next(filter(None, (complaint(web, answer) for answer in answers)), "") or left_behind(web)
             if problem:
-                wrong.append(f"{kind.__name__} ({number}): {problem}")
+                wrong.append(f"{name} ({number}): {problem}")
+            if number % max(count // 4, 1) == 0:
+                memory.append(_memory_mb())
+        memory.append(_memory_mb())
     return {
         "count": count,
         "kinds": dict(by_kind),
         "statuses": {str(status): many for status, many in sorted(statuses.items())},
         "wrong": wrong,
         "slowest_s": round(slowest, 2),
+        "memory_mb": [round(size) for size in memory],  # before, after each quarter, at the end
         "seconds": round(time.monotonic() - began, 1),
     }
 
@@ -308,6 +81,37 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
 def upload(web: Running, content: bytes, name: str) -> Any:
     """One upload, in one piece."""
     return web.client.post("/api/projects/upload", params={"filename": name}, content=content)
+
+
+def abused_protocol(web: Running, good: Members, rng: random.Random) -> list[Any]:
+    """What a resumable upload must refuse; an upload that was announced for it is given up at the end."""
+    ask = web.client.request
+    announce = {"file_name": rng.choice(NAMES), "size": rng.randint(40, 4000)}
+    size = announce["size"]
+    if rng.random() < 0.3:  # nothing is even announced
+        impossible = rng.choice([-1, -(2**31), 0, 2**53, 2**63, 10**30, 1.5, "12", None, True, [], 2**50])
+        strangers = rng.choice(["0" * 12, "..", "%2e%2e%2fr2c2r.db", "a" * 500, "\u202e", "-1"])
+        return [
+            ask("POST", "/api/uploads", json={**announce, "size": impossible}),
+            ask("PATCH", f"/api/uploads/{strangers}x", content=b"x", headers={"Upload-Offset": "0"}),
+            ask("POST", f"/api/uploads/{strangers}x/finish"),
+            ask("DELETE", f"/api/uploads/{strangers}x"),
+        ]
+    upload_id = web.post("/api/uploads", announce, 201)["id"]
+    at = f"/api/uploads/{upload_id}"
+    told = rng.choice(["-1", "1", str(size), str(2**53), "nan", "", "0x0", "1e3", "9" * 400])
+    answers = [
+        ask("PATCH", at, content=b"x" * 20, headers={"Upload-Offset": told}),
+        ask("PATCH", at, content=b"x" * 20),
+        ask("POST", f"{at}/finish"),
+        ask("PATCH", at, content=rng.randbytes(size + rng.randint(1, 90_000)), headers={"Upload-Offset": "0"}),
+    ]
+    offset = int(ask("HEAD", at).headers["upload-offset"])
+    rest = packed(good)[offset:size].ljust(size - offset, b"\0")
+    assert ask("PATCH", at, content=rest, headers={"Upload-Offset": str(offset)}).status_code == 204
+    answers.append(ask("POST", f"{at}/finish"))  # complete, and no recording: refused, and gone
+    answers.append(ask("DELETE", at))
+    return answers
 
 
 def complaint(web: Running, answer: Any) -> str:
@@ -322,11 +126,22 @@ def complaint(web: Running, answer: Any) -> str:
         return f"not one line: {words[:200]!r}"
     if str(web.settings.data_dir) in words or "Traceback" in words:
         return f"tells what it should not: {words[:200]}"
-    data = web.settings.data_dir
-    left = [path for place in ("projects", "uploads") for path in (data / place).rglob("*") if path.is_file()]
-    if left or web.get("/api/projects") or web.get("/api/uploads"):
-        return f"left behind: {left[:3]}"
     return ""
+
+
+def left_behind(web: Running) -> str:
+    """Files, rows or processes that a refused upload left."""
+    data = web.settings.data_dir
+    files = [path for place in ("projects", "uploads") for path in (data / place).rglob("*") if path.is_file()]
+    if files or web.get("/api/projects") or web.get("/api/uploads") or web.get("/api/jobs"):
+        return f"left behind: {files[:3]}"
+    processes = [child for child in psutil.Process().children(recursive=True) if child.is_running()]
+    _, alive = psutil.wait_procs(processes, timeout=5)
+    return f"still running: {alive[:3]}" if alive else ""
+
+
+def _memory_mb() -> float:
+    return float(psutil.Process().memory_info().rss) / 1e6
 
 
 def main() -> int:
@@ -334,15 +149,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path)
+    add_options(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="r2c2r-hostile-") as folder:
         figures = send_all(Path(folder), options.count, options.seed)
-    text = json.dumps(figures, indent=1)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n")
-    return 1 if figures["wrong"] else 0
+    return report("hostile_uploads", figures, options.json, failed=bool(figures["wrong"]))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Kill the server and its workers at random moments of the journey: nothing acknowledged may be lost, work goes on by itself.
 
-    python benchmarks/kills.py [--kills 50] [--seed 0] [--real SCAN_FOLDER] [--json benchmarks/app-kills.json]
+    python benchmarks/kills.py [--kills 50] [--seed 0] [--real SCAN_FOLDER] [--json benchmarks/app.json]
 
 One person clicks, names, undoes, judges, corrects, uploads and runs, one request after the other; SIGKILL comes at moments
 drawn from a seed and hits the server, all its workers with it, a job's process, or the live segmenter. What the server had
@@ -29,6 +29,10 @@ from typing import Any
 
 import httpx2 as httpx
 import psutil
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from kept import add_options, report
 
 ROOT = Path(__file__).resolve().parent.parent
 SERVER = """
@@ -378,15 +382,16 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--real", type=Path)
-    parser.add_argument("--json", type=Path)
+    add_options(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="r2c2r-kills-") as folder:
         figures = kill_often(Path(folder) / "data", kills=options.kills, seed=options.seed, real=options.real)
-    text = json.dumps(figures, indent=1)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n")
-    return 1 if figures["lost"] or not figures["went_on_by_itself"] else 0
+    return report(
+        "kills" if options.real is None else "kills_real",
+        figures,
+        options.json,
+        failed=bool(figures["lost"]) or not figures["went_on_by_itself"],
+    )
 
 
 if __name__ == "__main__":

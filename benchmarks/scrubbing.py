@@ -1,6 +1,6 @@
 """Ten people scrub at once: how fast frames of a project come, over loopback, each person on a connection of their own.
 
-    python benchmarks/scrubbing.py [--people 10] [--steps 200] [--json benchmarks/app-scrubbing.json]
+    python benchmarks/scrubbing.py [--people 10] [--steps 200] [--json benchmarks/app.json]
 
 A project of full-size frames (960x720 of a 1920x1440 recording would be shown) is scrubbed back and forth without any cache;
 each step asks for the next frame when the one before has come. The first pass makes the previews; both are reported.
@@ -22,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from kept import add_options, report
 from kills import Journey, Server, until
 
 FRAMES = 60
@@ -92,15 +93,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--steps", type=int, default=200)
-    parser.add_argument("--json", type=Path)
+    add_options(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="r2c2r-scrub-") as folder:
         figures = scrub(Path(folder), options.people, options.steps)
-    text = json.dumps(figures, indent=1)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n")
-    return 0
+    return report("scrubbing", figures, options.json)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from sqlalchemy import Engine, event
 from sqlmodel import Session, create_engine
 
 from alembic import command
+from app.db import once
 from app.settings import shipped
 
 
@@ -45,6 +46,7 @@ def reading(engine: Engine) -> Iterator[Session]:
 def writing(engine: Engine) -> Iterator[Session]:
     """One transaction that takes the write lock at its start, so that what it read is still true when it writes."""
     with Session(engine.execution_options(write=True), expire_on_commit=False) as session, session.begin():
+        once.claim(session)
         yield session
 
 

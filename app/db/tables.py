@@ -60,6 +60,19 @@ class SignIn(SQLModel, table=True):
     used: float  # to the hour
 
 
+class SentChange(SQLModel, table=True):
+    """A change that its sender marked with a key, and what was answered: sent again, it is not made again."""
+
+    __tablename__ = "sent_changes"
+
+    digest: str = Field(primary_key=True)  # SHA-256 of who sent it and the key
+    request: str  # method and path
+    project_id: str | None = Field(default=None, index=True)  # no foreign key: it is stored before a new project is
+    at: float = Field(index=True)
+    status: int | None = None  # None: the server stopped between the change and its answer
+    answer: str = ""
+
+
 class Upload(SQLModel, table=True):
     """A recording on its way in; its bytes are in the uploads folder, and how many they are is read from there."""
 

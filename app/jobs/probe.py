@@ -28,6 +28,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def probe(file: Path, name: str) -> None:
     """Raise CaptureError, in the sender's words, unless the recording opens and most frames looked at can be decoded."""
+    import numpy as np
+
     from r2c2r_core.ingest.readers.protocol import UnreadableFrame
     from r2c2r_core.ingest.readers.table import open_recording
     from r2c2r_core.ingest.rgb import stored_jpeg
@@ -39,7 +41,9 @@ def probe(file: Path, name: str) -> None:
         for frame in frames:
             try:
                 stored_jpeg(recording.colour_of(frame), frame.rgb_name, (frame.rgb_camera.width, frame.rgb_camera.height))
-                recording.depth_of(frame)
+                metres = recording.depth_of(frame).metres
+                if not (np.isfinite(metres) & (metres > 0)).any():
+                    problems.append(f"frame {frame.index}: its depth holds no measurement")
             except (UnreadableFrame, CaptureError) as problem:
                 problems.append(str(problem))
         if len(problems) > len(frames) / 2:

@@ -12,7 +12,7 @@ from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import history as events
-from app.db import queries
+from app.db import once, queries
 from app.db.documents import inputs_key
 from app.db.engine import reading, writing
 from app.db.tables import Comment, Event, Job, Point, Project, SceneObject, Verdict
@@ -109,6 +109,7 @@ def delete(context: Context, project_id: str) -> schemas.Deleted:
     context.viewer.close(project_id)
     with writing(context.engine) as session:
         session.delete(queries.project_row(session, project_id))
+        once.forget(session, project_id=project_id)
     freed = delete_folder(files.root)
     if files.work.is_relative_to(context.settings.data_dir):  # a workspace elsewhere is not ours to delete
         freed += delete_folder(files.work)

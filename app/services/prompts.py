@@ -32,26 +32,19 @@ def list_objects(context: Context, project_id: str, deleted: bool) -> list[schem
         return [_shape(context, session, project, item, stacks.get(item.id, empty)) for item in session.exec(query)]
 
 
-def create(
-    context: Context, project_id: str, body: schemas.ObjectIn, infer: bool, *, what: str = "added"
-) -> schemas.SceneObject:
-    """A new object, with its first clicks if there are any; `what` was done, as the history says it."""
+def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
+    """A new object, with its first clicks if there are any."""
+    return create_all(context, project_id, [body], infer, what="added")[0]
+
+
+def create_all(
+    context: Context, project_id: str, bodies: list[schemas.ObjectIn], infer: bool, *, what: str
+) -> list[schemas.SceneObject]:
+    """New objects, all or none; `what` was done, as the history says it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        for point in body.points:
-            _check_point(context, project, point.frame, point.x, point.y)
-        category = _category(body.category)
-        name = _free_name(session, project_id, category) if not body.name else _name(session, project_id, body.name, None)
-        count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project_id)).one()
-        item = SceneObject(project_id=project_id, name=name, category=category, colour=count, deleted=True)
-        session.add(item)
-        session.flush()
-        frame = body.points[0].frame if body.points else None
-        with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.who, frame=frame):
-            item.deleted = False
-            session.add(item)
-            session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
-    return _after(context, project_id, item.id, infer and bool(body.points))
+        made = [(_create(context, session, project, body, what).id, infer and bool(body.points)) for body in bodies]
+    return [_after(context, project_id, number, follow) for number, follow in made]
 
 
 def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
@@ -166,6 +159,23 @@ def import_file(context: Context, project_id: str, body: schemas.PromptsFile) ->
                 _check_point(context, project, point.frame, point.x, point.y)
         items = adopt_prompts(session, project, body.model_dump(), context.who)
     return [_after(context, project_id, item.id, infer=False) for item in items]
+
+
+def _create(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
+    for point in body.points:
+        _check_point(context, project, point.frame, point.x, point.y)
+    category = _category(body.category)
+    name = _free_name(session, project.id, category) if not body.name else _name(session, project.id, body.name, None)
+    count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
+    item = SceneObject(project_id=project.id, name=name, category=category, colour=count, deleted=True)
+    session.add(item)
+    session.flush()
+    frame = body.points[0].frame if body.points else None
+    with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.who, frame=frame):
+        item.deleted = False
+        session.add(item)
+        session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
+    return item
 
 
 def _file_point(point: Point) -> schemas.PromptsFilePoint:

@@ -36,16 +36,11 @@ def current(context: Context, project_id: str) -> schemas.Proposals:
 def confirm(context: Context, project_id: str, ids: list[str]) -> list[schemas.SceneObject]:
     """Make objects of proposals: each its click, under its category."""
     wanted = _wanted(context, project_id, ids)
-    made = [
-        prompts.create(
-            context,
-            project_id,
-            schemas.ObjectIn(category=item.category, points=[schemas.PointIn(frame=item.frame, x=item.x, y=item.y, label=1)]),
-            infer=True,
-            what="confirmed proposal",
-        )
+    bodies = [
+        schemas.ObjectIn(category=item.category, points=[schemas.PointIn(frame=item.frame, x=item.x, y=item.y, label=1)])
         for item in wanted
     ]
+    made = prompts.create_all(context, project_id, bodies, infer=True, what="confirmed proposal")
     _tell(context, project_id)
     return made
 

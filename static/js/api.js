@@ -23,6 +23,24 @@ export class ApiError extends Error {
   }
 }
 
+/** @type {{ key: string, calls: number } | null} */
+let marking = null;
+
+/**
+ * Mark the changes that `act` asks for at once: sent again under the same key, the server makes them no second time.
+ * @template T
+ * @param {string} key
+ * @param {() => T} act
+ */
+export function marked(key, act) {
+  marking = { key, calls: 0 };
+  try {
+    return act();
+  } finally {
+    marking = null;
+  }
+}
+
 /**
  * @param {string} path
  * @param {{ method?: string, json?: unknown, body?: BodyInit, signal?: AbortSignal, headers?: Record<string, string> }} [options]
@@ -30,6 +48,7 @@ export class ApiError extends Error {
 async function call(path, { method = "GET", json, body, signal, headers: more = {} } = {}) {
   /** @type {Record<string, string>} */
   const headers = method === "GET" ? {} : { "X-Requested-With": "r2c2r", ...more };
+  if (marking && method !== "GET") headers["Idempotency-Key"] = `${marking.key}.${marking.calls++}`;
   if (json !== undefined) headers["Content-Type"] = "application/json";
   else if (body !== undefined) headers["Content-Type"] = "application/octet-stream";
   /** @type {Response} */

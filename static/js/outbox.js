@@ -1,9 +1,9 @@
 /**
  * Changes on their way to the server, one after the other. What cannot be sent waits and is tried again, so that a lost
- * connection loses no click. Says "change" whenever the number of waiting ones or the state does.
+ * connection loses no click; one key for all tries, so that a lost answer repeats none. Says "change" whenever the number of waiting ones or the state does.
  */
 
-import { ApiError } from "./api.js";
+import { ApiError, marked } from "./api.js";
 import { live } from "./live.js";
 
 const FIRST_WAIT_MS = 500;
@@ -41,9 +41,10 @@ class Outbox extends EventTarget {
    * @param {() => Promise<T>} act
    */
   async #try(act) {
+    const key = newKey();
     for (let wait = FIRST_WAIT_MS; ; wait = Math.min(2 * wait, LONGEST_WAIT_MS)) {
       try {
-        const answer = await act();
+        const answer = await marked(key, act);
         this.#stick(false);
         return answer;
       } catch (error) {
@@ -70,6 +71,9 @@ class Outbox extends EventTarget {
     this.dispatchEvent(new Event("change"));
   }
 }
+
+/** 128 random bits; crypto.randomUUID is missing where the page did not come over TLS. */
+const newKey = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (n) => n.toString(36)).join("-");
 
 /**
  * Until the live connection is back, at most that long.

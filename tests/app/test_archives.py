@@ -33,3 +33,16 @@ def test_an_encrypted_archive_is_refused(tmp_path: Path) -> None:
     (tmp_path / "locked.zip").write_bytes(bytes(content))
     with pytest.raises(CaptureError, match="encrypted"):
         check_archive(tmp_path / "locked.zip", "it", **LIMITS)
+
+
+def test_a_path_that_is_too_long_or_too_deep_is_refused(tmp_path: Path) -> None:
+    for name, deep in enumerate(("n" * 1200, "d/" * 40 + "f")):
+        with pytest.raises(CaptureError, match="folders"):
+            check_archive(write(tmp_path / f"{name}.zip", (deep, b"x")), "it", **LIMITS)
+
+
+def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="Duplicate"):
+        path = write(tmp_path / "twice.zip", ("a", b"1"), ("a", b"2"))
+    with pytest.raises(CaptureError, match="two files named 'a'"):
+        check_archive(path, "it", **LIMITS)

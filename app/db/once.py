@@ -1,0 +1,67 @@
+"""A change that is sent again, because its answer got lost on the way, is not made again.
+
+The sender marks a change with a key of its own. The key is stored in the transaction that makes the change, the answer right
+after it; both are kept for a day. A server that dies between the two has the key without the answer: the change was made.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from sqlmodel import Session, col, delete
+
+from app.db.tables import SentChange
+
+KEPT_S = 24 * 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """A marked change on its way: who sent it under which key (a digest), and what it asks for."""
+
+    digest: str
+    request: str  # method and path
+    project_id: str | None
+
+
+_sending: ContextVar[Sending | None] = ContextVar("sending", default=None)
+
+
+@contextmanager
+def marked(sending: Sending) -> Iterator[None]:
+    """What is written inside belongs to the marked change."""
+    token = _sending.set(sending)
+    try:
+        yield
+    finally:
+        _sending.reset(token)
+
+
+def claim(session: Session) -> None:
+    """Store the key with what this transaction changes; nothing outside a marked change."""
+    sending = _sending.get()
+    if sending is not None and session.get(SentChange, sending.digest) is None:
+        session.add(SentChange(digest=sending.digest, request=sending.request, project_id=sending.project_id, at=time.time()))
+
+
+def find(session: Session, digest: str) -> SentChange | None:
+    """What became of the change with that key."""
+    return session.get(SentChange, digest)
+
+
+def answered(session: Session, digest: str, status: int, body: str) -> None:
+    """Keep the answer beside the key, if the change was stored at all."""
+    found = session.get(SentChange, digest)
+    if found is not None:
+        found.status, found.answer = status, body
+        session.add(found)
+
+
+def forget(session: Session, *, before: float | None = None, project_id: str | None = None) -> None:
+    """Delete what is older, or what was about a project."""
+    if before is not None:
+        session.exec(delete(SentChange).where(col(SentChange.at) < before))
+    if project_id is not None:
+        session.exec(delete(SentChange).where(col(SentChange.project_id) == project_id))

@@ -1,0 +1,59 @@
+"""Changes that their sender marked with a key: made once, answered as often as asked."""
+
+import hashlib
+import time
+from dataclasses import dataclass
+
+from app.db import once
+from app.db.engine import reading, writing
+from app.db.once import Sending, marked
+from app.errors import Conflict
+from app.security import Person
+from app.services.context import Context
+from r2c2r_core.errors import InputError
+
+__all__ = ["Answer", "Sending", "answer_of", "keep", "marked", "sending", "tidy"]
+
+LONGEST_KEY = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What was answered the first time."""
+
+    status: int
+    body: str
+
+
+def sending(person: Person, key: str, method: str, path: str) -> Sending:
+    """The marked change; keys of different people never meet."""
+    if not 1 <= len(key) <= LONGEST_KEY:
+        raise InputError(f"Idempotency-Key has {len(key)} characters", hint=f"between 1 and {LONGEST_KEY}")
+    parts = path.split("/")  # /api/projects/PROJECT/…
+    project = parts[3] if parts[2] == "projects" and len(parts) > 4 else None
+    return Sending(hashlib.sha256(f"{person.name}\0{key}".encode()).hexdigest(), f"{method} {path}", project)
+
+
+def answer_of(context: Context, change: Sending) -> Answer | None:
+    """What was answered when the change was made; None when it has not been made."""
+    with reading(context.engine) as session:
+        found = once.find(session, change.digest)
+    if found is None:
+        return None
+    if found.request != change.request:
+        raise InputError("this Idempotency-Key was used for another change", hint="make a new key for each change")
+    if found.status is None:
+        raise Conflict("this change is stored; the server stopped before it could say so", hint="look at what is there now")
+    return Answer(found.status, found.answer)
+
+
+def keep(context: Context, change: Sending, answer: Answer) -> None:
+    """Remember the answer."""
+    with writing(context.engine) as session:
+        once.answered(session, change.digest, answer.status, answer.body)
+
+
+def tidy(context: Context) -> None:
+    """Forget what was sent more than a day ago."""
+    with writing(context.engine) as session:
+        once.forget(session, before=time.time() - once.KEPT_S)

@@ -1,0 +1,24 @@
+"""The app's figures in one file: each script owns a part of it, and prints what it keeps."""
+
+import argparse
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """--json FILE, the same in every script."""
+    parser.add_argument("--json", type=Path, help="keep the figures in this file (benchmarks/app.json), beside those of others")
+
+
+def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: bool = False) -> int:
+    """Print the figures, replace that part of the file, and say by the exit status whether a bar was missed."""
+    print(json.dumps(figures, indent=1))
+    if file is not None:
+        parts = json.loads(file.read_text()) if file.exists() else {}
+        parts[part] = figures
+        beside = file.with_suffix(".part")
+        beside.write_text(json.dumps(dict(sorted(parts.items())), indent=1) + "\n")
+        os.replace(beside, file)
+    return 1 if failed else 0
