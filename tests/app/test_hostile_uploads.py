@@ -11,6 +11,7 @@ def test_each_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, monkeypa
     monkeypatch.syspath_prepend(BENCHMARKS)
     from hostile_uploads import KINDS, send_all
 
-    figures = send_all(tmp_path, 2 * len(KINDS), seed=1)
+    count = len(KINDS) + 1  # one of each, and the protocol abused
+    figures = send_all(tmp_path, count, seed=1)
     assert figures["wrong"] == []
-    assert sum(figures["statuses"].values()) == 2 * len(KINDS)
+    assert sum(figures["statuses"].values()) >= count
