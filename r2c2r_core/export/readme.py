@@ -31,7 +31,9 @@ LOADING  (unpack first; run in the bundle's folder)
              Add pybullet.URDF_USE_SELF_COLLISION to let doors touch their neighbours. Switch each joint's
              default motor off before pushing: setJointMotorControl2(..., VELOCITY_CONTROL, force=0).
   SAPIEN     loader = scene.create_urdf_loader(); loader.fix_root_link = True; loader.load("scene.urdf")
-             Without a Vulkan GPU remove the <visual> elements first. Check joint friction: SAPIEN 3 halves it.
+             Without a Vulkan GPU remove the <visual> elements first. SAPIEN 3 drops the friction, effort and
+             velocity of joints (its own friction is 0.05): call joint.set_friction(friction) and
+             joint.set_drive_property(0, damping, effort) with the numbers of scene.urdf.
   Isaac Sim  File > Open scene.usda, or add it as a reference. Each fixture with joints is one articulation; the drives damp
              (stiffness 0): raise stiffness to hold a position. Joint friction is in PhysxJointAxisAPI (Isaac Sim 5, PhysX 5.6).
   ROS        give the text of scene.urdf to robot_state_publisher as robot_description. RViz wants absolute mesh paths:

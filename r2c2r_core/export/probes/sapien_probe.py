@@ -1,7 +1,8 @@
 """Load a URDF in SAPIEN and write what it holds: `python sapien_probe.py scene.urdf answer.json`.
 
 Runs in SAPIEN's own environment, so it imports nothing of r2c2r. Visuals are stripped first: SAPIEN 3 needs a Vulkan GPU for
-them even to load.
+them even to load. Its URDF loader drops joint friction, effort and velocity (3.0.3: `articulation_builder.py` sets limits and
+damping only, every joint keeps PhysX's default friction of 0.05), so those are not read.
 """
 
 import json
@@ -9,10 +10,13 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 
-def read_back(urdf: Path) -> dict[str, object]:
-    """Joints, masses and colliders as SAPIEN holds them."""
+def read_back(urdf: Path) -> dict[str, Any]:
+    """Joints and bodies as SAPIEN holds them."""
     import sapien  # type: ignore[import-not-found]  # lives in an environment of its own
     from sapien import physx
 
@@ -21,16 +25,37 @@ def read_back(urdf: Path) -> dict[str, object]:
     loader.fix_root_link = True
     with tempfile.TemporaryDirectory() as scratch:
         robot = loader.load(str(without_visuals(urdf, Path(scratch))))
-    joints = {}
-    for joint in robot.get_active_joints():
-        lower, upper = joint.get_limits()[0]
-        joints[joint.name] = (joint.type.removesuffix("_unwrapped"), float(lower), float(upper))
-    links = [link for link in robot.get_links() if link.name != "world"]
+    robot.set_qpos(np.zeros(robot.dof))  # poses of links are only computed then
     return {
         "version": f"SAPIEN {sapien.__version__}",
-        "joints": joints,
-        "masses": {link.name: float(link.mass) for link in links},
-        "colliders": {link.name: len(link.collision_shapes) for link in links if len(link.collision_shapes)},
+        "joints": {joint.name: _joint(joint) for joint in robot.get_active_joints()},
+        "bodies": {link.name: _body(link) for link in robot.get_links() if link.name != "world"},
+    }
+
+
+def _joint(joint: Any) -> dict[str, Any]:
+    lower, upper = joint.get_limits()[0]
+    pose = joint.get_global_pose().to_transformation_matrix()
+    return {
+        "type": joint.type.removesuffix("_unwrapped"),
+        "axis_world": pose[:3, 0].tolist(),  # PhysX moves joints about and along x
+        "origin_world": pose[:3, 3].tolist(),
+        "lower": float(lower),
+        "upper": float(upper),
+        "damping": float(joint.damping),
+    }
+
+
+def _body(link: Any) -> dict[str, Any]:
+    world_from_link = link.entity_pose.to_transformation_matrix()
+    principal = world_from_link @ link.cmass_local_pose.to_transformation_matrix()
+    return {
+        "mass_kg": float(link.mass),
+        "com_world": principal[:3, 3].tolist(),
+        "inertia_world": (principal[:3, :3] @ np.diag(link.inertia) @ principal[:3, :3].T).tolist(),
+        "rotation_world": world_from_link[:3, :3].tolist(),
+        "origin_world": world_from_link[:3, 3].tolist(),
+        "colliders": len(link.collision_shapes),
     }
 
 

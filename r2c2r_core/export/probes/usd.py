@@ -2,37 +2,27 @@
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 _FRAMES_M = 1e-4  # single precision of joint frames metres away from the origin
 
 
-class UsdReadback(NamedTuple):
-    """The scene as USD holds it, lengths in metres, angles in radians."""
-
-    version: str
-    joints: dict[str, tuple[str, float, float]]
-    masses: dict[str, float]
-    colliders: dict[str, int]
-    problem: str
-
-
-def read_usd(path: Path) -> UsdReadback:
-    """Joints, masses and colliders by body; raises what the library raises on a file it cannot read."""
-    from pxr import Usd
+def read_back(path: Path) -> dict[str, Any]:
+    """Joints and bodies as USD holds them, lengths in metres, angles in radians; raises what the library raises."""
+    from pxr import Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.Open(str(path))
     prims = list(stage.Traverse())
     problems = [*_wrong_units(stage), *_invalid(stage), *_joints_apart(prims)]
-    return UsdReadback(
-        version=f"USD {version('usd-core')}",
-        joints={name: found for prim in prims if (found := _joint(prim)) for name in (prim.GetName(),)},
-        masses=_masses(prims),
-        colliders=_colliders(prims),
-        problem=problems[0] if problems else "",
-    )
+    cache = UsdGeom.XformCache()
+    return {
+        "version": f"USD {version('usd-core')}",
+        "joints": {prim.GetName(): _joint(prim, cache) for prim in prims if _kind(prim)},
+        "bodies": {p.GetName(): _body(p, cache) for p in prims if p.HasAPI(UsdPhysics.MassAPI)},
+        "problem": problems[0] if problems else "",
+    }
 
 
 def _wrong_units(stage: Any) -> list[str]:
@@ -52,33 +42,60 @@ def _invalid(stage: Any) -> list[str]:
     return [f"{len(serious)} errors by USD's validators, first {serious[0].GetMessage()}"] if serious else []
 
 
-def _joint(prim: Any) -> tuple[str, float, float] | None:
+def _kind(prim: Any) -> str | None:
     from pxr import UsdPhysics
 
     if prim.IsA(UsdPhysics.RevoluteJoint):
-        joint, kind, unit = UsdPhysics.RevoluteJoint(prim), "revolute", np.pi / 180
-    elif prim.IsA(UsdPhysics.PrismaticJoint):
-        joint, kind, unit = UsdPhysics.PrismaticJoint(prim), "prismatic", 1.0
-    else:
-        return None
-    return kind, float(joint.GetLowerLimitAttr().Get() * unit), float(joint.GetUpperLimitAttr().Get() * unit)
+        return "revolute"
+    return "prismatic" if prim.IsA(UsdPhysics.PrismaticJoint) else None
 
 
-def _masses(prims: list[Any]) -> dict[str, float]:
+def _joint(prim: Any, cache: Any) -> dict[str, Any]:
+    """One joint; what dry friction and velocity PhysX is told stands in its schema PhysxJointAxisAPI."""
     from pxr import UsdPhysics
 
-    return {p.GetName(): float(UsdPhysics.MassAPI(p).GetMassAttr().Get()) for p in prims if p.HasAPI(UsdPhysics.MassAPI)}
+    kind = _kind(prim)
+    schema, instance, unit = (
+        (UsdPhysics.RevoluteJoint, "angular", np.pi / 180) if kind == "revolute" else (UsdPhysics.PrismaticJoint, "linear", 1.0)
+    )
+    joint, drive = schema(prim), UsdPhysics.DriveAPI(prim, instance)
+    world_from_joint = _frame(prim, cache, joint.GetBody1Rel(), joint.GetLocalPos1Attr(), joint.GetLocalRot1Attr())
+    physx = f"physxJointAxis:{instance}:"
+    return {
+        "type": kind,
+        "axis_world": world_from_joint[:3, "XYZ".index(joint.GetAxisAttr().Get())],
+        "origin_world": world_from_joint[:3, 3],
+        "lower": _value(joint.GetLowerLimitAttr()) * unit,
+        "upper": _value(joint.GetUpperLimitAttr()) * unit,
+        "damping": _value(drive.GetDampingAttr()) / unit,
+        "friction": _value(prim.GetAttribute(f"{physx}dynamicFrictionEffort")),
+        "effort": _value(drive.GetMaxForceAttr()),
+        "velocity": _value(prim.GetAttribute(f"{physx}maxJointVelocity")) * unit,
+    }
 
 
-def _colliders(prims: list[Any]) -> dict[str, int]:
-    from pxr import UsdPhysics
+def _body(prim: Any, cache: Any) -> dict[str, Any]:
+    from pxr import Gf, UsdPhysics
 
-    found: dict[str, int] = {}
-    for prim in prims:
-        if prim.HasAPI(UsdPhysics.CollisionAPI) and prim.GetParent().HasAPI(UsdPhysics.MassAPI):
-            name = prim.GetParent().GetName()
-            found[name] = found.get(name, 0) + 1
-    return found
+    mass = UsdPhysics.MassAPI(prim)
+    world_from_body = np.array(cache.GetLocalToWorldTransform(prim)).T
+    turn = world_from_body[:3, :3]
+    principal = turn @ np.array(Gf.Matrix3d(Gf.Quatd(mass.GetPrincipalAxesAttr().Get()))).T
+    com = world_from_body @ [*mass.GetCenterOfMassAttr().Get(), 1.0]
+    return {
+        "mass_kg": _value(mass.GetMassAttr()),
+        "com_world": com[:3],
+        "inertia_world": principal @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ principal.T,
+        "rotation_world": turn,
+        "origin_world": world_from_body[:3, 3],
+        "colliders": sum(child.HasAPI(UsdPhysics.CollisionAPI) for child in prim.GetChildren()),
+    }
+
+
+def _value(attribute: Any) -> float:
+    """An attribute's number; NaN where nobody wrote it."""
+    value = attribute.Get() if attribute else None
+    return float("nan") if value is None else float(value)
 
 
 def _joints_apart(prims: list[Any]) -> list[str]:

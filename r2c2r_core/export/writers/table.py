@@ -26,7 +26,8 @@ FORMATS = (
         write=write_urdf,
         loses=(
             "free-standing things are fixed where they stand (loaders disagree on floating joints)",
-            "no floor and no contact exclusions (URDF has no words for them)",
+            "no floor, no contact exclusions, no surface friction and no joint armature (URDF has no words for them)",
+            "SAPIEN's loader drops the friction, effort and velocity of joints: set them as README.txt says",
             "where each number comes from: see manifest.json",
         ),
     ),
