@@ -170,6 +170,14 @@ def collider_corners_world(body: Body) -> list[Points]:
     return [body.world_from_body.apply(points) for points in own]
 
 
+def facing(plan: Plan) -> Vector3 | None:
+    """The horizontal direction (unit, world) that most moving fronts face; None where nothing opens."""
+    fronts = [-body.world_from_body.rotation[:, 1] for body in plan.bodies if body.joint is not None]
+    total = np.array([*np.sum(fronts, axis=0)[:2], 0.0]) if fronts else np.zeros(3)
+    length = float(np.linalg.norm(total))
+    return total / length if length > 1e-3 else None
+
+
 def _texture_file(object_name: str, body_name: str, link: Link, textures: dict[str, str]) -> str | None:
     if link.visual is None:
         return None

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image, Points, Vector3
-from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.plan import WORLD, Body, Plan, facing
 from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres
 from r2c2r_core.geometry.raster import rasterize
@@ -151,20 +151,17 @@ def _motion(body: Body, fraction: float) -> Rigid3:
 
 def _view_from(plan: Plan, seen_from: Vector3 | None) -> Vector3:
     """Direction from the scene to the eye: from where the fronts face, turned towards where the scan was filmed."""
-    outward = [-body.world_from_body.rotation[:, 1] for body in plan.bodies if body.joint is not None]
-    facing: Vector3 = np.array(outward).sum(axis=0) if outward else np.zeros(3)
+    fronts = facing(plan)
+    towards = np.zeros(3)
     if seen_from is not None:
         centre = np.mean([body.world_from_body.translation for body in plan.bodies], axis=0)
-        towards = np.asarray(seen_from, dtype=np.float64) - centre
-        towards[2] = 0.0
-        if np.linalg.norm(towards) > 0.2:
-            facing = facing / max(np.linalg.norm(facing), 1e-9) * 0.5 + towards / np.linalg.norm(towards)
-    facing = np.array([facing[0], facing[1], 0.0])
-    if np.linalg.norm(facing) < 1e-3:
-        facing = np.array([0.0, -1.0, 0.0])
-    facing /= np.linalg.norm(facing)
-    side = np.cross([0.0, 0.0, 1.0], facing)
-    return facing + 0.35 * side + np.array([0.0, 0.0, 0.5])  # three quarters view: depth shows
+        away = np.asarray(seen_from, dtype=np.float64) - centre
+        away[2] = 0.0
+        towards = away / np.linalg.norm(away) if np.linalg.norm(away) > 0.2 else towards
+    front = towards + (np.zeros(3) if fronts is None else fronts * (0.5 if towards.any() else 1.0))
+    front = front / np.linalg.norm(front) if np.linalg.norm(front) > 1e-3 else np.array([0.0, -1.0, 0.0])
+    side = np.cross([0.0, 0.0, 1.0], front)
+    return front + 0.35 * side + np.array([0.0, 0.0, 0.5])  # three quarters view: depth shows
 
 
 def albedo(soup: Soup, marks: np.ndarray) -> np.ndarray:

@@ -42,7 +42,8 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
         front = solid ^ box_solid(region.low, region.high, paint.back_uv)
         visuals[link.name] = joined([mesh_of(front, paint.texture), *_inner_boxes(item, link, paint)])
         wider = _widened(region)
-        rest = rest - box_solid(wider.low, wider.high, paint.inside_uv)
+        # edges of the carcass are banded like its front: white ones would shine through the seam
+        rest = rest - box_solid(wider.low, wider.high, paint.back_uv)
     low, high = cavity(item)
     if (high > low).all():
         rest = rest - box_solid(low, high, paint.inside_uv)

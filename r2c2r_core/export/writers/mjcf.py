@@ -7,9 +7,12 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.stand import add_surroundings, add_view
 from r2c2r_core.export.writers.text import numbers, quat_wxyz_of
 from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
 from r2c2r_core.geometry.transforms import Rigid3
+
+_FRICTION = f"{SURFACE_FRICTION} 0.01 0.001"  # sliding, spinning, rolling
 
 
 def write_mjcf(plan: Plan, path: Path) -> None:
@@ -22,12 +25,11 @@ def mjcf_text(plan: Plan) -> str:
     root = ET.Element("mujoco", model=plan.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", timestep="0.002", integrator="implicitfast")
+    add_view(root, plan)
     _add_defaults(root)
     _add_assets(root, plan)
     worldbody = ET.SubElement(root, "worldbody")
-    ET.SubElement(worldbody, "light", name="sun", pos="0 0 4", dir="0.3 0.4 -1", type="directional", diffuse="0.7 0.7 0.7")
-    floor = {"name": "floor", "type": "plane", "size": "0 0 0.05", "material": "floor", "pos": numbers([0, 0, plan.floor_z_m])}
-    ET.SubElement(worldbody, "geom", {"class": "collision", "group": "1", **floor})
+    add_surroundings(worldbody, plan, {"friction": _FRICTION})
     elements = {WORLD: worldbody}
     for body in plan.bodies:
         elements[body.name] = _add_body(elements[body.parent], body)
@@ -40,20 +42,18 @@ def mjcf_text(plan: Plan) -> str:
 
 
 def _add_defaults(root: ET.Element) -> None:
-    visual = ET.SubElement(root, "visual")
-    ET.SubElement(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.4 0.4 0.4", specular="0 0 0")
     default = ET.SubElement(root, "default")
     seen = ET.SubElement(default, "default", {"class": "visual"})
     ET.SubElement(seen, "geom", group="2", contype="0", conaffinity="0", mass="0")
     touched = ET.SubElement(default, "default", {"class": "collision"})
-    ET.SubElement(touched, "geom", group="3", friction=f"{SURFACE_FRICTION} 0.01 0.001", rgba="0.5 0.6 0.7 0.4")
+    ET.SubElement(touched, "geom", group="3", friction=_FRICTION, rgba="0.5 0.6 0.7 0.4")
 
 
 def _add_assets(root: ET.Element, plan: Plan) -> None:
     asset = ET.SubElement(root, "asset")
     sky = {"type": "skybox", "builtin": "gradient", "rgb1": "0.93 0.94 0.96", "rgb2": "0.7 0.75 0.8"}
     ET.SubElement(asset, "texture", {"name": "sky", "width": "64", "height": "64", **sky})
-    checker = {"type": "2d", "builtin": "checker", "rgb1": "0.78 0.77 0.75", "rgb2": "0.72 0.71 0.69"}
+    checker = {"type": "2d", "builtin": "checker", "rgb1": "0.8 0.79 0.77", "rgb2": "0.78 0.77 0.75"}
     ET.SubElement(asset, "texture", {"name": "floor", "width": "256", "height": "256", **checker})
     ET.SubElement(asset, "material", name="floor", texture="floor", texrepeat="2 2", texuniform="true", reflectance="0")
     textures: dict[str, str] = {}

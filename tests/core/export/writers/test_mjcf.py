@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.plan import collider_corners_world, facing, plan_bundle
 from r2c2r_core.export.preview import poses_at
 from tests.core.export.kitchen import kitchen
 
@@ -59,3 +59,26 @@ def test_visuals_touch_nothing_and_textures_arrive(model: mujoco.MjModel) -> Non
 
 def test_parents_and_children_are_excluded_from_contact(model: mujoco.MjModel) -> None:
     assert model.nexclude == 4
+
+
+def test_the_camera_sees_the_whole_kitchen_from_the_front_and_the_sun_shines_on_it(model: mujoco.MjModel) -> None:
+    plan = plan_bundle(kitchen())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    eye, axes = data.cam("front").xpos, data.cam("front").xmat.reshape(3, 3)
+    seen = (np.concatenate([points for body in plan.bodies for points in collider_corners_world(body)]) - eye) @ axes
+    assert (seen[:, 2] < 0).all()  # MuJoCo's cameras look along -z
+    slope = np.tan(np.radians(model.cam("front").fovy[0] / 2))
+    assert (np.abs(seen[:, 1] / seen[:, 2]) < slope).all()
+    assert (np.abs(seen[:, 0] / seen[:, 2]) < slope * 4 / 3).all()
+    fronts = facing(plan)
+    assert fronts is not None
+    np.testing.assert_allclose(fronts, [0.0, -1.0, 0.0], atol=1e-9)
+    assert (eye - model.stat.center) @ fronts > 0.5
+    assert model.light("sun").dir @ fronts < -0.3
+
+
+def test_a_full_hd_picture_needs_no_edit_and_the_floor_keeps_its_own_colour(model: mujoco.MjModel) -> None:
+    assert (model.vis.global_.offwidth, model.vis.global_.offheight) == (1920, 1080)
+    np.testing.assert_array_equal(model.geom("floor").rgba, [1.0, 1.0, 1.0, 1.0])
+    assert model.geom("floor").friction[0] == model.geom("cabinet_1_door_col_0").friction[0]

@@ -1,0 +1,72 @@
+"""Where scene.xml is first seen from: a camera before the fronts, a sun over its left shoulder, a plain floor."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from r2c2r_core.export.plan import Plan, collider_corners_world, facing
+from r2c2r_core.export.writers.text import numbers
+
+CAMERA = "front"
+
+_FOVY_DEG = 40.0
+_PICTURE = (1920, 1080)  # the largest picture `mujoco.Renderer` makes without an edit; MuJoCo's own default is 640 x 480
+_NARROWEST, _FILLED = 1.3, 0.8  # width over height of a picture that still holds everything, and how much of it is filled
+_SHADOW_PX = 8192  # 1 mm of a kitchen: the default draws steps along every shadow
+
+
+def add_view(root: ET.Element, plan: Plan) -> None:
+    """<statistic> and <visual>: what a viewer frames, how its pictures are lit."""
+    corners = _corners(plan)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    ET.SubElement(root, "statistic", center=numbers((low + high) / 2), extent=numbers(_radius(low, high)))
+    visual = ET.SubElement(root, "visual")
+    # pictures of a scan hold the light they were taken in: a strong ambient keeps their colours
+    ET.SubElement(visual, "headlight", ambient="0.5 0.5 0.5", diffuse="0.25 0.25 0.25", specular="0 0 0")
+    ET.SubElement(visual, "global", fovy=numbers(_FOVY_DEG), offwidth=str(_PICTURE[0]), offheight=str(_PICTURE[1]))
+    ET.SubElement(visual, "quality", shadowsize=str(_SHADOW_PX))
+    ET.SubElement(visual, "map", shadowclip="2")
+
+
+def add_surroundings(worldbody: ET.Element, plan: Plan, surface: dict[str, str]) -> None:
+    """Sun, camera and floor; `surface` is how the floor touches."""
+    corners, forward = _corners(plan), -_facing(plan)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre, radius, right = (low + high) / 2, _radius(low, high), np.cross(forward, [0.0, 0.0, 1.0])
+    sun = -0.8 * forward - 0.5 * right + np.array([0.0, 0.0, 1.3])
+    light = {"name": "sun", "type": "directional", "diffuse": "0.45 0.45 0.45", "specular": "0 0 0"}
+    # a directional light shadows what lies round its position
+    ET.SubElement(
+        worldbody, "light", {**light, "pos": numbers(centre + radius * sun / np.linalg.norm(sun)), "dir": numbers(-sun)}
+    )
+    eye, axes = _eye(corners, -forward + 0.35 * right + np.array([0.0, 0.0, 0.45]))
+    ET.SubElement(worldbody, "camera", name=CAMERA, pos=numbers(eye), xyaxes=numbers(axes[:2]), fovy=numbers(_FOVY_DEG))
+    floor = {"name": "floor", "type": "plane", "size": "0 0 0.05", "pos": numbers([0, 0, plan.floor_z_m])}
+    ET.SubElement(worldbody, "geom", {**surface, **floor, "group": "1", "material": "floor", "rgba": "1 1 1 1"})
+
+
+def _facing(plan: Plan) -> np.ndarray:
+    found = facing(plan)
+    return np.array([0.0, -1.0, 0.0]) if found is None else found
+
+
+def _eye(corners: np.ndarray, backward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position of a camera that sees all corners, looking along -backward, and its axes: right, up, backward (rows)."""
+    backward = backward / np.linalg.norm(backward)
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(backward, right), backward])
+    seen = corners @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    x, y, z = np.abs(seen - middle)[:, 0], np.abs(seen - middle)[:, 1], (seen - middle)[:, 2]
+    slope = np.tan(np.radians(_FOVY_DEG / 2)) * _FILLED
+    away = float(np.max(np.maximum(x / (slope * _NARROWEST), y / slope) + z))
+    return middle @ axes + away * backward, axes
+
+
+def _corners(plan: Plan) -> np.ndarray:
+    return np.concatenate([points for body in plan.bodies for points in collider_corners_world(body)] or [np.zeros((1, 3))])
+
+
+def _radius(low: np.ndarray, high: np.ndarray) -> float:
+    return max(float(np.linalg.norm(high - low)) / 2, 0.2)
