@@ -8,6 +8,7 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, View, masked_points
 from r2c2r_core.generate.priors import DepthBehind, category_depth, depth_behind
+from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.relief import BoxPart, find_steps, handle_parts, measure_heights, measured_protrusion
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
@@ -43,6 +44,7 @@ def appliance_shape(evidence: Evidence, variation: Variation) -> Shape:
     low, high = _measured_box(box, variation)
     if track.front is not None:
         low[1] = float(world_from_local.inverse.apply(track.front.world_from_front.translation[None])[0, 1])
+    high[1] = rear_edge(low, high, evidence.pool, world_from_local)
     high[1] = low[1] + _appliance_depth(evidence, variation, box, float(high[1] - low[1]))
     return _box_with_front(BoxPart(low, high), world_from_local, _local_front(track.front, box), variation)
 

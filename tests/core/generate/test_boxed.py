@@ -8,6 +8,7 @@ import pytest
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.boxed import appliance_shape, front_shape
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
 
@@ -80,3 +81,20 @@ def test_a_front_without_a_rectangle_says_what_to_do(front_scene):
     capture, track = front_scene
     with pytest.raises(GenerationFailed, match="add a click"):
         shape_of(front_shape, (capture, replace(track, front=None)))
+
+
+@pytest.mark.parametrize("off_m", [-0.03, 0.0, 0.04])
+def test_an_appliance_ends_where_the_wall_shows_past_its_sides(appliance_scene, off_m):
+    """The segmenter's box is too deep or too shallow; the true one ends 34 cm behind the front."""
+    capture, track = appliance_scene
+    evidence = gather_evidence(capture, track, 10)
+    low, high = np.array([-0.23, -0.17, -0.14]), np.array([0.23, 0.17 + off_m, 0.14])
+    assert rear_edge(low, high, evidence.pool, track.box.world_from_object) == pytest.approx(0.17, abs=0.012)
+
+
+def test_a_rear_edge_that_no_frame_shows_stays_where_it_was_thought(appliance_scene):
+    capture, track = appliance_scene
+    evidence = gather_evidence(capture, track, 10)
+    low, high = np.array([-0.23, -0.17, -0.14]), np.array([0.23, 0.17, 0.14])
+    blind = [replace(view, depth_m=np.zeros_like(view.depth_m)) for view in evidence.pool]
+    assert rear_edge(low, high, blind, track.box.world_from_object) == high[1]

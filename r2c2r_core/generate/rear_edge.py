@@ -1,0 +1,94 @@
+"""Where an appliance's sides and top end: depth pixels beyond its rear edge lie on the wall, not on the face continued.
+
+Colour does not tell a white microwave from a white wall, and points on its sides thin out where they are seen at a flat
+angle. Each depth pixel whose ray crosses the plane of a face says how far behind the crossing the surface is: nothing where
+the face goes on, what is left to the wall where it has ended. The edge is the change point of all frames together.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.transforms import Rigid3
+
+_FLATTEST = 0.08  # sine of the angle between a ray and the face
+_BEFORE_M = 0.05  # nearer than the face: something in front of it
+_BIN_M = 0.01
+_LEAST = 6  # pixels of a bin, and of a frame on either part of a face
+_LEAST_BINS = 8
+_SURE = 0.7  # of the depth: up to here the face is there
+_LEAST_GAP_M = 0.015  # between the rear edge and what is behind it
+_CLEARER = 0.5  # of the misfit of a face without an end
+_WIDEST_M = 0.08  # how far from where it was thought the edge is looked for
+
+
+def rear_edge(
+    low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3, reach_m: float = _WIDEST_M
+) -> float:
+    """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, moved to where depth lets the edge be."""
+    thought = float(high[1])
+    bounds = []
+    for axis, side in ((2, 1.0), (0, -1.0), (0, 1.0)):
+        crossings, behind = [np.zeros(0)], [np.zeros(0)]
+        for view in views:
+            y, gap = _continued(low, high, view, world_from_local, axis, side, reach_m)
+            known = y < low[1] + _SURE * (high[1] - low[1])
+            if known.sum() < _LEAST or np.count_nonzero(~known) < _LEAST:
+                continue
+            crossings.append(y)
+            behind.append(gap - np.median(gap[known]))  # the frame's own pose error
+        found = _change_point(np.concatenate(crossings), np.concatenate(behind), thought, reach_m)
+        if found is not None:
+            bounds.append(found)
+    if not bounds:
+        return thought
+    last, first = np.mean(bounds, axis=0)
+    return float(np.clip(thought, last, first))
+
+
+def _continued(
+    low: Vector3, high: Vector3, view: View, world_from_local: Rigid3, axis: int, side: float, reach_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where pixels' rays cross the plane of a face (y), and how far behind the crossing, along y, the surface they hit lies."""
+    eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+    face = high[axis] if side > 0 else low[axis]
+    if side * (eye[axis] - face) <= 0.05:
+        return np.zeros(0), np.zeros(0)
+    valid = view.depth_m > 0
+    hit = (world_from_local.inverse @ view.world_from_camera).apply(depth_points(view.depth_m, view.depth_camera)[valid])
+    ray = hit - eye
+    steep = side * ray[:, axis] < -_FLATTEST * np.linalg.norm(ray, axis=1)
+    share = (face - eye[axis]) / np.where(steep, ray[:, axis], -1.0 * side)
+    crossing = eye + share[:, None] * ray
+    other = 2 - axis
+    margin = 0.1 * (high[other] - low[other])
+    inside = steep & (crossing[:, other] > low[other] + margin) & (crossing[:, other] < high[other] - margin)
+    inside &= (crossing[:, 1] > low[1] + 0.3 * (high[1] - low[1])) & (crossing[:, 1] < high[1] + reach_m)
+    gap = (hit - crossing)[:, 1]
+    inside &= (gap > -_BEFORE_M) & (ray[:, 1] > 0)
+    return crossing[inside, 1], gap[inside]
+
+
+def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reach_m: float) -> tuple[float, float] | None:
+    """The last y at which the surface is the face, and the first at which it is the wall; None where no edge shows.
+
+    Bins of y are told apart by least absolute deviations. Between the two lie the pixels that a phone drops at an edge.
+    """
+    index = np.floor(crossing / _BIN_M).astype(int)
+    bins = np.array([k for k in np.unique(index) if np.count_nonzero(index == k) >= _LEAST])
+    if len(bins) < _LEAST_BINS:
+        return None
+    y = (bins + 0.5) * _BIN_M
+    gap = np.array([np.median(behind[index == k]) for k in bins])
+    misfits = []
+    for k in range(1, len(bins) - 1):
+        wall = np.median(gap[k:] + y[k:])  # what is behind is upright: the gap shrinks by as much as y grows
+        beyond = np.abs(gap[k:] + y[k:] - wall).sum() if wall - y[k] > _LEAST_GAP_M else np.inf
+        misfits.append(float(np.abs(gap[:k]).sum() + beyond))
+    best = int(np.argmin(misfits)) + 1
+    if misfits[best - 1] > _CLEARER * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
+        return None
+    return float(y[best - 1]), float(y[best] - _BIN_M / 2)
