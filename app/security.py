@@ -25,6 +25,7 @@ PAGE_POLICY = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "frame-src 'self'; worker-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
 )
+SESSION_ENDED = 4401  # closes a WebSocket whose session has ended; HTTP says 401
 NO_SESSION = "sign in, or open the address that `r2c2r serve` printed: it carries the key to this app"
 
 

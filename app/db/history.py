@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from sqlalchemy import func
 from sqlmodel import Session, col, select
 
 from app.db.tables import Event, Override, Point, Project, SceneObject, Verdict
@@ -94,6 +95,14 @@ def last_change(session: Session, project_id: str, scope: Scope, direction: Lite
             continue
         best = max(best, (when, object_id)) if best else (when, object_id)
     return best[1] if best else None
+
+
+def version_of(session: Session, item: SceneObject, scope: Scope) -> int:
+    """A number that grows with every change of the object in this scope; 0 before the first."""
+    query = select(func.max(Event.id)).where(
+        Event.project_id == item.project_id, Event.object_id == item.id, Event.scope == scope
+    )
+    return session.exec(query).one() or 0
 
 
 def snapshot(session: Session, item: SceneObject, scope: Scope) -> State:

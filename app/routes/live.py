@@ -7,7 +7,10 @@ import json
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from app.hub import Hub, Listener
+from app.security import SESSION_ENDED
 from app.services.context import Context
+from app.services.people import People
+from app.tasks import until_first
 
 router = APIRouter()
 
@@ -23,12 +26,11 @@ async def live(socket: WebSocket, project: str | None = None, since: int | None 
     try:
         hello = {"type": "hello", "epoch": context.hub.epoch, "seq": context.hub.seq, "reset": must_fetch, "tab": listener.tab}
         await socket.send_json(hello)
-        listening = asyncio.create_task(_listen(socket, listener, context.hub))
-        speaking = asyncio.create_task(_speak(socket, listener, context.hub))
-        _, pending = await asyncio.wait({listening, speaking}, return_when=asyncio.FIRST_COMPLETED)
-        for task in pending:
-            task.cancel()
-        await asyncio.gather(listening, speaking, return_exceptions=True)
+        await until_first(
+            lambda: _listen(socket, listener, context.hub),
+            lambda: _speak(socket, listener, context.hub),
+            lambda: _follow_person(socket, listener, context.people),
+        )
     except (WebSocketDisconnect, RuntimeError):
         pass
     finally:
@@ -57,3 +59,12 @@ async def _listen(socket: WebSocket, listener: Listener, hub: Hub) -> None:
                     page[:20] if isinstance(page, str) else "",
                     number if isinstance(number, int) else None,
                 )
+
+
+async def _follow_person(socket: WebSocket, listener: Listener, people: People) -> None:
+    """Say when the person may do more or less than before; close when the session has ended."""
+    person = socket.state.person
+    while (now := await people.until_other(socket.state.session, person)) is not None:
+        person = now
+        listener.queue.put_nowait({"type": "you", "name": person.name, "role": person.role})
+    await socket.close(SESSION_ENDED, "the session has ended")

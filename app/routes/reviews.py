@@ -1,11 +1,15 @@
 """Candidates, what people say about them, and what they correct."""
 
-from fastapi import APIRouter, Request
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
 
 from app import schemas
 from app.deps import Ctx, ReviewerCtx
 from app.routes.numbers import RowId
 from app.services import overlays, reviews
+
+Version = Annotated[int | None, Query(ge=0)]
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
 
@@ -24,15 +28,21 @@ def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.Candida
 
 @router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201)
 async def upload_candidate(
-    context: ReviewerCtx, request: Request, project: str, object: RowId, filename: str, rerun: bool = True
+    context: ReviewerCtx,
+    request: Request,
+    project: str,
+    object: RowId,
+    filename: str,
+    rerun: bool = True,
+    version: Version = None,
 ) -> schemas.Reviewed:
     """A mesh (the request's body: GLB, OBJ, PLY or STL) as this object's candidate, chosen by a person."""
-    return await reviews.upload(context, project, object, filename, request.stream(), rerun)
+    return await reviews.upload(context, project, object, filename, request.stream(), rerun, version)
 
 
 @router.post("/objects/{object}/verdicts", operation_id="giveVerdict")
 def give_verdict(context: ReviewerCtx, project: str, object: RowId, body: schemas.VerdictIn) -> schemas.Reviewed:
-    """Accept, reject or clear; undo with scope `review`."""
+    """Accept, reject or clear; undo with scope `review`. 409 with both versions when `version` is old."""
     return reviews.give_verdict(context, project, object, body)
 
 
@@ -44,7 +54,7 @@ def get_override(context: Ctx, project: str, object: RowId) -> schemas.OverrideD
 
 @router.patch("/objects/{object}/override", operation_id="setOverride")
 def set_override(context: ReviewerCtx, project: str, object: RowId, body: schemas.OverridePatch) -> schemas.Reviewed:
-    """Correct the object; what depends on it runs again."""
+    """Correct the object; what depends on it runs again. 409 with both versions when `version` is old."""
     return reviews.set_override(context, project, object, body)
 
 

@@ -22,7 +22,7 @@ from app.schemas.objects import (
     Undone,
     UndoRequest,
 )
-from app.schemas.people import Credentials
+from app.schemas.people import AccountIn, AccountInfo, AccountPatch, Credentials, PasswordChange
 from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo
 from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, ProjectPatch, SampleRequest
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
@@ -34,6 +34,9 @@ from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerShown
 
 __all__ = [
+    "AccountIn",
+    "AccountInfo",
+    "AccountPatch",
     "Backend",
     "Bundle",
     "BundleChange",
@@ -73,6 +76,7 @@ __all__ = [
     "OverlayOf",
     "OverrideData",
     "OverridePatch",
+    "PasswordChange",
     "Photo",
     "Placement",
     "Point",

@@ -60,6 +60,7 @@ class CandidateGroup(Shape):
     candidates: list[Candidate]
     placement: Placement | None
     override: "OverrideData"
+    version: int  # grows with every verdict, correction and undo of them
     can_undo: bool
     can_redo: bool
 
@@ -71,6 +72,7 @@ class VerdictIn(Shape):
     verdict: Literal["accepted", "rejected", "cleared"]
     reason: str = Field(default="", max_length=500)
     rerun: bool = True
+    version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
 
 
 class OverrideData(Shape):
@@ -97,6 +99,7 @@ class OverridePatch(Shape):
     joint_upper: float | None = Field(default=None, allow_inf_nan=False)
     regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES)  # times further candidates were asked for
     rerun: bool = True
+    version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
 
 
 class Reviewed(Shape):

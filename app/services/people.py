@@ -1,16 +1,19 @@
 """Who is here: the browsers that were let in, by the printed key or by a password."""
 
+import asyncio
+import contextlib
 import hashlib
 import hmac
 import secrets
 import time
 
+import anyio
 from sqlalchemy import Engine
 from sqlmodel import col, delete, select
 
 from app.db.engine import reading, writing
 from app.db.tables import Account, SignIn
-from app.errors import Unauthorised
+from app.errors import Conflict, Forbidden, Unauthorised
 from app.security import Person
 from app.services import accounts
 from app.services.attempts import Attempts
@@ -27,6 +30,7 @@ class People:
         self._engine, self._settings = engine, settings
         self._attempts = Attempts()
         self._known: dict[str, tuple[float, Person]] = {}
+        self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
 
     def of(self, session_id: str) -> Person | None:
         """Whose session it is; None when nobody's."""
@@ -39,6 +43,30 @@ class People:
         if person is not None:
             self._known[session_id] = (now + REMEMBERED_S, person)
         return person
+
+    async def until_other(self, session_id: str, person: Person) -> Person | None:
+        """Wait until the session is not that person's any more: then whose it is, such as the same one's with another role.
+
+        What this process did is noticed at once, what another did (`r2c2r user`) after REMEMBERED_S.
+        """
+        woken = asyncio.Event()
+        waiting = (asyncio.get_running_loop(), woken)
+        self._waiting.add(waiting)
+        try:
+            while (found := await anyio.to_thread.run_sync(self.of, session_id)) == person:
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(woken.wait(), REMEMBERED_S)
+                woken.clear()
+            return found
+        finally:
+            self._waiting.discard(waiting)
+
+    def look_again(self) -> None:
+        """Accounts or sessions changed: nobody is taken for who they were, on open connections neither."""
+        self._known.clear()
+        for loop, woken in tuple(self._waiting):
+            with contextlib.suppress(RuntimeError):  # its loop is gone
+                loop.call_soon_threadsafe(woken.set)
 
     def enter_with_key(self, key: str) -> str:
         """A new session of whoever started the server; raises Unauthorised for a wrong key."""
@@ -58,9 +86,22 @@ class People:
 
     def sign_out(self, session_id: str) -> None:
         """The session is nobody's any more."""
-        self._known.pop(session_id, None)
         with writing(self._engine) as session:
             session.exec(delete(SignIn).where(col(SignIn.digest) == _digest(session_id)))
+        self.look_again()
+
+    def change_password(self, person: Person, old: str, new: str, client: str) -> str:
+        """The person's own password; every session of theirs ends, and a new one is returned."""
+        if not person.account:
+            raise Conflict("who started the server has no password", hint="make an account: r2c2r user add NAME --role admin")
+        self._attempts.check(person.name, client)
+        account = accounts.verified(self._engine, person.name, old)
+        if account is None:
+            self._attempts.failed(person.name, client)
+            raise Forbidden("the present password is wrong", hint="an admin can set a new one")
+        accounts.set_password(self._engine, person.name, new)
+        self.look_again()
+        return self._begin(account.id)
 
     def _begin(self, account_id: int | None) -> str:
         session_id, now = secrets.token_urlsafe(32), time.time()

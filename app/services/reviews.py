@@ -16,7 +16,7 @@ from app.db import history, queries
 from app.db.documents import overrides_entry
 from app.db.engine import reading, writing
 from app.db.tables import Project, SceneObject, Verdict
-from app.errors import NotFound, NotReady, TooLarge
+from app.errors import Conflict, NotFound, NotReady, TooLarge
 from app.files import ProjectFiles, inside, require_free, safe_name
 from app.jobs.plain import plain
 from app.services import jobs
@@ -54,6 +54,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
+        _refuse_overtaken(context, session, project, item, body)
         facts = _candidate_facts(context.files(project), item.name)
         before = history.override_data(session, item)
         known = {c["candidate_id"] for c in facts["candidates"]} if facts else set()
@@ -77,10 +78,11 @@ def get_override(context: Context, project_id: str, object_id: int) -> schemas.O
 
 def set_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> schemas.Reviewed:
     """Correct the object; the fields that were sent are set, null clears."""
-    wanted = {key: value for key, value in body.model_dump(exclude_unset=True).items() if key != "rerun"}
+    wanted = {key: value for key, value in body.model_dump(exclude_unset=True).items() if key not in ("rerun", "version")}
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
+        _refuse_overtaken(context, session, project, item, body)
         before = history.override_data(session, item)
         merged = {key: value for key, value in {**before, **wanted}.items() if value is not None}
         _check_override(context, project, item, merged)
@@ -93,7 +95,13 @@ def set_override(context: Context, project_id: str, object_id: int, body: schema
 
 
 async def upload(
-    context: Context, project_id: str, object_id: int, filename: str, stream: AsyncIterator[bytes], rerun: bool
+    context: Context,
+    project_id: str,
+    object_id: int,
+    filename: str,
+    stream: AsyncIterator[bytes],
+    rerun: bool,
+    version: int | None = None,
 ) -> schemas.Reviewed:
     """A mesh that a person made, as the object's candidate."""
     suffix = Path(safe_name(filename)).suffix.lower()
@@ -106,7 +114,7 @@ async def upload(
     stem = re.sub(r"[^A-Za-z0-9_]+", "_", Path(safe_name(filename)).stem)[:40] or "mesh"
     target = context.files(project).uploads / item.name / f"{stem}-{int(time.time())}{suffix}"
     await _receive(stream, target)
-    patch = schemas.OverridePatch(candidate=str(target), rerun=rerun)
+    patch = schemas.OverridePatch(candidate=str(target), rerun=rerun, version=version)
     return await anyio.to_thread.run_sync(set_override, context, project_id, object_id, patch)
 
 
@@ -140,6 +148,27 @@ async def _receive(stream: AsyncIterator[bytes], target: Path) -> None:
     except BaseException:
         target.unlink(missing_ok=True)
         raise
+
+
+def _refuse_overtaken(
+    context: Context, session: Session, project: Project, item: SceneObject, body: schemas.VerdictIn | schemas.OverridePatch
+) -> None:
+    """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
+    if body.version is None or body.version == history.version_of(session, item, "review"):
+        return
+    shown = _group(context, session, project, item)
+    last = history.stacks_of(session, project.id, item.id, "review").done[-1:]
+    said = f": {last[0].who}, {last[0].text}" if last else ""
+    raise Conflict(
+        f"{item.name} was reviewed meanwhile{said}",
+        hint="look at both, then keep yours or take theirs",
+        current={
+            "version": history.version_of(session, item, "review"),
+            "override": history.override_data(session, item),
+            "group": shown.model_dump() if shown else None,
+            "yours": body.model_dump(exclude_unset=True, exclude={"rerun", "version"}),
+        },
+    )
 
 
 def _store_verdict(session: Session, item: SceneObject, body: schemas.VerdictIn, who: str) -> None:
@@ -238,6 +267,7 @@ def _group(context: Context, session: Session, project: Project, item: SceneObje
         candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],
         placement=_placement(placement) if placement else None,
         override=_override_shape(override),
+        version=history.version_of(session, item, "review"),
         can_undo=bool(stacks.done),
         can_redo=bool(stacks.undone),
     )

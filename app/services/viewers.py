@@ -80,7 +80,14 @@ async def socket(context: Context, token: str, connection: WebSocket) -> None:
         await connection.close(4403 if isinstance(error, Forbidden) else 1013, error.message)
         return
     with context.viewer.watched(token):
-        await proxy.pump(connection, port, context.viewer.key)
+        await proxy.pump(connection, port, context.viewer.key, lambda: _session_end(context, connection))
+
+
+async def _session_end(context: Context, connection: WebSocket) -> None:
+    """Returns when the session of the connection has ended; any role may look."""
+    person = connection.state.person
+    while person is not None:
+        person = await context.people.until_other(connection.state.session, person)
 
 
 def _chosen(context: Context, project_id: str, object_id: int) -> str:

@@ -1,8 +1,8 @@
 """viser through the app's own origin: its page with our rules in it, and its connection pumped both ways."""
 
-import asyncio
 import contextlib
 import http.client
+from collections.abc import Awaitable, Callable
 
 import anyio
 import websockets
@@ -11,6 +11,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.typing import Subprotocol
 
 from app.errors import NotFound, Unavailable
+from app.security import SESSION_ENDED
+from app.tasks import until_first
 from app.viewer.contract import KEY_HEADER
 
 PAGE_POLICY = (
@@ -39,8 +41,8 @@ async def fetch_page(port: int, path: str, key: str) -> Response:
     return Response(content, headers=headers)
 
 
-async def pump(socket: WebSocket, port: int, key: str) -> None:
-    """Carry messages both ways until either side leaves."""
+async def pump(socket: WebSocket, port: int, key: str, session_end: Callable[[], Awaitable[object]]) -> None:
+    """Carry messages both ways until either side leaves, or who looks may not look any more."""
     wanted = [Subprotocol(name) for name in socket.scope["subprotocols"]]
     try:
         upstream = await websockets.connect(
@@ -56,12 +58,11 @@ async def pump(socket: WebSocket, port: int, key: str) -> None:
         return
     async with upstream:
         await socket.accept(subprotocol=upstream.subprotocol)
-        tasks = {asyncio.create_task(_up(socket, upstream)), asyncio.create_task(_down(socket, upstream))}
-        _, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in pending:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        first = await until_first(lambda: _up(socket, upstream), lambda: _down(socket, upstream), session_end)
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # already closed by the browser
+        if first == 2:
+            await socket.close(SESSION_ENDED, "the session has ended")
+            return
         await socket.close(upstream.close_code if upstream.close_code in (1002, 1011) else 1000)
 
 

@@ -1,5 +1,27 @@
 // Generated from the app's OpenAPI document by `python -m app.openapi_types`. Do not edit.
 
+/** A new account. */
+export interface AccountIn {
+  name: string;
+  role: "annotator" | "reviewer" | "admin";
+  password: string;
+}
+
+/** An account as an admin sees it. */
+export interface AccountInfo {
+  name: string;
+  role: "annotator" | "reviewer" | "admin";
+  created: number;
+  used: number | null;
+  you: boolean;
+}
+
+/** What changes; a new password ends the account's sessions. */
+export interface AccountPatch {
+  role?: "annotator" | "reviewer" | "admin" | null;
+  password?: string | null;
+}
+
 /** One way to do a stage's work. */
 export interface Backend {
   name: string;
@@ -73,6 +95,7 @@ export interface CandidateGroup {
   candidates: Candidate[];
   placement: Placement | null;
   override: OverrideData;
+  version: number;
   can_undo: boolean;
   can_redo: boolean;
 }
@@ -406,6 +429,13 @@ export interface OverridePatch {
   joint_upper?: number | null;
   regenerate?: number | null;
   rerun?: boolean;
+  version?: number | null;
+}
+
+/** One's own password. */
+export interface PasswordChange {
+  old: string;
+  new: string;
 }
 
 /** A frame that shows the object well, with its pinhole camera (pixels of the stored frame, OpenCV axes). */
@@ -735,6 +765,7 @@ export interface VerdictIn {
   verdict: "accepted" | "rejected" | "cleared";
   reason?: string;
   rerun?: boolean;
+  version?: number | null;
 }
 
 /** One joint of the scene the 3D view shows. */
@@ -774,6 +805,16 @@ export interface ViewerShown {
 
 /** Every endpoint by its name. */
 export interface Operations {
+  /** POST /api/account/password */
+  changePassword: { parameters: Record<string, never>; body: PasswordChange; answer: unknown };
+  /** GET /api/accounts */
+  listAccounts: { parameters: Record<string, never>; body: undefined; answer: AccountInfo[] };
+  /** POST /api/accounts */
+  addAccount: { parameters: Record<string, never>; body: AccountIn; answer: AccountInfo };
+  /** DELETE /api/accounts/{name} */
+  removeAccount: { parameters: { name: string }; body: undefined; answer: unknown };
+  /** PATCH /api/accounts/{name} */
+  changeAccount: { parameters: { name: string }; body: AccountPatch; answer: AccountInfo };
   /** GET /api/browse */
   browse: { parameters: { path?: string | null }; body: undefined; answer: FolderListing };
   /** GET /api/health */
@@ -849,7 +890,7 @@ export interface Operations {
   /** GET /api/projects/{project}/objects/{object}/candidates */
   getCandidates: { parameters: { project: string; object: number }; body: undefined; answer: CandidateGroup };
   /** POST /api/projects/{project}/objects/{object}/candidates */
-  uploadCandidate: { parameters: { project: string; object: number; filename: string; rerun?: boolean }; body: undefined; answer: Reviewed };
+  uploadCandidate: { parameters: { project: string; object: number; filename: string; rerun?: boolean; version?: number | null }; body: undefined; answer: Reviewed };
   /** POST /api/projects/{project}/objects/{object}/clicks */
   addPoints: { parameters: { project: string; object: number; infer?: boolean }; body: PointsIn; answer: SceneObject };
   /** GET /api/projects/{project}/objects/{object}/cloud */

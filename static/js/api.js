@@ -4,7 +4,8 @@
  *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
  *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
  *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ObjectPhotos, ViewerSession, ViewerShown, ViewerShow,
- *   BundleChange, BundleCheck, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload
+ *   BundleChange, BundleCheck, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo,
+ *   AccountIn, AccountPatch
  * } from "./api-types" */
 
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
@@ -98,6 +99,16 @@ const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
 /** @param {string} name @param {string} password */
 export const signIn = (name, password) => call("/api/login", { method: "POST", json: { name, password } });
 export const signOut = () => call("/api/logout", { method: "POST", json: {} });
+/** @param {string} old @param {string} now */
+export const changePassword = (old, now) => call("/api/account/password", { method: "POST", json: { old, new: now } });
+/** @returns {Promise<AccountInfo[]>} */
+export const listAccounts = () => get("/api/accounts");
+/** @param {AccountIn} account @returns {Promise<AccountInfo>} */
+export const addAccount = (account) => send("POST", "/api/accounts", account);
+/** @param {string} name @param {Partial<AccountPatch>} patch @returns {Promise<AccountInfo>} */
+export const changeAccount = (name, patch) => send("PATCH", `/api/accounts/${encodeURIComponent(name)}`, patch);
+/** @param {string} name */
+export const removeAccount = (name) => call(`/api/accounts/${encodeURIComponent(name)}`, { method: "DELETE" });
 /** @returns {Promise<SystemInfo>} */
 export const getSystem = () => get("/api/system");
 /** @param {string} path @returns {Promise<FolderListing>} */

@@ -2,6 +2,8 @@
 
 /** @typedef {{ type: string, seq?: number, [key: string]: unknown }} Message */
 
+const SESSION_ENDED = 4401;
+
 class Live extends EventTarget {
   /** @type {WebSocket | null} */
   #socket = null;
@@ -60,7 +62,8 @@ class Live extends EventTarget {
       this.dispatchEvent(new Event("online"));
     });
     socket.addEventListener("message", (event) => this.#receive(JSON.parse(String(event.data))));
-    socket.addEventListener("close", () => {
+    socket.addEventListener("close", ({ code }) => {
+      if (code === SESSION_ENDED) return location.assign(`/login?${new URLSearchParams({ next: location.pathname })}`);
       this.dispatchEvent(new Event("offline"));
       setTimeout(() => this.#open(), this.#wait);
       this.#wait = Math.min(this.#wait * 1.8, 8000);

@@ -18,7 +18,7 @@ from tests.app.conftest import ORIGIN, SOCKETS, Running, running
 
 PASSWORD = "correct horse battery"
 REVIEWER = {"uploadCandidate", "giveVerdict", "setOverride"}
-ADMIN = {"importProject", "deleteProject", "browse"}
+ADMIN = {"importProject", "deleteProject", "browse", "listAccounts", "addAccount", "changeAccount", "removeAccount"}
 OPEN = {"health", "signIn"}
 
 
@@ -174,6 +174,82 @@ def test_a_new_password_and_a_removed_account_end_sessions(shared: Running) -> N
     assert client.post("/api/login", json={"name": "leaving", "password": PASSWORD + "!"}).status_code == 204
     accounts.remove(engine, "leaving")
     Running.until(lambda: client.get("/api/projects").status_code == 401)
+
+
+def closed_with(socket: Any) -> int:
+    """The code that an open connection is closed with, whatever it says before."""
+    while True:
+        try:
+            socket.receive_json()
+        except WebSocketDisconnect as closed:
+            return closed.code
+
+
+def connection(client: TestClient) -> Any:
+    return client.websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN})
+
+
+def test_signing_out_closes_the_open_connections_of_that_session_and_no_other(shared: Running) -> None:
+    with (
+        signed_in(shared, "the-reviewer") as leaving,
+        signed_in(shared, "the-reviewer") as staying,
+        connection(leaving) as gone,
+        connection(staying) as kept,
+    ):
+        gone.receive_json()
+        leaving.post("/api/logout")
+        assert closed_with(gone) == 4401
+        kept.send_text('{"type": "watch", "project": "p"}')
+        assert {kept.receive_json()["type"] for _ in range(2)} == {"hello", "presence"}
+
+
+def test_an_admin_lets_somebody_in_changes_what_they_may_and_removes_them(shared: Running) -> None:
+    with signed_in(shared, "the-admin") as admin:
+        new = {"name": "Eve", "role": "annotator", "password": PASSWORD}
+        assert admin.post("/api/accounts", json=new).json()["name"] == "eve"
+        assert admin.post("/api/accounts", json=new).status_code == 409
+        assert admin.post("/api/accounts", json={**new, "name": "short", "password": "short"}).status_code == 422
+        eve = browser(shared)
+        eve.post("/api/login", json={"name": "eve", "password": PASSWORD})
+        assert eve.get("/api/system").json()["role"] == "annotator"
+        with connection(eve) as socket:
+            socket.receive_json()
+            assert admin.patch("/api/accounts/eve", json={"role": "reviewer"}).json()["role"] == "reviewer"
+            assert socket.receive_json() == {"type": "you", "name": "eve", "role": "reviewer"}
+            assert eve.get("/api/system").json()["role"] == "reviewer"
+            assert admin.delete("/api/accounts/eve").status_code == 204
+            assert closed_with(socket) == 4401
+        assert eve.get("/api/projects").status_code == 401
+        assert {each["name"]: each["you"] for each in admin.get("/api/accounts").json()}["the-admin"] is True
+
+
+def test_what_the_command_line_changes_reaches_open_connections(shared: Running) -> None:
+    engine = shared.context.engine
+    accounts.add(engine, "visitor", "annotator", PASSWORD)
+    client = browser(shared)
+    client.post("/api/login", json={"name": "visitor", "password": PASSWORD})
+    with connection(client) as socket:
+        socket.receive_json()
+        accounts.remove(engine, "visitor")
+        assert closed_with(socket) == 4401
+
+
+def test_the_last_admin_stays(shared: Running) -> None:
+    with signed_in(shared, "the-admin") as admin:
+        assert admin.delete("/api/accounts/the-admin").status_code == 409
+        assert admin.patch("/api/accounts/the-admin", json={"role": "annotator"}).status_code == 409
+
+
+def test_ones_own_password_needs_the_old_one_and_ends_other_sessions(shared: Running) -> None:
+    accounts.add(shared.context.engine, "careful", "annotator", PASSWORD)
+    here, there = browser(shared), browser(shared)
+    for client in (here, there):
+        client.post("/api/login", json={"name": "careful", "password": PASSWORD})
+    wrong = {"old": "not this one", "new": PASSWORD + "?"}
+    assert here.post("/api/account/password", json=wrong).status_code == 403
+    assert here.post("/api/account/password", json={**wrong, "old": PASSWORD}).status_code == 204
+    assert here.get("/api/projects").status_code == 200
+    assert there.get("/api/projects").status_code == 401
 
 
 def test_a_local_session_is_worth_nothing_once_others_can_reach_the_server(start: Callable[..., Any]) -> None:

@@ -214,3 +214,29 @@ def test_only_what_changes_the_result_makes_it_stale(reviewed: Reviewed) -> None
     assert web.get(f"/api/projects/{project}")["result"] == "stale"
     web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
     assert web.get(f"/api/projects/{project}")["result"] == "current"
+
+
+def test_a_verdict_or_correction_on_what_somebody_changed_meanwhile_is_refused_with_both(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    at = f"/api/projects/{project}/objects/{number}"
+    seen = web.get(f"{at}/candidates")["version"]
+    said = web.patch(f"{at}/override", {"hinge": "left", "rerun": False, "version": seen})
+    assert said["group"]["version"] > seen
+    mine = {"hinge": "right", "rerun": False, "version": seen}
+    refused = web.patch(f"{at}/override", mine, 409)
+    assert (refused["kind"], "tester" in refused["message"]) == ("conflict", True)
+    assert (refused["current"]["override"]["hinge"], refused["current"]["yours"]) == ("left", {"hinge": "right"})
+    verdict = {"candidate": "c1", "verdict": "accepted", "rerun": False}
+    stale = web.post(f"{at}/verdicts", {**verdict, "version": seen}, 409)["current"]
+    assert stale["group"]["accepted"] is None
+    assert web.post(f"{at}/verdicts", {**verdict, "version": stale["version"]})["group"]["accepted"] == "c1"
+    again = web.patch(f"{at}/override", {**mine, "version": web.get(f"{at}/candidates")["version"]})
+    assert again["group"]["override"]["hinge"] == "right"
+
+
+def test_a_new_name_is_no_change_of_the_review(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    at = f"/api/projects/{project}/objects/{number}"
+    seen = web.get(f"{at}/candidates")["version"]
+    web.patch(at, {"category": "oven"})
+    web.patch(f"{at}/override", {"hinge": "left", "rerun": False, "version": seen})

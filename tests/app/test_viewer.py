@@ -49,6 +49,15 @@ def test_messages_go_both_ways_under_the_clients_own_protocol(seen: Running) -> 
         assert socket.receive_text() == "hello"
 
 
+def test_signing_out_closes_the_3d_view(seen: Running) -> None:
+    url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
+    with seen.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
+        assert seen.client.post("/api/logout").status_code == 204
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_bytes()
+    assert closed.value.code == 4401
+
+
 def test_a_token_serves_the_session_it_was_made_for_only(seen: Running) -> None:
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"]
     other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})

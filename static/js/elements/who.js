@@ -2,10 +2,16 @@
 
 import { getSystem, signOut } from "../api.js";
 import { h, LiveElement } from "../dom.js";
+import { live } from "../live.js";
 import { sayError } from "./toasts.js";
 
 export class WhoIsIn extends LiveElement {
-  async connected() {
+  connected() {
+    live.addEventListener("you", () => this.#draw(), { signal: this.signal });
+    this.#draw();
+  }
+
+  async #draw() {
     try {
       const { user, role, account } = await getSystem();
       if (!account) return;
