@@ -15,7 +15,7 @@ from r2c2r_core.generate.evidence import Evidence, masked_points
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.symmetry import Revolution, best_mirror
 from r2c2r_core.generate.variation import Variation
-from r2c2r_core.generate.votes import collect_votes
+from r2c2r_core.generate.votes import grid_votes
 from r2c2r_core.geometry.meshes import largest_component, simplify, volume
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 
@@ -23,7 +23,7 @@ _MOST_VOXELS = 1_000_000
 _MOST_CELLS = 160  # along the longest side: 6 mm on a chair
 _TRUNCATION_VOXELS = 3.0
 _LEAST_TRUNCATION_M = 0.012  # LiDAR noise and pose error together
-_LEVELS_M = (-0.004, -0.002, 0.0, 0.002, 0.004)
+_OUTWARDS_M, _INWARDS_M = (0.002, 0.004), (-0.002, -0.004)
 _MOST_FACES = 6000
 _LEAST_POINTS = 60
 _COMPONENT_CELL_M = 0.03
@@ -170,7 +170,7 @@ def _solid_field(
 
     centres = grid.centres()
     truncation = max(_TRUNCATION_VOXELS * grid.voxel_m, _LEAST_TRUNCATION_M)
-    votes = collect_votes(world_from_local.apply(centres), variation, truncation)
+    votes = grid_votes(centres, grid.shape, grid.voxel_m, variation, truncation, world_from_local)
     bounds = np.maximum(low - centres, centres - high).max(axis=1)
     prior = np.maximum(bounds, revolution.signed_distance(centres)) if revolution is not None else bounds
     prior = np.clip(prior, -truncation, truncation)
@@ -214,16 +214,19 @@ def _best_level(
     grid: Grid, field: np.ndarray, floor: float | None, evidence: Evidence, variation: Variation, world_from_local: Rigid3
 ) -> tuple[Points, Faces, float]:
     """The surface at the level, within ±4 mm, whose silhouettes agree best with the masks: masks and votes err to one side."""
-    best: tuple[float, float, Points, Faces] | None = None
     views = variation.views[:: max(len(variation.views) // 5, 1)]
-    for level in _LEVELS_M:
-        extracted = _extract(grid, field, level, floor)
-        if extracted is None:
-            continue
-        vertices, faces = extracted
-        score = silhouette_iou(world_from_local.apply(vertices), faces, views)
-        if best is None or score > best[0]:
-            best = (score, level, vertices, faces)
+    best: tuple[float, float, Points, Faces] | None = None
+    for levels in ((0.0,), _OUTWARDS_M, _INWARDS_M):  # the agreement has one peak: climb it
+        for level in levels:
+            extracted = _extract(grid, field, level, floor)
+            if extracted is None:
+                break
+            score = silhouette_iou(world_from_local.apply(extracted[0]), extracted[1], views)
+            if best is not None and score <= best[0]:
+                break
+            best = (score, level, *extracted)
+        if best is not None and best[1] > 0:
+            break
     if best is None:
         raise GenerationFailed(f"{evidence.track.name}: carving left nothing", hint="its masks disagree; add a click")
     _, level, vertices, faces = best

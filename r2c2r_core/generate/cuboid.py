@@ -29,6 +29,7 @@ _WALL_M = 0.003  # how far a box may stand in a wall
 _USUAL_DEPTH, _DEPTH_SPREAD = 0.5, 0.35  # of the width: all that is known of a box seen squarely
 _STARTS = (0.25, 0.5, 1.0)  # depths to start from, of the width
 _SAME_YAW = np.radians(2.0)
+_NO_BOX_M = 0.012  # depth points lie this far from anything that is no box
 _ROUGH_ROUNDS, _ROUNDS = 8, 12
 _ALONG_PX = 2.5  # depth pixels to either side of an outline, where it is judged whose outline it is
 _BEFORE_M = 0.03
@@ -61,7 +62,8 @@ def fit_cuboid(
     *,
     yaw_sigma_rad: float = np.pi,
 ) -> Cuboid | None:
-    """The box nearest to points and outlines, from the box `low`..`high` of the local frame; None without three outlines.
+    """The box nearest to points and outlines, from the box `low`..`high` of the local frame; None without three outlines,
+    or where the points lie on no box.
 
     The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame. `yaw_sigma_rad` is how
     well the local frame's own yaw is known.
@@ -75,7 +77,10 @@ def fit_cuboid(
     rough = _Problem(chosen[::4], coarse, world_from_local, walls, bottom, yaw_sigma_rad)
     tried = [rough.fitted(start, _ROUGH_ROUNDS) for start in _starts(chosen, float(high[2]))]
     problem = _Problem(chosen, outlines, world_from_local, walls, bottom, yaw_sigma_rad)
-    best, cost = problem.fitted(min(tried, key=lambda found: found[1])[0], _ROUNDS)
+    start = min(tried, key=lambda found: found[1])[0]
+    if rough.median_distance(start) > _NO_BOX_M:
+        return None
+    best, cost = problem.fitted(start, _ROUNDS)
     sizes = np.array([best[2] - best[1], best[4] - best[3], best[5] - low[2]])
     if (sizes < 0.005).any():
         return None
@@ -150,6 +155,10 @@ class _Problem:
                 if damping > 1e3:
                     break
         return current, cost
+
+    def median_distance(self, parameters: np.ndarray) -> float:
+        """Of the depth points from the box's surface, metres."""
+        return float(np.median(np.abs(self._residuals(parameters)[: len(self._points)])))
 
     def size_sigma(self, parameters: np.ndarray) -> Vector3:
         """Standard deviation of width, depth and height by the curvature at the fit, the depth's prior left out."""

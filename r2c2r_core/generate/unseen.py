@@ -10,7 +10,7 @@ _LEAST_SHARE = 0.15  # of a side that must be seen before its own colours are us
 _BEFORE_FACE_M = 0.002
 _NEIGHBOURS = 4
 _MOST_KNOWN = 12_000
-_CELLS_A_REACH = 40  # colours fade over a reach: within a cell they hardly change
+_CELLS_A_REACH = 20  # colours fade over a reach: within a cell they hardly change
 _REACH = 0.15  # of the mesh's size: further from anything seen, the median colour is as good a guess
 
 

@@ -9,7 +9,9 @@ from r2c2r_core.arrays import Points
 from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
 
+_BLOCK = 4  # voxels, each way
 _OCCLUDER_GAP_M = 0.03  # depth this much nearer than a voxel belongs to something in front of it
 
 
@@ -45,6 +47,43 @@ def collect_votes(centres_world: Points, variation: Variation, truncation: float
     # a few frames whose mask misses a part must not carve what most frames see as surface
     outvoted = free_count < 0.4 * (free_count.astype(np.float32) + solid)
     return Votes(distance, np.where(outvoted, -np.inf, largest[-1]), outside)
+
+
+def grid_votes(
+    centres_local: Points,
+    shape: tuple[int, int, int],
+    voxel_m: float,
+    variation: Variation,
+    truncation: float,
+    world_from_local: Rigid3,
+) -> Votes:
+    """The same of a whole grid (last axis fastest); blocks that lie clearly outside the masks are not looked at in detail."""
+    grid = centres_local.reshape(*shape, 3)
+    middles = grid[np.ix_(*[np.minimum(np.arange(0, n, _BLOCK) + _BLOCK // 2, n - 1) for n in shape])]
+    reach = max(
+        _BLOCK * voxel_m, truncation
+    )  # from a block's middle to its furthest voxel, and as far as anything is told apart
+    away = _is_outside(world_from_local.apply(middles.reshape(-1, 3)), variation, truncation, reach).reshape(middles.shape[:3])
+    for axis in range(3):
+        away = np.repeat(away, _BLOCK, axis=axis)
+    near = np.flatnonzero(~away[: shape[0], : shape[1], : shape[2]])
+    known = collect_votes(world_from_local.apply(centres_local[near]), variation, truncation)
+    votes = Votes(*(np.full(len(centres_local), value, np.float32) for value in (np.nan, truncation, truncation)))
+    for values, found in zip(votes, known, strict=True):
+        values[near] = found
+    return votes
+
+
+def _is_outside(points_world: Points, variation: Variation, truncation: float, reach_m: float) -> np.ndarray:
+    """Whether enough frames see each point free and further than `reach_m` outside their masks."""
+    free, solid = np.zeros(len(points_world), np.int64), np.zeros(len(points_world), np.int64)
+    for view in variation.views:
+        _, is_surface, free_m, outside_m = _view_distances(
+            points_world.astype(np.float32), view, variation.erosion_px, truncation
+        )
+        free += (free_m > reach_m) & np.isfinite(outside_m) & (outside_m > reach_m)
+        solid += is_surface
+    return np.asarray((free >= variation.carve_votes) & (free > solid))
 
 
 def _view_distances(

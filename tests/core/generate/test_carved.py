@@ -8,8 +8,10 @@ import pytest
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.things import thing_shape
-from r2c2r_core.generate.variation import draw_variation
+from r2c2r_core.generate.variation import draw_variation, whole_pool
+from r2c2r_core.generate.votes import collect_votes, grid_votes
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
+from r2c2r_core.geometry.transforms import Rigid3
 
 
 def carve(scene, seed=0):
@@ -55,3 +57,20 @@ def test_a_thing_without_a_box_is_carved_from_its_points_alone(bottle_scene):
     _, shape = carve((capture, replace(track, box=None)))
     assert np.ptp(shape.vertices_local, axis=0)[2] == pytest.approx(0.28, abs=0.03)
     assert is_watertight(shape.vertices_local, shape.faces)
+
+
+def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene):
+    """The votes of a grid by blocks against those of every voxel, where they decide anything."""
+    evidence = gather_evidence(*chair_scene, 10)
+    variation = whole_pool(evidence)
+    shape, voxel_m, truncation = (30, 30, 50), 0.02, 0.03
+    axes = [low + (np.arange(n) + 0.5) * voxel_m for low, n in zip((-0.3, -0.1, 0.0), shape, strict=True)]
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    every = collect_votes(centres, variation, truncation)
+    blocks = grid_votes(centres, shape, voxel_m, variation, truncation, Rigid3())
+    assert np.isnan(blocks.distance_m).sum() >= np.isnan(every.distance_m).sum()
+    free = np.isneginf(every.free_m)
+    assert (np.isneginf(blocks.free_m) == free).mean() > 0.999
+    np.testing.assert_allclose(
+        np.minimum(blocks.free_m, truncation)[~free], np.minimum(every.free_m, truncation)[~free], atol=1e-6
+    )
