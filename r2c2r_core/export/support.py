@@ -13,6 +13,7 @@ import numpy as np
 from r2c2r_core.arrays import Points
 from r2c2r_core.export.plan import WORLD, Body, Plan, collider_corners_world
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.materials import CHIPBOARD
 from r2c2r_core.model.scene import Box, Inertial, Link
 
 PLATE_M = 0.01
@@ -20,7 +21,6 @@ _FOOT_M = 0.02  # colliders are looked at this far above the lowest point
 _GAP_M = 1e-4  # no contact at rest, no visible fall
 _HIGHER_M, _LOWER_M = 0.02, 0.012  # what counts as standing on it: a support this far above or below the foot
 _SHARE = 0.3  # of the foot's corners
-_DENSITY_KG_M3 = 680.0
 
 
 def supported(plan: Plan) -> Plan:
@@ -92,7 +92,7 @@ def _plate(thing: Body, points: Points) -> Body:
     size = np.array([max(high[0] - low[0], 0.02), max(high[1] - low[1], 0.02), PLATE_M])
     centre = turn @ np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, 0.0])
     pose = Rigid3(turn, np.array([centre[0], centre[1], bottom - _GAP_M - PLATE_M / 2]))
-    mass = float(np.prod(size)) * _DENSITY_KG_M3
+    mass = float(np.prod(size)) * CHIPBOARD.density_kg_m3
     name = f"{thing.object_name}_support"
     link = Link(
         name=name,

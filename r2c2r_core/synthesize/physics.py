@@ -33,6 +33,14 @@ def inertial_of_pieces(pieces: Sequence[ConvexPiece], density_kg_m3: float) -> I
     return _combined(np.array(masses), np.array(centres), np.array(own))
 
 
+def weighing(inertial: Inertial, usual_kg: tuple[float, float] | None) -> Inertial:
+    """The same body scaled into the weight that its kind usually has: a coarse mesh's colliders hold air, or lack a handle."""
+    if usual_kg is None:
+        return inertial
+    scale = min(max(inertial.mass_kg, usual_kg[0]), usual_kg[1]) / inertial.mass_kg
+    return Inertial(mass_kg=inertial.mass_kg * scale, com_link=inertial.com_link, inertia=inertial.inertia * scale)
+
+
 def _box_inertia(mass_kg: float, size_m: Vector3, rotation: np.ndarray) -> np.ndarray:
     squares = np.asarray(size_m) ** 2
     return np.asarray(rotation @ np.diag(mass_kg / 12 * (squares.sum() - squares)) @ rotation.T)

@@ -9,6 +9,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.materials import THINGS, UNKNOWN_THING
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
@@ -17,11 +18,10 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_for, normalised
-from r2c2r_core.synthesize.fixtures.thing import DEFAULT_DENSITY_KG_M3, DENSITY_KG_M3
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
 from r2c2r_core.synthesize.layout import arrange
 from r2c2r_core.synthesize.opening import open_all
-from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes
+from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 
 _WOOD = (0.80, 0.76, 0.70)
@@ -120,7 +120,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     fitted = (vertices - (low + high) / 2) * (item.dimensions_m / np.maximum(high - low, 1e-6))
     pieces = convex_pieces(Solid(vertices=fitted, faces=asset.mesh.faces), item.dimensions_m, seed=seed)
-    density = DENSITY_KG_M3.get(normalised(item.category), DEFAULT_DENSITY_KG_M3)
+    material = THINGS.get(normalised(item.category), UNKNOWN_THING)
     link = Link(
         name=f"{item.name}_base",
         object_from_link=Rigid3(),
@@ -128,7 +128,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
         pieces=pieces,
         visual=None,
         colour=_WOOD,
-        inertial=inertial_of_pieces(pieces, density),
+        inertial=weighing(inertial_of_pieces(pieces, material.density_kg_m3), material.weight_kg),
     )
     return SceneObject(
         name=item.name,

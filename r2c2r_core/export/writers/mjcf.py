@@ -9,8 +9,8 @@ from pathlib import Path
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.stand import add_surroundings, add_view
 from r2c2r_core.export.writers.text import numbers, quat_wxyz_of
-from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.materials import ARMATURE, SURFACE_FRICTION
 
 _FRICTION = f"{SURFACE_FRICTION} 0.01 0.001"  # sliding, spinning, rolling
 

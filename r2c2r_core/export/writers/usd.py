@@ -14,8 +14,8 @@ import numpy as np
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.meshes import convex_hull
 from r2c2r_core.export.writers.text import quat_wxyz_of
-from r2c2r_core.export.writers.values import ARMATURE, SURFACE_FRICTION
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+from r2c2r_core.model.materials import ARMATURE, SURFACE_FRICTION
 
 ROOT = "/Scene"
 _FLOOR_M = 20.0

@@ -1,0 +1,100 @@
+"""What things weigh and how they resist: every number of the physics, with where it comes from.
+
+Of whole appliances and things the weight is known, not a density: an effective density turns a fixture's panels, or a thing's
+colliders, into a weight within that range. What no table was found for is called an own estimate or an own choice.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """A density for the panels of a fixture, or for the colliders of a thing."""
+
+    density_kg_m3: float
+    source: str
+    weight_kg: tuple[float, float] | None = None  # least and most of a usual whole one; None: a material, not a thing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointFeel:
+    """Resistance and strength of a joint (units: rad or m, N m or N)."""
+
+    damping: float
+    friction: float
+    effort: float
+    velocity: float
+    source: str
+
+
+_BOARD = "ANSI A208.1 grade M particleboard, 640-800 kg/m3; European melamine-faced boards of 16-19 mm lie at 600-720"
+
+CHIPBOARD = Material(density_kg_m3=680.0, source=_BOARD)
+WORKTOP = Material(density_kg_m3=700.0, source=f"{_BOARD}; a laminate on either side")
+REFRIGERATOR = Material(
+    density_kg_m3=340.0,
+    source="sellers' tables: 50-150 kg, one door and no side-by-side 50-100 kg; steel skin, foam and compressor shared out",
+    weight_kg=(50.0, 100.0),
+)
+OVEN = Material(
+    density_kg_m3=540.0,
+    source="own estimate: built-in ovens 0.6 m wide weigh 28-40 kg; sheet steel, wool and glass shared out",
+    weight_kg=(28.0, 40.0),
+)
+DISHWASHER = Material(
+    density_kg_m3=480.0,
+    source="sellers' tables: built-in dishwashers 27-45 kg; tub, motor and racks shared out",
+    weight_kg=(27.0, 45.0),
+)
+MICROWAVE = Material(
+    density_kg_m3=850.0,
+    source="sellers' tables: countertop microwaves 9-23 kg; sheet steel, transformer and magnetron shared out",
+    weight_kg=(9.0, 23.0),
+)
+HOOD = Material(
+    density_kg_m3=150.0,
+    source="own estimate: wall hoods 0.6 m wide weigh 8-16 kg; sheet steel round a fan, over the whole box",
+    weight_kg=(8.0, 16.0),
+)
+
+_STONEWARE = "own estimate: stoneware and porcelain weigh 2.0-2.4 g/cm3"
+
+THINGS: dict[str, Material] = {
+    "bottle": Material(
+        density_kg_m3=950.0,
+        source="own estimate: 0.25-1.5 l of water or oil (0.92-1.0 kg/l) and 20-500 g of bottle",
+        weight_kg=(0.2, 2.2),
+    ),
+    "can": Material(density_kg_m3=1000.0, source="own estimate: filled cans of 0.33-0.85 l", weight_kg=(0.3, 1.0)),
+    "mug": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; mugs of 0.25-0.4 l 250-450 g", weight_kg=(0.2, 0.5)),
+    "cup": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; cups 120-350 g", weight_kg=(0.12, 0.35)),
+    "bowl": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; bowls of 14-25 cm 300-1200 g", weight_kg=(0.2, 1.2)),
+    "plate": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; plates of 18-28 cm 300-900 g", weight_kg=(0.2, 0.9)),
+    "box": Material(
+        density_kg_m3=350.0, source="own choice: filled cartons, flour 600 and cereal 120 kg/m3", weight_kg=(0.05, 12.0)
+    ),
+    "chair": Material(
+        density_kg_m3=120.0,
+        source="own estimate: wooden kitchen chairs weigh 4-8 kg; over the hulls of its parts, air between them",
+        weight_kg=(3.5, 8.0),
+    ),
+    "toaster": Material(density_kg_m3=300.0, source="own estimate: two-slice toasters 1-2 kg", weight_kg=(0.9, 2.5)),
+    "kettle": Material(density_kg_m3=400.0, source="own estimate: kettles of 1-1.7 l 0.8-1.5 kg, empty", weight_kg=(0.7, 3.0)),
+}
+"""By category, for things whose mesh and colliders are their own."""
+
+UNKNOWN_THING = Material(density_kg_m3=400.0, source="own choice: household things lie between 100 and 1000 kg/m3")
+
+_OPENED = "own choice within 2010 ADA Standards 309.4 (one hand, at most 22.2 N)"
+_RELEASED = "enough to come to rest: lids without were measured to slam at 6.9 rad/s (Articraft, pull request 81)"
+
+HINGE_FEEL = JointFeel(damping=0.3, friction=0.15, effort=30.0, velocity=3.0, source=f"{_OPENED}; {_RELEASED}")
+SLIDE_FEEL = JointFeel(damping=8.0, friction=1.5, effort=80.0, velocity=1.0, source=f"{_OPENED}; {_RELEASED}")
+HEAVY_DOOR_FEEL = JointFeel(damping=0.8, friction=0.4, effort=40.0, velocity=3.0, source=f"{_OPENED}, seals; {_RELEASED}")
+
+SURFACE_FRICTION = 0.5
+"""Of every surface; dry wood on wood 0.25-0.5 and laminate 0.2-0.4 in friction tables. A gripper brings its own: MuJoCo takes
+the larger of two, PhysX their mean."""
+
+ARMATURE = {"revolute": 0.005, "prismatic": 0.02}
+"""kg m^2 and kg added to a joint for the solver's sake: own choice, under 2 % of a cabinet door's or a drawer's own."""

@@ -1,0 +1,76 @@
+"""Every number of the physics has a source, and what is built weighs and resists what such things do."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.model import materials
+from r2c2r_core.model.materials import THINGS, JointFeel, Material
+from r2c2r_core.model.scene import ConvexPiece
+from r2c2r_core.synthesize.fixtures.spec import Order
+from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
+from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, weighing
+
+MATERIALS = {name: value for name, value in vars(materials).items() if isinstance(value, Material)}
+FEELS = {name: value for name, value in vars(materials).items() if isinstance(value, JointFeel)}
+ONE_HAND_N, LEVER_M = 22.2, 0.4  # 2010 ADA Standards 309.4; handle to hinge of a usual door
+WEIGHED = {
+    "refrigerator": materials.REFRIGERATOR,
+    "fridge_freezer": materials.REFRIGERATOR,
+    "side_by_side_refrigerator": materials.REFRIGERATOR,
+    "oven": materials.OVEN,
+    "dishwasher": materials.DISHWASHER,
+    "microwave": materials.MICROWAVE,
+    "hood": materials.HOOD,
+}
+
+
+def built_weight_kg(category: str) -> float:
+    spec, _ = fixture_for(category)
+    assert spec.build is not None
+    build = spec.build(Order(dimensions_m=np.array(spec.dimensions_m), hinge=spec.default_hinge, handle=None))
+    return sum(inertial_of_boxes(part.boxes, part.density_kg_m3).mass_kg for part in build.parts)
+
+
+@pytest.mark.parametrize("name", [*MATERIALS, *THINGS, *FEELS])
+def test_every_value_names_its_source(name: str) -> None:
+    source = (MATERIALS | THINGS | FEELS)[name].source
+    assert len(source) > 20
+    assert any(ch.isdigit() for ch in source), "a source states figures that can be checked"
+
+
+def test_every_fixture_is_built_from_the_table() -> None:
+    densities = {material.density_kg_m3 for material in MATERIALS.values()}
+    for spec in FIXTURES:
+        assert spec.feel in FEELS.values(), spec.name
+        if spec.build is not None:
+            build = spec.build(Order(dimensions_m=np.array(spec.dimensions_m), hinge=spec.default_hinge, handle=None))
+            assert {part.density_kg_m3 for part in build.parts} <= densities, spec.name
+
+
+@pytest.mark.parametrize("category", WEIGHED)
+def test_an_appliance_of_usual_size_weighs_what_its_kind_does(category: str) -> None:
+    least, most = WEIGHED[category].weight_kg or (0.0, 0.0)
+    assert least <= built_weight_kg(category) <= most
+
+
+@pytest.mark.parametrize("name", FEELS)
+def test_one_hand_opens_a_joint_slowly_and_a_released_one_is_slowed(name: str) -> None:
+    feel = FEELS[name]
+    slide = name.startswith("SLIDE")
+    lever, speed = (1.0, 0.3) if slide else (LEVER_M, 0.5)  # m/s, rad/s: a drawer in 1.5 s, a door in 3 s
+    assert (feel.friction + feel.damping * speed) / lever < ONE_HAND_N / 2
+    assert feel.friction > 0.0
+    assert feel.damping > 0.0
+    assert ONE_HAND_N * lever < feel.effort < 100.0  # a limit that a hand does not reach, and that means something
+
+
+@pytest.mark.parametrize("edge_m", [0.01, 0.09, 0.5])
+def test_a_thing_weighs_what_its_kind_can(edge_m: float) -> None:
+    """A mug whose colliders are a lump, a sliver or right: scaled into the range, inertia with it."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * edge_m
+    raw = inertial_of_pieces([ConvexPiece(name="lump", vertices_link=corners)], THINGS["mug"].density_kg_m3)
+    usual = THINGS["mug"].weight_kg
+    assert usual is not None
+    inertial = weighing(raw, usual)
+    assert usual[0] <= inertial.mass_kg <= usual[1]
+    np.testing.assert_allclose(inertial.inertia / inertial.mass_kg, raw.inertia / raw.mass_kg, rtol=1e-9)
