@@ -1,6 +1,7 @@
 """The good kitchen as a bundle's folder, without what takes seconds (preview, reports)."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,15 @@ from r2c2r_core.model.scene import ArticulatedScene
 from tests.core.export.kitchen import kitchen, reconstruction
 
 
+@pytest.fixture(scope="session")
+def written_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Written once; tests copy it."""
+    return write_folder(kitchen(), tmp_path_factory.mktemp("bundle") / "good")
+
+
 @pytest.fixture
-def good_folder(tmp_path: Path) -> Path:
-    return write_folder(kitchen(), tmp_path / "good")
+def good_folder(written_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written_folder, tmp_path / "good"))
 
 
 def write_folder(scene: ArticulatedScene, folder: Path) -> Path:

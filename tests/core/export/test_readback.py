@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -14,16 +15,14 @@ import pytest
 from r2c2r_core.export.probes import bullet, mujoco_model, sapien_probe, usd, yourdf
 from r2c2r_core.export.readback import RESISTANCE, Readback, differences, expected_readback, readback_of
 from r2c2r_core.export.reading import read_urdf
-from tests.core.export.conftest import write_folder
-from tests.core.export.kitchen import kitchen
 
 SAPIEN = os.environ.get("R2C2R_SAPIEN_PYTHON", "")
 JOINT, LINK = "drawer_1_slide", "drawer_1_drawer"
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_folder(kitchen(), tmp_path_factory.mktemp("readback") / "good")
+def bundle(written_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(shutil.copytree(written_folder, tmp_path_factory.mktemp("readback") / "good"))
 
 
 @pytest.fixture(scope="module")
