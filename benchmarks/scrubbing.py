@@ -23,7 +23,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from kept import add_options, report
-from kills import Journey, Server, until
+from kill_journey import Journey, until
+from kills import Server
 
 FRAMES = 60
 SIZE = (1440, 1920)  # rows, columns
@@ -33,13 +34,13 @@ def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
     """Milliseconds a frame, first pass and later ones, and the slowest answer of the API meanwhile."""
     server = Server(folder / "data", real=False)
     server.start()
-    journey = Journey(server, random.Random(0))
+    journey = Journey(server.address, folder / "data", random.Random(0), None)
     try:
         journey.sign_in()
         project = journey.ask("POST", "/api/projects/sample", json={})["id"]
         until(lambda: journey.ask("GET", f"/api/projects/{project}")["status"] == "ready", 300)
         _full_size_frames(folder / "data" / "projects" / project)
-        address = f"http://127.0.0.1:{server.port}/media/{project}/frames"
+        address = f"{server.address}/media/{project}/frames"
         cookies = dict(journey.client.cookies)
         first = _together(address, cookies, people=1, steps=FRAMES, stride=1)
         later = _together(address, cookies, people=people, steps=steps, stride=None)

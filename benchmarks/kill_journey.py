@@ -1,0 +1,424 @@
+"""What one person does from upload to download while servers die, what was acknowledged, and whether it is still there."""
+
+import contextlib
+import hashlib
+import io
+import json
+import random
+import time
+import zipfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx2 as httpx
+
+PIECES = 12  # that a recording is uploaded in
+HOPELESS = ("worker-died", "interrupted")  # ends of jobs that only kills explain
+
+
+class Refused(Exception):
+    """The server answered with an error."""
+
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(f"{status}: {message}")
+        self.status, self.message = status, message
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change on its way: the same request under the same key until an answer comes."""
+
+    what: str
+    method: str
+    path: str
+    body: Any
+    key: str
+    took: Callable[[Any], None]  # what the answer says is true from now on
+
+
+class Journey:
+    """One person, and everything the server said is stored."""
+
+    def __init__(self, address: str, data: Path, rng: random.Random, real: Path | None) -> None:
+        self.address, self.data, self.rng, self.real = address, data, rng, real
+        self.client = httpx.Client(timeout=60)
+        self.recording = (real / "scan.r3d").read_bytes() if real else _any_zip()
+        self.upload: tuple[str, int] | None = None  # id, acknowledged bytes
+        self.project, self.ready = "", False
+        self.frames: list[dict[str, Any]] = []
+        self.objects: dict[int, dict[str, Any]] = {}
+        self.reviews: dict[int, dict[str, Any]] = {}  # groups, as last acknowledged
+        self.comments: dict[int, dict[str, Any]] = {}
+        self.state = "draft"
+        self.jobs: set[int] = set()
+        self.bundles: dict[int, str] = {}  # version: checksum
+        self.part: tuple[int, bytes] | None = None  # of a bundle that is being downloaded
+        self.pending: Change | None = None
+        self.acknowledged, self.sent_again, self.job_ends = Counter[str](), Counter[str](), Counter[str]()
+        self.lost: list[str] = []
+
+    @property
+    def folder(self) -> Path:
+        """The project's files."""
+        return self.data / "projects" / self.project
+
+    @property
+    def at(self) -> str:
+        """The project's address."""
+        return f"/api/projects/{self.project}"
+
+    def ask(self, method: str, path: str, **options: Any) -> Any:
+        """One request; raises httpx.HTTPError when the server vanished meanwhile, Refused when it says no."""
+        headers = {"X-Requested-With": "kills", **options.pop("headers", {})}
+        answer = self.client.request(method, self.address + path, headers=headers, **options)
+        if answer.status_code >= 500 and answer.status_code != 503:
+            self.lost.append(f"{method} {path}: {answer.status_code} {answer.text[:200]}")
+        if answer.status_code >= 400:
+            raise Refused(answer.status_code, answer.text[:200])
+        return answer.json() if answer.content and "json" in answer.headers["content-type"] else answer
+
+    def change(self, what: str, method: str, path: str, body: Any, took: Callable[[Any], None]) -> None:
+        """One change; it stays pending when the server vanishes before it answers."""
+        self.pending = Change(what, method, path, body, f"{self.rng.getrandbits(96):x}", took)
+        self._send(self.pending)
+
+    def send_again(self) -> None:
+        """The change whose answer was lost, under the key it had."""
+        change = self.pending
+        if change is None:
+            return
+        try:
+            self._send(change)
+            self.sent_again["answered"] += 1
+        except Refused as refused:
+            if "is stored" not in refused.message:
+                return
+            self.sent_again["stored, not answered before"] += 1
+            self._read_again(change)
+
+    def sign_in(self) -> None:
+        """The session outlives every server."""
+        self.client.get(f"{self.address}/", params={"token": "key"})
+
+    def act(self) -> None:
+        """The next thing this person does; nothing new before what is pending was answered."""
+        with contextlib.suppress(Refused):
+            if self.pending is not None:
+                self.send_again()
+            elif not self.project:
+                self._import()
+            elif not self.ready:
+                self._open()
+            else:
+                self.rng.choice(self._choices())()
+
+    def compare(self) -> None:
+        """What is stored is what was acknowledged, no more and no less."""
+        self._compare_upload()
+        if not self.ready:
+            return
+        now = {item["id"]: item for item in self.ask("GET", f"{self.at}/objects?deleted=true")}
+        self._expect("objects", set(now) == set(self.objects), f"{sorted(self.objects)} acknowledged, {sorted(now)} found")
+        for number, said in self.objects.items():
+            found = now.get(number, {})
+            differs = [key for key in ("name", "category", "points", "deleted") if found.get(key) != said[key]]
+            self._expect(f"object {number}", not differs, f"{differs}: {said} acknowledged, {found} found")
+        self._compare_review()
+
+    def settles(self, seconds: float) -> bool:
+        """Whether every job and every object's masks come to an end with nobody asking for it."""
+
+        def quiet() -> bool:
+            jobs = self.ask("GET", f"/api/jobs?project={self.project}&limit=500")
+            busy = [job for job in jobs if job["state"] in ("queued", "running", "cancelling")]
+            lanes = self.ask("GET", f"{self.at}/lanes")
+            return not busy and all(lane["state"] not in ("waiting", "running", "partial") for lane in lanes)
+
+        with contextlib.suppress(TimeoutError):
+            until(lambda: self.ready or self.act() or self.ready, 120)
+            until(quiet, seconds)
+            jobs = {job["id"]: job for job in self.ask("GET", f"/api/jobs?project={self.project}&limit=500")}
+            self._expect("jobs", self.jobs <= set(jobs), f"{self.jobs - set(jobs)} acknowledged, not found")
+            self.job_ends.update(job["state"] for job in jobs.values())
+            gave_up = [job["id"] for job in jobs.values() if (job["error"] or {}).get("kind") in HOPELESS]
+            self._expect("jobs", not gave_up, f"{gave_up} gave up")
+            return True
+        return False
+
+    def _choices(self) -> list[Callable[[], None]]:
+        """What makes sense now; what is more frequent in life is there more often."""
+        known = [number for number, item in self.objects.items() if not item["deleted"]]
+        review = [self._comment, self._resolve, self._step, self._download, self._run]
+        number = self.rng.choice(known) if known else 0
+        if number in self.reviews:
+            review += [lambda: self._judge(number)] * 3 + [lambda: self._correct(number)] * (1 if self.real else 3)
+        if self.real or not known:  # a click anywhere would be an object more to reconstruct
+            return review if self.real else [self._add]
+        edits = [self._add, self._add, self._change_side_upload]
+        edits += [lambda: self._edit(number, "POST", "/points", self._click())] * 4
+        edits += [lambda: self._edit(number, "PATCH", "", {"category": self.rng.choice(["drawer", "oven", "mug"])})]
+        edits += [lambda: self._edit(number, "DELETE", "", None)]
+        edits += [lambda: self.change("undo", "POST", f"{self.at}/undo", {"object": number}, self._took_undone)] * 2
+        return review + edits
+
+    def _import(self) -> None:
+        """Upload in pieces, then finish."""
+        if self.upload is None:
+            wish = {"file_name": "scan.r3d", "size": len(self.recording)}
+            self.upload = (self.ask("POST", "/api/uploads", json=wish)["id"], 0)
+        number, offset = self.upload
+        if offset < len(self.recording):
+            self._send_piece(number, offset, self.recording, len(self.recording) // PIECES + 1)
+            return
+        self.project = self.ask("POST", f"/api/uploads/{number}/finish")["id"]
+        self.upload = None
+        self.acknowledged["recording"] += 1
+
+    def _send_piece(self, number: str, offset: int, content: bytes, length: int) -> None:
+        piece, headers = content[offset : offset + length], {"Upload-Offset": str(offset)}
+        answer = self.ask("PATCH", f"/api/uploads/{number}", content=piece, headers=headers)
+        self.upload = (number, int(answer.headers["upload-offset"]))
+        self.acknowledged["piece of a recording"] += 1
+
+    def _change_side_upload(self) -> None:
+        """Another recording is on its way meanwhile, and never complete."""
+        if self.upload is None:
+            self.upload = (self.ask("POST", "/api/uploads", json={"file_name": "next.zip", "size": 1 << 20})["id"], 0)
+        self._send_piece(*self.upload, bytes(1 << 20), 64)
+
+    def _open(self) -> None:
+        """Once the import is done: the objects, and (for stand-ins) the nouns of a first reconstruction."""
+        project = self.ask("GET", self.at)
+        if project["status"] != "ready":
+            return
+        self.frames = self.ask("GET", f"{self.at}/frames")
+        if self.real is not None:
+            prompts = json.loads((self.real / "prompts.json").read_text())
+            first = {**prompts, "objects": prompts["objects"][:3]}
+            self.ask("POST", f"{self.at}/prompts.json", json=first)  # by name: twice is once
+            self._run()
+        else:
+            self._stand_in_for_a_first_run()
+        self.objects = {item["id"]: item for item in self.ask("GET", f"{self.at}/objects?deleted=true")}
+        self.reviews = {group["object"]: group for group in self.ask("GET", f"{self.at}/candidates")}
+        self.ready = True
+
+    def _stand_in_for_a_first_run(self) -> None:
+        from tests.app.nouns import finish
+
+        clicks = [{**self._click(), "label": 1}]
+        drawer = {"name": "drawer_1", "category": "drawer", "points": clicks}
+        self.ask("POST", f"{self.at}/prompts.json", json={"version": 1, "objects": [drawer]})
+        finish(self.folder / "work")
+        stages = ("segment", "generate", "align", "export")
+        (self.folder / "behave.json").write_text(json.dumps(dict.fromkeys(stages, "slow")))
+
+    def _add(self) -> None:
+        if len(self.objects) < 12:
+            body = {"category": self.rng.choice(["drawer", "cabinet", "mug"]), "points": [self._click()]}
+            self.change("object", "POST", f"{self.at}/objects", body, self._took_object)
+
+    def _edit(self, number: int, method: str, path: str, body: Any) -> None:
+        self.change("click or edit", method, f"{self.at}/objects/{number}{path}", body, self._took_object)
+
+    def _click(self) -> dict[str, Any]:
+        frame = self.rng.choice(self.frames)
+        x, y = self.rng.uniform(0, frame["width"] - 1), self.rng.uniform(0, frame["height"] - 1)
+        return {"frame": frame["index"], "x": x, "y": y, "label": 1}
+
+    def _judge(self, number: int) -> None:
+        candidate = self.rng.choice(self.reviews[number]["candidates"])["id"]
+        verdict = self.rng.choice(["accepted", "accepted", "cleared"] if self.real else ["accepted", "rejected", "cleared"])
+        reason = f"because {self.rng.randrange(1000)}"
+        body = {"candidate": candidate, "verdict": verdict, "reason": reason, "rerun": not self.real}
+        self.change("verdict", "POST", f"{self.at}/objects/{number}/verdicts", body, self._took_review)
+
+    def _correct(self, number: int) -> None:
+        body = {"hinge": self.rng.choice(["left", "right", None]), "rerun": self.rng.random() < 0.5}
+        self.change("correction", "PATCH", f"{self.at}/objects/{number}/override", body, self._took_review)
+
+    def _comment(self) -> None:
+        body = {"text": f"look at {self.rng.randrange(10**6)}"}
+        self.change("comment", "POST", f"{self.at}/comments", body, self._took_comment)
+
+    def _resolve(self) -> None:
+        if self.comments:
+            comment = self.rng.choice(list(self.comments.values()))
+            body = {"resolved": comment["resolved_at"] is None}
+            self.change("comment", "PATCH", f"{self.at}/comments/{comment['id']}", body, self._took_comment)
+
+    def _step(self) -> None:
+        moves = self.ask("GET", f"{self.at}/review")["moves"]
+        body = {"from_state": self.state, "to": self.rng.choice(moves)["to"], "reason": "it is time"}
+        self.change("review step", "POST", f"{self.at}/review", body, self._took_state)
+
+    def _run(self) -> None:
+        self.change("run", "POST", f"{self.at}/run", {}, lambda job: self.jobs.add(job["id"]))
+
+    def _download(self) -> None:
+        """Half a bundle now, the other half another time, perhaps from another server."""
+        if self.part is None:
+            found = self.ask("GET", f"{self.at}/bundles")
+            self.bundles.update({bundle["version"]: bundle["sha256"] for bundle in found})
+            if found:
+                version, size = found[0]["version"], found[0]["size"]
+                self.part = (version, self._range(version, f"0-{size // 2}"))
+            return
+        version, half = self.part
+        whole = half + self._range(version, f"{len(half)}-")
+        self._expect("download", hashlib.sha256(whole).hexdigest() == self.bundles[version], f"bundle {version} differs")
+        self.part = None
+        self.acknowledged["download"] += 1
+
+    def _range(self, version: int, wanted: str) -> bytes:
+        answer = self.ask("GET", f"/media/{self.project}/bundles/{version}.zip", headers={"Range": f"bytes={wanted}"})
+        return bytes(answer.content)
+
+    def _took_object(self, item: dict[str, Any]) -> None:
+        self.objects[item["id"]] = item
+
+    def _took_undone(self, undone: dict[str, Any]) -> None:
+        self._took_object(undone["object"])
+
+    def _took_review(self, reviewed: dict[str, Any]) -> None:
+        if reviewed["group"] is not None:
+            self.reviews[reviewed["group"]["object"]] = reviewed["group"]
+        if reviewed["job"] is not None:
+            self.jobs.add(reviewed["job"]["id"])
+
+    def _took_comment(self, comment: dict[str, Any]) -> None:
+        self.comments[comment["id"]] = comment
+
+    def _took_state(self, status: dict[str, Any]) -> None:
+        self.state = status["state"]
+
+    def _send(self, change: Change) -> None:
+        try:
+            answer = self.ask(change.method, change.path, json=change.body, headers={"Idempotency-Key": change.key})
+        except Refused as refused:
+            if refused.status != 503 and "is stored" not in refused.message:
+                self.pending = None
+            raise
+        change.took(answer)
+        self.acknowledged[change.what] += 1
+        self.pending = None
+
+    def _read_again(self, change: Change) -> None:
+        """A change that is stored but was never answered: what it made is read from what is there."""
+        self.pending = None
+        self.acknowledged[change.what] += 1
+        if change.what in ("object", "click or edit", "undo"):
+            for item in self.ask("GET", f"{self.at}/objects?deleted=true"):
+                self._took_object(item)
+        elif change.what in ("verdict", "correction"):
+            self.reviews = {group["object"]: group for group in self.ask("GET", f"{self.at}/candidates")}
+        elif change.what == "comment":
+            self.comments = {comment["id"]: comment for comment in self.ask("GET", f"{self.at}/comments")}
+        elif change.what == "review step":
+            self._took_state(self.ask("GET", f"{self.at}/review"))
+
+    def _compare_upload(self) -> None:
+        if self.upload is None:
+            return
+        number, acknowledged = self.upload
+        try:
+            length = int(self.ask("HEAD", f"/api/uploads/{number}").headers["upload-offset"])
+        except Refused:  # it is a project by now: finishing was not answered, and is asked for again
+            length = len(self.recording) if not self.project else 0
+        self._expect("upload", length >= acknowledged, f"{acknowledged} bytes acknowledged, {length} found")
+        self.upload = (number, length)
+
+    def _compare_review(self) -> None:
+        groups = {group["object"]: group for group in self.ask("GET", f"{self.at}/candidates")}
+        for number, said in self.reviews.items():
+            found = groups.get(number)
+            if found is None:
+                self._expect(f"object {number}", self.objects[number]["deleted"], "its candidates are gone")
+                continue
+            self._expect(
+                f"review of {number}", _said(found) == _said(said), f"{said['version']} acknowledged, {found['version']} found"
+            )
+        if self.real:
+            self.reviews = groups
+        now = {comment["id"]: comment for comment in self.ask("GET", f"{self.at}/comments")}
+        self._expect("comments", now == self.comments, f"{len(self.comments)} acknowledged, {len(now)} found, or changed")
+        state = self.ask("GET", f"{self.at}/review")["state"]
+        self._expect("state", state == self.state, f"{self.state} acknowledged, {state} found")
+        kept = {bundle["version"]: bundle["sha256"] for bundle in self.ask("GET", f"{self.at}/bundles")}
+        self._expect("bundles", self.bundles.items() <= kept.items(), f"{self.bundles} seen, {kept} found")
+
+    def _expect(self, what: str, holds: bool, said: str) -> None:
+        if not holds:
+            self.lost.append(f"{what}: {said}")
+
+
+def _said(group: dict[str, Any]) -> tuple[Any, ...]:
+    """What people said about an object."""
+    return group["version"], group["override"], {c["id"]: (c["verdict"], c["verdict_reason"]) for c in group["candidates"]}
+
+
+def _any_zip() -> bytes:
+    """A zip that the stand-in for the import takes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("metadata", b"{}")
+        archive.writestr("noise", random.Random(0).randbytes(40_000))
+    return buffer.getvalue()
+
+
+class FinishedStages:
+    """What a finished stage stored stays what it was as long as the same run goes on."""
+
+    def __init__(self, journey: "Journey") -> None:
+        self._journey = journey
+        self.seen: dict[tuple[int, str, str], dict[str, str]] = {}
+        self.changed: list[str] = []
+        self._looked = 0.0
+
+    def look(self) -> None:
+        """Note the files of stages that a running job has finished; compare those noted before."""
+        if time.monotonic() - self._looked < 0.5:
+            return
+        self._looked = time.monotonic()
+        self.compare()
+
+    def compare(self) -> None:
+        """Note and compare."""
+        journey = self._journey
+        work = journey.folder / "work"
+        if not journey.ready:
+            return
+        with contextlib.suppress(Refused, FileNotFoundError):
+            for job in journey.ask("GET", f"/api/jobs?project={journey.project}&limit=1"):
+                for stage in job["stages"]:
+                    if job["kind"] != "run" or stage["state"] != "done":
+                        continue
+                    key, digests = (job["id"], stage["name"], _given(work)), _digests(work, stage["name"])
+                    if digests and self.seen.setdefault(key, digests) != digests:
+                        self.changed.append(f"job {job['id']}: what {stage['name']} had stored was changed")
+                        self.seen[key] = digests
+
+
+def _given(work: Path) -> str:
+    """What the run was given: a run that is taken up again takes the clicks of then."""
+    return hashlib.sha256(b"".join((work / name).read_bytes() for name in ("prompts.json", "overrides.json"))).hexdigest()
+
+
+def _digests(work: Path, stage: str) -> dict[str, str]:
+    found = {}
+    for path in sorted((work / "nouns" / stage).glob("*.noun")):
+        with contextlib.suppress(FileNotFoundError):
+            found[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+def until(condition: Any, seconds: float) -> None:
+    """Wait for it; raises TimeoutError."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"not within {seconds} s")
+        time.sleep(0.05)
