@@ -54,6 +54,6 @@ def keep(context: Context, change: Sending, answer: Answer) -> None:
 
 
 def tidy(context: Context) -> None:
-    """Forget what was sent more than a day ago."""
+    """Forget what was sent so long ago that nobody sends it again."""
     with writing(context.engine) as session:
         once.forget(session, before=time.time() - once.KEPT_S)
