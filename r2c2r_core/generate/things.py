@@ -13,10 +13,12 @@ from r2c2r_core.generate.lathe import fit_lathe, is_round, lathe_mesh
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.symmetry import Revolution, fit_revolution, is_rounder_than_box
 from r2c2r_core.generate.variation import Variation, whole_pool
+from r2c2r_core.generate.vessel import find_handle, is_open_vessel, vessel_mesh
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 
 _LATHE_FIT, _CUBOID_FIT = 0.75, 0.8  # a model below it is compared with what carving gives
+_SIMPLER = 0.05  # carving copies the masks' errors: it has to agree with them better than a clean shape
 _BOX_M, _FAR_SHARE = 0.006, 0.1  # median distance of a box's points from it, and the share that may be far from it
 _FAR_M = 0.015
 
@@ -25,7 +27,7 @@ def thing_shape(evidence: Evidence, variation: Variation) -> Shape:
     """A thing's solid from the views of one draw, in a gravity-aligned frame; raises GenerationFailed."""
     seen = observe_thing(evidence, variation)
     revolution = fit_revolution(seen.points)
-    lathe, is_certain = _lathe_shape(variation, revolution, seen) if revolution is not None else (None, False)
+    lathe, is_certain = _lathe_shape(evidence, variation, revolution, seen) if revolution is not None else (None, False)
     cuboid = _cuboid_shape(evidence, variation)
     sure = [shape for shape, passed in ((lathe, is_certain), (cuboid, True)) if shape is not None and passed]
     fits = [_fit(shape, evidence) for shape in sure]
@@ -33,16 +35,21 @@ def thing_shape(evidence: Evidence, variation: Variation) -> Shape:
         return sure[int(np.argmax(fits))]
     rounder = revolution is not None and is_rounder_than_box(seen.points, revolution)
     carved = carved_shape(evidence, variation, seen, revolution if rounder else None)
-    return max([carved, *([lathe] if lathe is not None else [])], key=lambda shape: _fit(shape, evidence))
+    return lathe if lathe is not None and _fit(lathe, evidence) > _fit(carved, evidence) - _SIMPLER else carved
 
 
-def _lathe_shape(variation: Variation, revolution: Revolution, seen: Seen) -> tuple[Shape | None, bool]:
+def _lathe_shape(evidence: Evidence, variation: Variation, revolution: Revolution, seen: Seen) -> tuple[Shape | None, bool]:
     """A clean body of revolution, None where masks do not give one, and whether the depth points lie on it too."""
     span = float(seen.low[2]), float(seen.high[2])
     measured = fit_lathe(seen.points, revolution, *span, variation.views, seen.world_from_local)
     if measured is None:
         return None, False
-    return _model(*lathe_mesh(measured), seen.world_from_local, {"revolved": 1.0}), is_round(seen.points, measured)
+    if is_open_vessel(evidence.track.category):
+        handle = find_handle(measured, evidence.pool, seen.world_from_local)
+        mesh, parameters = vessel_mesh(measured, handle), {"revolved": 1.0, "hollow": 1.0, "handles": float(handle is not None)}
+    else:
+        mesh, parameters = lathe_mesh(measured), {"revolved": 1.0}
+    return _model(*mesh, seen.world_from_local, parameters), is_round(seen.points, measured)
 
 
 def _cuboid_shape(evidence: Evidence, variation: Variation) -> Shape | None:

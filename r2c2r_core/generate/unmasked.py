@@ -1,7 +1,7 @@
 """What masks get wrong on a body of revolution, put right by depth: a cap of the wall's colour, a shadow at its foot.
 
 A mask is cut along colours, so a white cap before a white wall is missing from it in every frame, and a dark shadow on the
-worktop is part of it. Depth tells both: pixels over the cap are as near as the axis, not as far as the wall.
+worktop is part of it. Depth tells both: pixels over the cap are as near as the body, not as far as the wall.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,15 @@ from r2c2r_core.geometry.transforms import Rigid3
 _STEP_M = 0.003
 _HIGHEST = 0.35  # of the height: what may be missing above
 _LEAST_M = 0.006  # a shorter piece is within the masks' error
-_CLEAR_M = 0.04  # behind the axis and the radius: something else
+_NOISE_M = 0.015  # of one depth pixel
+_CLEAR_M = 0.03  # behind the far rim: something else
 _LEAST_SEEN = 3  # pixels that know, of all views
 _FOOT, _BODY = 0.12, 0.35  # of the height: the foot, and the body above it
 _FLARE = 1.06
 
 
 def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
-    """The body continued upwards for as long as most depth pixels on its axis are as near as the axis."""
+    """The body continued upwards for as long as most depth pixels on its axis are as near as the body."""
     bottom, top, widest = revolution.heights_m[0], revolution.heights_m[-1], float(revolution.radii_m.max())
     heights = np.arange(top + _STEP_M / 2, top + _HIGHEST * (top - bottom), _STEP_M)
     offsets = np.arange(0.0, widest + _STEP_M, _STEP_M)
@@ -62,21 +63,19 @@ def without_flared_foot(revolution: Revolution, points: Points) -> Revolution:
 def _hits_and_known(
     revolution: Revolution, heights: np.ndarray, offsets: np.ndarray, view: View, world_from_local: Rigid3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of the two depth pixels at each (height, distance to either side of the axis): how many are as near as it, or known."""
+    """Of the two depth pixels at each (height, distance to either side of the axis): how many lie on the body, or on either."""
     eye = world_from_local.inverse.apply(view.eye_world[None])[0]
     away = revolution.centre - eye[:2]
-    right = np.array([away[1], -away[0]]) / max(float(np.linalg.norm(away)), 1e-9)
+    away /= max(float(np.linalg.norm(away)), 1e-9)
+    rim = float(revolution.radii_m[-1])
+    # seen from above, it is the far rim that hides what is behind; nearer to the axis the top itself does
     sides = np.concatenate([offsets, -offsets])
-    plan = revolution.centre + sides[:, None] * right
-    places = np.concatenate(
-        [np.tile(plan, (len(heights), 1)), np.repeat(heights, len(sides))[:, None]],
-        axis=1,
-    )
+    plan = revolution.centre + rim * away + sides[:, None] * np.array([away[1], -away[0]])
+    places = np.column_stack([np.tile(plan, (len(heights), 1)), np.repeat(heights, len(sides))])
     in_camera = (view.world_from_camera.inverse @ world_from_local).apply(places)
     depth, inside = sample_nearest(view.depth_m, project(in_camera, view.depth_camera))
     behind = np.where(inside & (depth > 0), depth, np.nan) - in_camera[:, 2]
-    reach = float(revolution.radii_m.max())
-    hit = np.abs(behind) < max(reach, 0.02)
-    clear = behind > reach + _CLEAR_M
+    hit = (behind > -2.0 * rim - _NOISE_M) & (behind < _NOISE_M)
+    clear = behind > _CLEAR_M
     shape = (len(heights), 2, len(offsets))
     return hit.reshape(shape).sum(axis=1), (hit | clear).reshape(shape).sum(axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.generate.lathe import lathe_mesh
 from r2c2r_core.generate.symmetry import Revolution
+from r2c2r_core.generate.vessel import VesselHandle, vessel_mesh
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.geometry.meshes import box_mesh
@@ -103,6 +104,20 @@ def bottle_scene(seed=0):
         support_z_m=0.9,
     )
     return capture, track("bottle_1", "bottle", "thing", masks, box=thing)
+
+
+def mug_scene(azimuth_rad, seed=0):
+    """A mug of radius 4 cm, 9 cm high, on a counter, with a handle; filmed all round from above."""
+    body = Revolution(np.zeros(2), np.array([0.9, 0.99]), np.full(2, 0.04))
+    handle = None if azimuth_rad is None else VesselHandle(azimuth_rad, 0.028)
+    mug = Solid(*vessel_mesh(body, handle), (200, 200, 210), 1)
+    counter = box((-0.8, -0.8, 0.86), (0.8, WALL_Y, 0.9), (150, 110, 70), 0)
+    views = [(2 * np.pi * k / 10, np.radians(35)) for k in range(10)]
+    capture, masks = scan([mug, counter], target=(0, 0, 0.94), distance=0.55, seed=seed, noise_m=0.003, views=views)
+    thing = ThingBox(
+        world_from_object=Rigid3(np.eye(3), np.array([0.0, 0.0, 0.945])), dimensions_m=np.full(3, 0.09), support_z_m=0.9
+    )
+    return capture, track("mug", "mug", "thing", masks, box=thing)
 
 
 def chair_scene(seed=0):

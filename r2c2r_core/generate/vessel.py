@@ -1,0 +1,124 @@
+"""Mugs, bowls and pots: a body of revolution with a wall, a floor and a hollow, and the handle that outlines show.
+
+Depth into a mug is a handful of noisy pixels, so the hollow and the wall's thickness come from the category; where a handle
+stands and how far it reaches is seen in the masks: beside the body, in the frames that look past it.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.generate.lathe import lathe_mesh
+from r2c2r_core.generate.symmetry import Revolution
+from r2c2r_core.geometry.camera import project, sample_nearest
+from r2c2r_core.geometry.meshes import unite
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+
+_OPEN = ("mug", "cup", "bowl", "pot", "pan", "vase", "bucket", "jug", "pitcher", "tumbler", "planter")
+_CLOSED = ("teapot", "cupboard", "panel")
+_WALL_M, _WALL_SHARE = 0.004, 0.2  # stoneware; never more than this share of the radius
+_FLOOR = 1.5  # walls thick
+_AZIMUTHS = 36
+_REACHES_M = np.arange(0.008, 0.06, 0.004)  # beyond the body: where a handle is looked for
+_SPREAD = 4  # azimuths to either side of the clearest that are averaged
+_BESIDE = 1.08  # of the radius: a place that a frame sees past the body
+_LEAST_VIEWS, _SHOWN = 3, 0.5
+_BAR_M = 0.009
+_TALLEST = 0.36  # of the height: the radius of a handle's ring
+
+
+class VesselHandle(NamedTuple):
+    """Where a handle stands round the axis, and how far its outer edge is from the body."""
+
+    azimuth_rad: float
+    reach_m: float
+
+
+def is_open_vessel(category: str) -> bool:
+    """Whether things of that name are hollow and open upwards."""
+    words = category.lower().replace("_", " ").split()
+    return any(word.rstrip("s") in _OPEN for word in words) and not any(word in _CLOSED for word in words)
+
+
+def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Points, Faces]:
+    """The closed surface of the body with its hollow, and the handle as a ring through the wall."""
+    bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
+    wall = min(_WALL_M, _WALL_SHARE * float(revolution.radii_m.min()))
+    floor = bottom + _FLOOR * wall
+    inside = revolution.heights_m > floor
+    heights = np.concatenate([[floor], revolution.heights_m[inside], [top + wall]])
+    radii = np.interp(heights, revolution.heights_m, revolution.radii_m) - wall
+    hollow = lathe_mesh(Revolution(revolution.centre, heights, radii))
+    parts = [lathe_mesh(revolution)]
+    if handle is not None:
+        parts.append(_ring(revolution, handle))
+    return unite(parts, [hollow])
+
+
+def find_handle(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> VesselHandle | None:
+    """The direction in which most frames that look past the body show mask beside it; None where there is none."""
+    shares = np.stack([_shown(revolution, azimuth, views, world_from_local) for azimuth in _azimuths()])
+    near = shares[:, : len(_REACHES_M) // 3].mean(axis=1)
+    if not np.isfinite(near).any():
+        return None
+    best = int(np.nanargmax(near))
+    if near[best] < _SHOWN or np.nanmedian(near) > 0.5 * near[best]:  # a mask wide all round is a mask too wide
+        return None
+    reach = float(_REACHES_M[shares[best] >= _SHOWN].max(initial=_REACHES_M[0]))
+    beside = (best + np.arange(-_SPREAD, _SPREAD + 1)) % _AZIMUTHS
+    middle = np.nan_to_num(near[beside]) @ np.exp(1j * _azimuths()[beside])
+    return VesselHandle(float(np.angle(middle)), reach)
+
+
+def _azimuths() -> np.ndarray:
+    return np.arange(_AZIMUTHS) * 2 * np.pi / _AZIMUTHS
+
+
+def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_from_local: Rigid3) -> np.ndarray:
+    """Per reach, the share of the frames that see past the body there whose mask holds the place; nan for too few frames."""
+    bottom, top = revolution.heights_m[0], revolution.heights_m[-1]
+    out = np.array([np.cos(azimuth), np.sin(azimuth)])
+    heights = bottom + np.array([0.45, 0.6, 0.75]) * (top - bottom)
+    radius = float(np.interp(heights[1], revolution.heights_m, revolution.radii_m))
+    places = [np.append(revolution.centre + (radius + r) * out, z) for r in _REACHES_M for z in heights]
+    body = np.array([[*revolution.centre, z] for z in heights])
+    held = []
+    for view in views:
+        eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+        towards = (revolution.centre - eye[:2]) / np.linalg.norm(revolution.centre - eye[:2])
+        if abs(out @ [towards[1], -towards[0]]) * (radius + _REACHES_M[2]) < _BESIDE * radius:
+            continue
+        camera_from_local = view.world_from_camera.inverse @ world_from_local
+        pixels = project(camera_from_local.apply(np.array(places)), view.rgb_camera)
+        pixels = pixels + _pose_error(view, project(camera_from_local.apply(body), view.rgb_camera))
+        mask, inside = sample_nearest(view.mask, pixels)
+        held.append((mask & inside).reshape(len(_REACHES_M), -1).any(axis=1))
+    return np.mean(held, axis=0) if len(held) >= _LEAST_VIEWS else np.full(len(_REACHES_M), np.nan)
+
+
+def _pose_error(view: View, body_px: np.ndarray) -> np.ndarray:
+    """By how many pixels the mask's deepest place, which is in the body and not in the handle, is off the body's middle."""
+    inside = cv2.distanceTransform(np.pad(view.mask, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    rows, columns = np.nonzero(inside > 0.9 * inside.max())
+    return np.array([columns.mean() + 0.5, rows.mean() + 0.5]) - body_px.mean(axis=0)
+
+
+def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
+    """An upright ring whose outer edge is where the handle ends; its inner part is cut off by the hollow."""
+    bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
+    middle = 0.55 * top + 0.45 * bottom
+    outer = _TALLEST * (top - bottom)
+    radius = float(np.interp(middle, revolution.heights_m, revolution.radii_m))
+    centre = radius + max(handle.reach_m - outer, -0.4 * outer)
+    disc, hole = (
+        lathe_mesh(Revolution(np.zeros(2), np.array([-half, half]), np.full(2, size)))
+        for half, size in ((_BAR_M / 2, outer), (_BAR_M, outer - _BAR_M))
+    )
+    vertices, faces = unite([disc], [hole])
+    upright = np.column_stack([vertices[:, 0] + centre, -vertices[:, 2], vertices[:, 1]])  # its axis along the tangent
+    turned = upright @ rotation_about_z(handle.azimuth_rad).T
+    return turned + np.append(revolution.centre, middle), faces

@@ -1,0 +1,47 @@
+"""A mug is hollow, and its handle stands where the outlines show it."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.symmetry import Revolution
+from r2c2r_core.generate.things import thing_shape
+from r2c2r_core.generate.variation import whole_pool
+from r2c2r_core.generate.vessel import VesselHandle, is_open_vessel, vessel_mesh
+from r2c2r_core.geometry.hollows import find_hollow
+from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
+from tests.core.generate.scenes import mug_scene
+
+
+@pytest.mark.parametrize("azimuth", [0.4, 3.6])
+def test_a_mug_is_hollow_and_has_its_handle_where_it_was_seen(azimuth):
+    evidence = gather_evidence(*mug_scene(azimuth), 10)
+    shape = thing_shape(evidence, whole_pool(evidence))
+    assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 1.0)
+    world = shape.vertices_world
+    assert np.ptp(world[:, 2]) == pytest.approx(0.09, abs=0.004)
+    out = np.array([np.cos(azimuth), np.sin(azimuth)])
+    assert (world[:, :2] @ out).max() == pytest.approx(0.068, abs=0.012)
+    assert (world[:, :2] @ -out).max() == pytest.approx(0.04, abs=0.005)
+    assert find_hollow(world, shape.faces) is not None
+
+
+def test_a_cup_without_a_handle_gets_none():
+    evidence = gather_evidence(*mug_scene(None), 10)
+    shape = thing_shape(evidence, whole_pool(evidence))
+    assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("handle", [None, VesselHandle(1.0, 0.03)])
+def test_vessels_are_closed_manifold_and_outward(handle):
+    body = Revolution(np.array([0.1, 0.0]), np.linspace(0.0, 0.09, 20), np.linspace(0.03, 0.04, 20))
+    vertices, faces = vessel_mesh(body, handle)
+    assert is_watertight(vertices, faces)
+    assert is_manifold(vertices, faces)
+    solid = np.pi * 0.035**2 * 0.09
+    assert 0.1 * solid < volume(vertices, faces) < 0.4 * solid
+
+
+def test_names_say_what_opens_upwards():
+    assert all(is_open_vessel(name) for name in ("mug", "coffee_mug", "bowls", "plant pot"))
+    assert not any(is_open_vessel(name) for name in ("bottle", "cupboard", "teapot", "panel", "potato", "jar"))
