@@ -4,7 +4,8 @@
 
 DIR holds seed<N> and kitchen, the workdirs of finished `r2c2r run`s (of `r2c2r sample` and of the real kitchen); what is not
 there is left out. Only the stages after the alignment are run again, into a temporary folder; the workdirs stay as they
-are. Seconds are scaled to 20 objects by their number. --update writes benchmarks/scene.json. SAPIEN is tried when
+are. Seconds are scaled to 20 objects by their number; a
+true room of 20 is timed, against its bar, by galley.py. --update writes benchmarks/scene.json. SAPIEN is tried when
 R2C2R_SAPIEN_PYTHON names its environment.
 """
 
@@ -56,7 +57,7 @@ BARS: tuple[tuple[str, float | None, str], ...] = (
     ("corner_residual_paper_mm", None, "lower"),
     ("paper_equation_15_mm", None, "lower"),
     ("without_mesh", None, "lower"),
-    ("seconds_20_objects", 60.0, "lower"),
+    ("seconds_20_objects", None, "lower"),
     ("cpu_seconds_20_objects", None, "lower"),
 )
 

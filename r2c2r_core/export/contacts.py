@@ -21,11 +21,15 @@ class Touch:
         return (a in some and b in others) or (b in some and a in others)
 
 
-def touches(model: Any, positions: Mapping[str, float]) -> list[Touch]:
-    """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero."""
+def touches(model: Any, positions: Mapping[str, float], scratch: Any | None = None) -> list[Touch]:
+    """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero.
+
+    `scratch` is an MjData of the model to work in: making one takes 20 times as long as looking for contacts.
+    """
     import mujoco
 
-    data = mujoco.MjData(model)
+    data = mujoco.MjData(model) if scratch is None else scratch
+    mujoco.mj_resetData(model, data)
     for name, position in positions.items():
         data.qpos[model.joint(name).qposadr[0]] = position
     mujoco.mj_kinematics(model, data)

@@ -54,10 +54,12 @@ def push_open(model: Any, joint: str) -> float:
 
 def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
     """Free-standing things that the joint's part runs into, each with where in the sweep it first does."""
-    movers, free = movers_of(solid, name), free_bodies(solid)
+    import mujoco
+
+    movers, free, scratch = movers_of(solid, name), free_bodies(solid), mujoco.MjData(solid)
     first: dict[str, float] = {}
     for position in _positions(solid, name) if free else ():
-        for touch in touches(solid, {name: position}):
+        for touch in touches(solid, {name: position}, scratch):
             if touch.depth_m > ALLOWED_PENETRATION_M and touch.between(movers, free):
                 thing = body_name(solid, next(body for body in touch.bodies if body in free))
                 first.setdefault(thing, position)
@@ -66,10 +68,12 @@ def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
 
 def _swept(strict: Any, name: str) -> tuple[float, list[Finding]]:
     """The deepest overlap over the joint's sweep, and a finding where it is too deep."""
-    movers = movers_of(strict, name)
+    import mujoco
+
+    movers, scratch = movers_of(strict, name), mujoco.MjData(strict)
     deepest, at, worst = 0.0, 0.0, ""
     for position in _positions(strict, name):
-        for touch in touches(strict, {name: position}):
+        for touch in touches(strict, {name: position}, scratch):
             if movers & set(touch.bodies) and touch.depth_m > deepest:
                 deepest, at, worst = touch.depth_m, position, touch.names
     if deepest <= ALLOWED_PENETRATION_M:

@@ -56,20 +56,24 @@ def meetings(model: Any) -> list[Meeting]:
 
 def all_together(model: Any) -> float:
     """Deepest overlap in metres while every joint opens at the same share of its range."""
+    import mujoco
+
     ranges = {name: model.joint(name).range for name in joint_names(model)}
-    deepest = 0.0
+    deepest, scratch = 0.0, mujoco.MjData(model)
     for share in np.linspace(0.0, 1.0, _ALL_POSITIONS):
         positions = {name: float(lower + share * (upper - lower)) for name, (lower, upper) in ranges.items()}
-        deepest = max([deepest, *(touch.depth_m for touch in touches(model, positions))])
+        deepest = max([deepest, *(touch.depth_m for touch in touches(model, positions, scratch))])
     return deepest
 
 
 def _overlaps(model: Any, first: str, second: str) -> Iterator[tuple[float, float, float]]:
     """Positions of both joints and the overlap there, in metres."""
-    some, others = movers_of(model, first), movers_of(model, second)
+    import mujoco
+
+    some, others, scratch = movers_of(model, first), movers_of(model, second), mujoco.MjData(model)
     for a in _positions(model, first)[1:]:
         for b in _positions(model, second)[1:]:
-            for touch in touches(model, {first: float(a), second: float(b)}):
+            for touch in touches(model, {first: float(a), second: float(b)}, scratch):
                 if touch.between(some, others):
                     yield float(a), float(b), touch.depth_m
 

@@ -1,0 +1,177 @@
+"""Two finished kitchens as one room of 20 objects or more: how long synthesis, warp, export and certificate really take.
+
+    python benchmarks/galley.py --workdir DIR [--kitchens seed0,seed1] [--objects 20] [--json FILE]
+
+The second kitchen is turned round and stands opposite the first, as in a galley: every noun that a stage hands on (tracks,
+placements, frames, the scanned surface) is moved with it, so the four stages work on real measurements and pictures of 20
+objects. DIR holds the workdirs of finished `r2c2r run`s, as benchmarks/scene.py reads them. Times count on an idle machine:
+the load is written beside them.
+"""
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scene import _cpu_seconds, _placed, _proof, _reconstruction, _timed
+
+from r2c2r_core.arrays import Image
+from r2c2r_core.config import ReconstructConfig
+from r2c2r_core.export.stage import write_bundle
+from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
+from r2c2r_core.model.capture import Capture, Depth, FrameImages, SceneSurface, Wall
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.overrides import NO_OVERRIDES
+from r2c2r_core.synthesize.stage import build_scene
+from r2c2r_core.warp.stage import fit_meshes
+from r2c2r_core.workspace import Workspace
+
+_AISLE_M = 2.0
+_SECOND = 1_000_000  # added to the second recording's frame numbers
+Placed = tuple[Capture, list[MaskTrack], list[Placement], list[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _BothImages:
+    """Pixels of two captures."""
+
+    first: FrameImages
+    second: FrameImages
+
+    def rgb(self, frame_index: int) -> Image:
+        return self.second.rgb(frame_index - _SECOND) if frame_index >= _SECOND else self.first.rgb(frame_index)
+
+    def depth(self, frame_index: int) -> Depth:
+        return self.second.depth(frame_index - _SECOND) if frame_index >= _SECOND else self.first.depth(frame_index)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Time one room."""
+    parser = argparse.ArgumentParser(description="The four stages after the alignment on a room of 20 objects.")
+    parser.add_argument("--workdir", type=Path, required=True)
+    parser.add_argument("--kitchens", default="seed0,seed1")
+    parser.add_argument("--objects", type=int, default=20)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args(arguments)
+    first, second = (_placed(Workspace(options.workdir / name)) for name in options.kitchens.split(","))
+    figures = timed(galley(first, second, options.objects)) | {"kitchens": options.kitchens}
+    print(json.dumps(figures))
+    if options.json is not None:
+        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    return 0 if figures["passed"] and figures["seconds_in_all"] <= 60.0 else 1
+
+
+def timed(placed: Placed) -> dict[str, Any]:
+    """Seconds of each stage, and what the certificate says of the room."""
+    config, seconds, load = ReconstructConfig(), dict[str, float](), os.getloadavg()[0]
+    capture, tracks, placements, assets = placed
+    started = _cpu_seconds()
+    scene = _timed(
+        seconds, "synthesize", lambda: build_scene(capture, tracks, placements, assets, NO_OVERRIDES, config.synthesize)
+    )
+    fitted = _timed(seconds, "warp", lambda: fit_meshes(scene, tracks, placements, assets, config.warp))
+    with tempfile.TemporaryDirectory(prefix="r2c2r-galley-") as folder:
+        result = _reconstruction(placed, fitted)
+        certificate = _timed(seconds, "export", lambda: write_bundle(result, Path(folder) / "bundle.zip", config.export))
+    return _proof(certificate) | {
+        "objects": len(fitted.objects),
+        "joints": len(certificate.joints),
+        "seconds": {name: round(value, 1) for name, value in seconds.items()},
+        "seconds_in_all": round(sum(seconds.values()), 1),
+        "cpu_seconds": round(_cpu_seconds() - started, 1),
+        "load_before": round(load, 1),
+    }
+
+
+def galley(first: Placed, second: Placed, objects: int) -> Placed:
+    """One room: all of the first kitchen and as many of the second, opposite, as are needed."""
+    fronts = [track.front.world_from_front for track in first[1] if track.front is not None]
+    moved = _moved(second, _opposite(fronts, [t.front.world_from_front for t in second[1] if t.front is not None]))
+    joined = Capture(
+        name=f"{first[0].name} and {second[0].name}",
+        sha256=first[0].sha256,
+        format=first[0].format,
+        frames=(*first[0].frames, *moved[0].frames),
+        world_from_capture=first[0].world_from_capture,
+        room=replace(first[0].room, walls=(*first[0].room.walls, *moved[0].room.walls)),
+        surface=_together(first[0].surface, moved[0].surface),
+        images=_BothImages(first[0].images, second[0].images),
+        notices=(),
+    )
+    _, tracks, placements, assets = first
+    _, more_tracks, more_placements, more_assets = moved
+    return (
+        joined,
+        [*tracks, *more_tracks][:objects],
+        [*placements, *more_placements][:objects],
+        [*assets, *more_assets][:objects],
+    )
+
+
+def _opposite(fronts: list[Rigid3], others: list[Rigid3]) -> Rigid3:
+    """The motion after which the other fronts face these ones across the aisle."""
+
+    def middle_and_yaw(poses: list[Rigid3]) -> tuple[np.ndarray, float]:
+        outward = -np.sum([pose.rotation[:, 1] for pose in poses], axis=0)
+        return np.mean([pose.translation for pose in poses], axis=0), float(np.arctan2(outward[1], outward[0]))
+
+    (here, facing), (there, other) = middle_and_yaw(fronts), middle_and_yaw(others)
+    turn = rotation_about_z(facing + np.pi - other)
+    target = here + _AISLE_M * np.array([np.cos(facing), np.sin(facing), 0.0])
+    shift = target - turn @ there
+    return Rigid3(turn, np.array([shift[0], shift[1], 0.0]))
+
+
+def _moved(placed: Placed, new_from_old: Rigid3) -> Placed:
+    """Everything of a kitchen that has a place in the world, moved; names and frame numbers made its own."""
+    capture, tracks, placements, assets = placed
+    frames = tuple(
+        replace(f, index=f.index + _SECOND, world_from_camera=new_from_old @ f.world_from_camera) for f in capture.frames
+    )
+    surface = replace(capture.surface, vertices_world=new_from_old.apply(capture.surface.vertices_world))
+    walls = tuple(_moved_wall(wall, new_from_old) for wall in capture.room.walls)
+    similar = Similarity3(1.0, new_from_old.rotation, new_from_old.translation)
+    return (
+        replace(capture, frames=frames, surface=surface, room=replace(capture.room, walls=walls), poses=None),
+        [_moved_track(track, new_from_old) for track in tracks],
+        [replace(p, object_name=f"b_{p.object_name}", world_from_mesh=similar @ p.world_from_mesh) for p in placements],
+        [replace(asset, object_name=f"b_{asset.object_name}") for asset in assets],
+    )
+
+
+def _moved_track(track: MaskTrack, new_from_old: Rigid3) -> MaskTrack:
+    front, box = track.front, track.box
+    return replace(
+        track,
+        name=f"b_{track.name}",
+        masks={index + _SECOND: mask for index, mask in track.masks.items()},
+        confidence={index + _SECOND: value for index, value in track.confidence.items()},
+        opened_m={index + _SECOND: value for index, value in track.opened_m.items()},
+        front=None if front is None else replace(front, world_from_front=new_from_old @ front.world_from_front),
+        box=None if box is None else replace(box, world_from_object=new_from_old @ box.world_from_object),
+    )
+
+
+def _moved_wall(wall: Wall, new_from_old: Rigid3) -> Wall:
+    normal = new_from_old.rotation @ wall.normal
+    return replace(wall, normal=normal, offset_m=wall.offset_m + float(normal @ new_from_old.translation))
+
+
+def _together(first: SceneSurface, second: SceneSurface) -> SceneSurface:
+    return SceneSurface(
+        vertices_world=np.concatenate([first.vertices_world, second.vertices_world]),
+        faces=np.concatenate([first.faces, second.faces + len(first.vertices_world)]),
+        colours=np.concatenate([first.colours, second.colours]),
+        voxel_m=first.voxel_m,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
