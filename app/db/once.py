@@ -1,7 +1,8 @@
 """A change that is sent again, because its answer got lost on the way, is not made again.
 
 The sender marks a change with a key of its own. The key is stored in the transaction that makes the change, the answer right
-after it; both are kept as long as a browser's session, for a tab may come back with what it could not send. A server that dies between the two has the key without the answer: the change was made.
+after it; both are kept as long as a browser's session, for a tab may come back with what it could not send. A server that
+dies between the two has the key without the answer: the change was made.
 """
 
 import time

@@ -84,9 +84,10 @@ class Figures(Shape):
     """What the project cost its people so far; times in seconds."""
 
     objects: int
-    clicks: int  # points set, moved and removed, objects confirmed, edited and deleted, undos
+    clicks: int  # points set, moved, removed; proposals confirmed, dismissed; objects edited, deleted; undos: each is one
     clicks_per_object: float | None
     verdicts: int  # verdicts and corrections
     automatic_kept: float | None  # share of accepted candidates that were the automatic choice
     upload_to_approval_s: float | None
+    computing_s: float  # of the import and the runs
     age_s: float

@@ -13,7 +13,7 @@ from app import schemas
 from app.db import history, queries
 from app.db.documents import inputs_key
 from app.db.engine import reading, writing
-from app.db.tables import Comment, Event, Project, Verdict
+from app.db.tables import Comment, Event, Job, Project, Verdict
 from app.errors import Conflict
 from app.services import masks, projects
 from app.services.context import Context
@@ -165,6 +165,7 @@ def _record(context: Context, session: Session, project: Project, to: str, reaso
 def _figures(session: Session, project: Project) -> schemas.Figures:
     items = queries.live_objects(session, project.id)
     clicks = _events(session, project.id, "prompts", without=("import",))
+    clicks += _events(session, project.id, "proposals", without=("restore",))
     accepted = select(Verdict.object_id).where(
         col(Verdict.object_id).in_([item.id for item in items]), Verdict.verdict == "accepted"
     )
@@ -173,6 +174,7 @@ def _figures(session: Session, project: Project) -> schemas.Figures:
     approved = session.exec(
         select(func.min(Event.at)).where(Event.project_id == project.id, Event.scope == SCOPE, Event.action == "approved")
     ).one()
+    jobs = select(Job).where(Job.project_id == project.id, col(Job.started).is_not(None))
     return schemas.Figures(
         objects=len(items),
         clicks=clicks,
@@ -180,6 +182,7 @@ def _figures(session: Session, project: Project) -> schemas.Figures:
         verdicts=_events(session, project.id, "review"),
         automatic_kept=named.count(False) / len(named) if named else None,
         upload_to_approval_s=approved - project.created if approved is not None else None,
+        computing_s=sum((job.finished or time.time()) - (job.started or time.time()) for job in session.exec(jobs)),
         age_s=time.time() - project.created,
     )
 

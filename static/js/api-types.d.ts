@@ -220,6 +220,7 @@ export interface Figures {
   verdicts: number;
   automatic_kept: number | null;
   upload_to_approval_s: number | null;
+  computing_s: number;
   age_s: number;
 }
 

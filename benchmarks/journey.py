@@ -1,0 +1,276 @@
+"""From upload to an approved bundle as a practised person goes, in a real Chromium, with the clock running.
+
+    python benchmarks/journey.py SAMPLE [--json benchmarks/app.json]
+
+SAMPLE is what `r2c2r sample` writes (180 frames, 14-15 objects). The person knows the room as well as its truth does: after all
+proposals from 80 % up are confirmed with one key, what is still missing gets a click where a person would click (prompts.json),
+what is no object is deleted, a wrong category is
+written anew. Then run, accept every object, send to review, approve, download.
+
+The app's own figures count the clicks (GET …/figures): each point, each proposal confirmed (also when one key confirms them
+all), dismissed or deleted, each new name or category, each undo is one. Key presses and mouse presses on the whole way are
+counted here beside it, and so is the time of computing in it. Exit status 1: more than 10 minutes, or 1.2 clicks an object.
+"""
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from playwright.sync_api import Page, expect, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from kept import add_options, report
+
+from app.jobs.mask_wire import bits_mask
+from tests.browser.conftest import CHROMIUM, QUIET, served
+
+MOST_MINUTES, MOST_CLICKS = 10.0, 1.2
+SAME = 0.5  # IoU from which a mask is that object
+LONG_MS = 1_800_000
+
+
+@dataclass
+class Person:
+    """A pair of hands whose presses are counted, and what they know of the room."""
+
+    page: Page
+    sample: Path
+    keys: int = 0
+    mouse: int = 0
+    minutes: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def project(self) -> str:
+        """The project's address in the API."""
+        found = re.search(r"/p/(\w+)", self.page.url)
+        assert found, self.page.url
+        return f"/api/projects/{found.group(1)}"
+
+    def ask(self, path: str) -> Any:
+        """What the app says; a look, no action."""
+        origin = re.match(r"https?://[^/]+", self.page.url)
+        assert origin
+        answer = self.page.context.request.get(origin.group() + path)
+        assert answer.ok, f"{path}: {answer.status} {answer.text()[:200]}"
+        return answer.json()
+
+    def press(self, key: str) -> None:
+        """One key."""
+        self.keys += 1
+        self.page.keyboard.press(key)
+
+    def click(self, target: Any, **where: Any) -> None:
+        """One press of the mouse."""
+        self.mouse += 1
+        target.click(timeout=LONG_MS, **where)
+
+    def write(self, target: Any, text: str) -> None:
+        """Into a field, and Enter."""
+        self.click(target)
+        self.keys += len(text) + 1
+        target.fill(text)
+        target.press("Enter")
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Minutes of a part of the way."""
+        began = time.monotonic()
+        yield
+        self.minutes[name] = round((time.monotonic() - began) / 60, 2)
+
+
+def journey(sample: Path, data: Path) -> dict[str, Any]:
+    """The figures of one journey."""
+    with served(data) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+        context.set_default_timeout(LONG_MS)
+        expect.set_options(timeout=LONG_MS)
+        page = context.new_page()
+        page.goto(address)
+        person = Person(page, sample)
+        with person.phase("upload and import"):
+            _upload(person)
+        with person.phase("proposals"):
+            _confirm(person)
+        with person.phase("corrections"):
+            right = _correct(person)
+        with person.phase("reconstruction"):
+            _run(person)
+        with person.phase("review"):
+            unmet = _review(person)
+        with person.phase("download"):
+            _download(person)
+        figures = person.ask(f"{person.project}/figures")
+        browser.close()
+    return {
+        "sample": sample.name,
+        "objects": figures["objects"],
+        "objects_of_the_truth_found": right,
+        "clicks": figures["clicks"],
+        "clicks_per_object": round(figures["clicks_per_object"], 2),
+        "verdicts": figures["verdicts"],
+        "automatic_kept": figures["automatic_kept"],
+        "upload_to_approval_minutes": round(figures["upload_to_approval_s"] / 60, 2),
+        "of_it_computing_minutes": round(figures["computing_s"] / 60, 2),
+        "minutes": person.minutes,
+        "key_presses": person.keys,
+        "mouse_presses": person.mouse,
+        "approved_in_spite_of": unmet,
+    }
+
+
+def _upload(person: Person) -> None:
+    page = person.page
+    with page.expect_file_chooser() as chooser:
+        person.click(page.get_by_role("button", name="Import a scan").first)
+    chooser.value.set_files(person.sample / "scan.r3d")
+    page.wait_for_url(re.compile(r"/p/\w+"))
+    page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
+
+
+def _confirm(person: Person) -> None:
+    """Wait for the proposals, look at them, confirm the sure ones with one key, wait for their masks."""
+    page = person.page
+    person.click(page.get_by_role("link", name="Annotate"))
+    expect(page.get_by_label("Proposals", exact=True)).to_contain_text("Y confirms", timeout=LONG_MS)
+    person.press("n")
+    person.press("Shift+Y")
+    expect(page.locator("r2c2r-object-list .head").first).to_be_visible(timeout=LONG_MS)
+    _masks_come(person)
+
+
+def _masks_come(person: Person) -> None:
+    """Until every object's masks are there."""
+    while True:
+        items = person.ask(f"{person.project}/objects")
+        if items and all(item["segment"] in ("done", "failed") for item in items):
+            return
+        person.page.wait_for_timeout(300)
+
+
+def _correct(person: Person) -> int:
+    """Delete what is nothing or twice, write categories anew, click what is missing; how many of the truth's are there then."""
+    wanted = {item["name"]: item["category"] for item in json.loads((person.sample / "truth.json").read_text())["objects"]}
+    found = _looked_at(person)
+    for item, name in found:
+        if name is None or name in [other for before, other in found if before["id"] < item["id"]]:
+            person.click(person.page.get_by_role("button", name=f"Delete {item['name']}", exact=True))
+        elif item["category"] != wanted[name]:
+            person.click(person.page.get_by_role("button", name=item["name"], exact=True))
+            person.write(person.page.get_by_label(f"Category of {item['name']}"), wanted[name])
+    missing = sorted(set(wanted) - {name for _, name in found})
+    for name in missing:
+        _click_object(person, name, wanted[name])
+    _masks_come(person)
+    return len(set(wanted) & {name for _, name in _looked_at(person) if name})
+
+
+def _looked_at(person: Person) -> list[tuple[dict[str, Any], str | None]]:
+    """Each object of the app, and which of the room's it shows on the frame it was clicked on."""
+    names = [item["name"] for item in json.loads((person.sample / "truth.json").read_text())["objects"]]
+    found: list[tuple[dict[str, Any], str | None]] = []
+    for item in person.ask(f"{person.project}/objects"):
+        frame = next(point["frame"] for point in item["points"] if point["label"])
+        shown = [mask for mask in person.ask(f"{person.project}/masks/{frame}") if mask["object"] == item["id"]]
+        shares = {name: _iou(bits_mask(shown[0]["mask"]), _truth_mask(person.sample, name, frame)) for name in names if shown}
+        best = max(shares, key=lambda name: shares[name], default=None)
+        found.append((item, best if best is not None and shares[best] >= SAME else None))
+    return found
+
+
+def _truth_mask(sample: Path, name: str, frame: int) -> np.ndarray:
+    path = sample / "truth_masks" / name / f"{frame:06d}.png"
+    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.exists() else None
+    return picture > 0 if picture is not None else np.zeros((1, 1), bool)
+
+
+def _iou(mask: np.ndarray, truth: np.ndarray) -> float:
+    if not truth.any():
+        return 0.0
+    same = cv2.resize(truth.astype(np.uint8), mask.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    return float((mask & same).sum() / max((mask | same).sum(), 1))
+
+
+def _click_object(person: Person, name: str, category: str) -> None:
+    """On the frame where it is seen best: its category, then one click on it."""
+    page = person.page
+    prompts = json.loads((person.sample / "prompts.json").read_text())["objects"]
+    point = next(item["points"][0] for item in prompts if item["name"] == name)
+    page.goto(re.sub(r"/annotate.*", f"/annotate?frame={point['frame']}", page.url))
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text(f"frame {point['frame']} ")
+    page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
+    before = len(person.ask(f"{person.project}/objects"))
+    person.write(page.get_by_label("Category of the next object"), category)
+    frames = person.ask(f"{person.project}/frames")
+    facts = next(frame for frame in frames if frame["index"] == point["frame"])
+    canvas = page.locator("r2c2r-frame-canvas canvas")
+    box = canvas.bounding_box()
+    assert box
+    scale = min(box["width"] / facts["width"], box["height"] / facts["height"])
+    left, top = (box["width"] - facts["width"] * scale) / 2, (box["height"] - facts["height"] * scale) / 2
+    person.click(canvas, position={"x": left + point["x"] * scale, "y": top + point["y"] * scale})
+    while len(person.ask(f"{person.project}/objects")) == before:
+        page.wait_for_timeout(50)
+
+
+def _run(person: Person) -> None:
+    page = person.page
+    person.click(page.get_by_role("link", name="Run", exact=True))
+    person.click(page.get_by_role("button", name="Run", exact=True))
+    page.get_by_role("heading", name="Result").wait_for(timeout=LONG_MS)
+
+
+def _review(person: Person) -> list[str]:
+    """Accept every object with one key each, then through the states; what was unmet when it was approved."""
+    page = person.page
+    person.click(page.get_by_role("link", name="Review").first)
+    groups = person.ask(f"{person.project}/candidates")
+    for number in range(len(groups)):
+        person.press("y")
+        expect(page.get_by_text(re.compile(f"^{number + 1} of {len(groups)} object"))).to_be_visible(timeout=LONG_MS)
+    unmet: list[str] = []
+    for text in ("Send to review", "Start the review", "Approve"):
+        person.click(page.get_by_role("button", name=text, exact=True))
+        left = next((m["unmet"] for m in person.ask(f"{person.project}/review")["moves"] if m["text"] == text), [])
+        if left:
+            unmet += left
+            dialog = page.get_by_role("dialog")
+            person.write(dialog.get_by_role("textbox"), "seen, and good enough")
+        page.get_by_role("button", name=text, exact=True).wait_for(state="detached")
+    return unmet
+
+
+def _download(person: Person) -> None:
+    page = person.page
+    person.click(page.get_by_role("link", name="Download").first)
+    with page.expect_download() as download:
+        person.click(page.get_by_role("link", name=re.compile("^Bundle")))
+    assert download.value.path().stat().st_size > 0
+
+
+def main() -> int:
+    """Go, report; 1 when it took too long or too many clicks."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sample", type=Path)
+    add_options(parser)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="r2c2r-journey-") as folder:
+        figures = journey(options.sample, Path(folder))
+    slow = figures["upload_to_approval_minutes"] > MOST_MINUTES
+    return report("journey", figures, options.json, failed=slow or figures["clicks_per_object"] > MOST_CLICKS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
