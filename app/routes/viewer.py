@@ -18,15 +18,21 @@ def open_viewer(context: Ctx, request: Request, project: str) -> schemas.ViewerS
 
 
 @router.post("/api/projects/{project}/viewer/show", operation_id="showInViewer")
-def show_in_viewer(context: Ctx, project: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
+def show_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
     """Change what the 3D view shows."""
-    return viewers.show(context, project, body)
+    return viewers.show(context, project, request.state.session, body)
 
 
 @router.post("/api/projects/{project}/viewer/joints", operation_id="setJoints")
-def set_joints(context: Ctx, project: str, body: schemas.JointValues) -> schemas.ViewerShown:
+def set_joints(context: Ctx, request: Request, project: str, body: schemas.JointValues) -> schemas.ViewerShown:
     """Move joints of the scene in the 3D view."""
-    return viewers.set_joints(context, project, body.values)
+    return viewers.set_joints(context, project, request.state.session, body.values)
+
+
+@router.post("/api/projects/{project}/viewer/place", operation_id="placeInViewer")
+def place_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
+    """Put what is being moved in the 3D view at a pose; without one, say where it was dragged to."""
+    return viewers.place(context, project, request.state.session, body)
 
 
 @router.get("/viewer/{token}/{path:path}", include_in_schema=False)

@@ -31,7 +31,7 @@ from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
 from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
 from app.schemas.system import Backend, Category, FolderEntry, FolderListing, SystemInfo
 from app.schemas.uploads import Upload, UploadIn
-from app.schemas.viewer import JointValues, ViewerSession, ViewerShow, ViewerShown
+from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
 
 __all__ = [
     "AccountIn",
@@ -111,6 +111,9 @@ __all__ = [
     "Upload",
     "UploadIn",
     "VerdictIn",
+    "ViewerBox",
+    "ViewerPlace",
+    "ViewerPlaced",
     "ViewerSession",
     "ViewerShow",
     "ViewerShown",

@@ -1,6 +1,6 @@
 """What the 3D view shows."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -17,6 +17,30 @@ class ViewerSession(Shape):
     fallback_image: str | None
 
 
+Row = Annotated[list[Annotated[float, Field(ge=-1e4, le=1e4)]], Field(min_length=4, max_length=4)]
+Pose = Annotated[list[Row], Field(min_length=4, max_length=4)]
+Side = Annotated[float, Field(gt=0, le=100)]
+
+
+class ViewerBox(Shape):
+    """The box of an object that is to be moved by hand."""
+
+    pose: Pose  # world_from_object
+    size: tuple[Side, Side, Side]  # width, depth, height in metres
+
+
+class ViewerPlace(Shape):
+    """Where to put the object that is moved by hand, world_from_object; null leaves it where it is."""
+
+    pose: Pose | None
+
+
+class ViewerPlaced(Shape):
+    """Where the object that is moved by hand is, world_from_object; null when none is."""
+
+    pose: list[list[float]] | None
+
+
 class ViewerShow(Shape):
     """What the 3D view shows."""
 
@@ -26,6 +50,7 @@ class ViewerShow(Shape):
     cloud: bool = True  # the scan behind it
     opacity: float = Field(default=1.0, ge=0.0, le=1.0)
     collision: bool = False  # colliders instead of what is seen (scene only)
+    box: ViewerBox | None = None  # with handles to move it by (aligned only, with an object)
     full: bool = False  # every point and face, whatever it costs
 
 
@@ -43,6 +68,7 @@ class ViewerShown(Shape):
 
     mode: str
     text: str
+    reduced: bool = False  # fewer points or faces than there are; `full` shows all
     joints: list[ViewerJoint]
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import anyio
 from fastapi import WebSocket
 from fastapi.responses import Response
 
@@ -36,7 +37,7 @@ def open_view(context: Context, project_id: str, session_id: str) -> schemas.Vie
     return schemas.ViewerSession(state="ready", url=f"/viewer/{token}/", message="", **instead)
 
 
-def show(context: Context, project_id: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
+def show(context: Context, project_id: str, session_id: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
     """Change what the 3D view shows."""
     from app.services.meshes import upright
 
@@ -57,25 +58,31 @@ def show(context: Context, project_id: str, body: schemas.ViewerShow) -> schemas
             wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.name if item else None)
         folder: Path | None = bundles.folder(context, project_id)
         wish["bundle"] = str(folder) if folder else None
-    return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, wish))
+    return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, session_id, wish))
 
 
-def set_joints(context: Context, project_id: str, values: dict[str, float]) -> schemas.ViewerShown:
+def set_joints(context: Context, project_id: str, session_id: str, values: dict[str, float]) -> schemas.ViewerShown:
     """Move joints of the shown scene."""
-    with reading(context.engine) as session:
-        queries.project_row(session, project_id)
-    return schemas.ViewerShown.model_validate(context.viewer.move(project_id, values))
+    shown = context.viewer.move(project_id, _workdir(context, project_id), session_id, values)
+    return schemas.ViewerShown.model_validate(shown)
+
+
+def place(context: Context, project_id: str, session_id: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
+    """Put what is being moved somewhere, or say where it is."""
+    placed = context.viewer.place(project_id, _workdir(context, project_id), session_id, body.pose)
+    return schemas.ViewerPlaced.model_validate(placed)
 
 
 async def page(context: Context, token: str, path: str, session_id: str) -> Response:
     """The 3D view's page, or a file of it."""
-    return await proxy.fetch_page(context.viewer.port(token, session_id), quote(path), context.viewer.key)
+    port = await anyio.to_thread.run_sync(context.viewer.port, token, session_id)
+    return await proxy.fetch_page(port, quote(path), context.viewer.key)
 
 
 async def socket(context: Context, token: str, connection: WebSocket) -> None:
     """The 3D view's connection."""
     try:
-        port = context.viewer.port(token, connection.state.session)
+        port = await anyio.to_thread.run_sync(context.viewer.port, token, connection.state.session)
     except (Forbidden, Unavailable) as error:
         await connection.close(4403 if isinstance(error, Forbidden) else 1013, error.message)
         return
@@ -88,6 +95,11 @@ async def _session_end(context: Context, connection: WebSocket) -> None:
     person = connection.state.person
     while person is not None:
         person = await context.people.until_other(connection.state.session, person)
+
+
+def _workdir(context: Context, project_id: str) -> Path:
+    with reading(context.engine) as session:
+        return context.files(queries.project_row(session, project_id)).work
 
 
 def _chosen(context: Context, project_id: str, object_id: int) -> str:

@@ -1,12 +1,16 @@
-"""The web process's end of the viewer: starts its process when somebody looks, asks it things, knows who may look."""
+"""The web process's end of the viewer: starts its process when somebody looks, asks it things, knows who may look at what.
 
+Each session has a view of its own of each project: what one person shows, turns or moves, nobody else sees.
+"""
+
+import hashlib
 import queue
 import secrets
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +21,28 @@ from r2c2r_core.errors import InputError
 
 ANSWER_S = 60.0
 TOKEN_S = 12 * 3600.0
+MOST_VIEWS = 24  # each holds what it shows
 WORKER = python_module("app.viewer.worker")
 
 
 @dataclass(slots=True)
-class Grant:
-    """Who may look at what through one token."""
+class Opened:
+    """One session's view of one project, and the token by which its page is reached."""
 
-    session: str
     project: str
-    until: float
+    session: str
+    workdir: Path
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
+    until: float = field(default_factory=lambda: time.monotonic() + TOKEN_S)
+    port: int | None = None  # None while it is not running
+    used: float = field(default_factory=time.monotonic)
+    watching: int = 0
+    shown: dict[str, Any] | None = None  # to be shown again after the process was started anew
+
+    @property
+    def name(self) -> str:
+        """What the viewer's process calls it."""
+        return f"{self.project}/{hashlib.sha256(self.session.encode()).hexdigest()[:16]}"
 
 
 class Viewer:
@@ -36,86 +52,135 @@ class Viewer:
         self.enabled = enabled
         self._settings, self._command = settings, command
         self.key = secrets.token_urlsafe(24)
-        self._grants: dict[str, Grant] = {}
-        self._ports: dict[str, int] = {}
-        self._used: dict[str, float] = {}
-        self._watching: dict[str, int] = {}
+        self._views: dict[tuple[str, str], Opened] = {}
         self._worker: Worker | None = None
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._number = 0
 
     def open(self, project: str, workdir: Path, session: str) -> str:
-        """A token by which this session reaches the project's view; raises Unavailable when there is no viewer."""
-        self._ports[project] = int(self._ask({"cmd": "open", "project": project, "workdir": str(workdir)})["port"])
-        self._used[project] = time.monotonic()
-        for token, grant in tuple(self._grants.items()):
-            if grant.session == session and grant.project == project and grant.until > time.monotonic():
-                return token
-        token = secrets.token_urlsafe(16)
-        self._grants[token] = Grant(session, project, time.monotonic() + TOKEN_S)
-        return token
+        """A token by which this session reaches its view; raises Unavailable when there is no viewer."""
+        return self._running_view(project, workdir, session).token
 
-    def show(self, project: str, workdir: Path, wish: dict[str, Any]) -> dict[str, Any]:
-        """Change what the view shows."""
-        if project not in self._ports:
-            self._ports[project] = int(self._ask({"cmd": "open", "project": project, "workdir": str(workdir)})["port"])
-        return self._ask({"cmd": "show", "project": project, **wish})
+    def show(self, project: str, workdir: Path, session: str, wish: dict[str, Any]) -> dict[str, Any]:
+        """Change what the session's view shows."""
+        view = self._running_view(project, workdir, session)
+        answer = self._ask({"cmd": "show", "view": view.name, **wish})
+        view.shown = wish
+        return answer
 
-    def move(self, project: str, values: dict[str, float]) -> dict[str, Any]:
+    def move(self, project: str, workdir: Path, session: str, values: dict[str, float]) -> dict[str, Any]:
         """Move joints of the shown scene."""
-        return self._ask({"cmd": "joints", "project": project, "values": values})
+        return self._ask({"cmd": "joints", "view": self._running_view(project, workdir, session).name, "values": values})
+
+    def place(self, project: str, workdir: Path, session: str, pose: list[list[float]] | None) -> dict[str, Any]:
+        """Put the object that is being moved somewhere; with None, where it is."""
+        return self._ask({"cmd": "place", "view": self._running_view(project, workdir, session).name, "pose": pose})
 
     def port(self, token: str, session: str) -> int:
-        """The loopback port behind a token; raises Forbidden for a token of somebody else, Unavailable when it is down."""
-        grant = self._grants.get(token)
-        if grant is None or grant.session != session or grant.until < time.monotonic():
-            raise Forbidden("this 3D view belongs to another session or has expired", hint="open the review page again")
-        self._used[grant.project] = time.monotonic()
-        if grant.project not in self._ports or self._worker is None or not self._worker.alive:
-            raise Unavailable("the 3D view is not running", hint="open the review page again")
-        return self._ports[grant.project]
+        """The loopback port behind a token, its view started anew where it has stopped.
 
-    def close(self, project: str, *, forget: bool = True) -> None:
-        """Close a project's view; with `forget` its tokens are worth nothing any more."""
-        for token in [token for token, grant in self._grants.items() if grant.project == project and forget]:
-            del self._grants[token]
-        if self._ports.pop(project, None) is not None:
-            try:
-                self._ask({"cmd": "close", "project": project})
-            except (Unavailable, InputError):
-                return
+        Raises Forbidden for a token of somebody else, Unavailable when there is no viewer.
+        """
+        view = self._view_of(token)
+        if view is None or view.session != session or view.until < time.monotonic():
+            raise Forbidden("this 3D view belongs to another session or has expired", hint="open the review page again")
+        running = self._running_view(view.project, view.workdir, session)
+        assert running.port is not None
+        return running.port
+
+    def close(self, project: str) -> None:
+        """Close everybody's views of a project; their tokens are worth nothing any more."""
+        for view in [view for view in self._views.values() if view.project == project]:
+            self._views.pop((view.project, view.session), None)
+            self._end(view)
 
     def close_idle(self) -> None:
-        """Close views that nobody has looked at for a while."""
+        """Close views that nobody has looked at for a while; their tokens open them again."""
         limit = time.monotonic() - self._settings.viewer_idle_s
-        for project in [p for p, used in self._used.items() if used < limit and not self._watching.get(p)]:
-            self._used.pop(project)
-            self.close(project, forget=False)
+        for key, view in tuple(self._views.items()):
+            if view.used < limit and not view.watching:
+                self._end(view)
+            if view.until < time.monotonic() and view.port is None:
+                self._views.pop(key, None)
 
     @contextmanager
     def watched(self, token: str) -> Iterator[None]:
         """Keep the view behind the token open while somebody is connected."""
-        project = self._grants[token].project
-        self._watching[project] = self._watching.get(project, 0) + 1
+        view = self._view_of(token)
+        if view is None:
+            raise Forbidden("this 3D view has been closed", hint="open the review page again")
+        view.watching += 1
         try:
             yield
         finally:
-            self._watching[project] -= 1
-            self._used[project] = time.monotonic()
+            view.watching -= 1
+            view.used = time.monotonic()
 
     def stop(self) -> None:
         """End the process."""
         with self._lock:
             if self._worker is not None:
-                self._worker.kill()
-                self._worker.close()
-                self._worker = None
+                self._forget(self._worker)
+
+    def _view_of(self, token: str) -> Opened | None:
+        return next((view for view in tuple(self._views.values()) if secrets.compare_digest(view.token, token)), None)
+
+    def _running_view(self, project: str, workdir: Path, session: str) -> Opened:
+        """The session's view, running and showing what it showed last."""
+        view = self._views.get((project, session))
+        if view is not None and self._runs(view):  # without the lock: somebody's large scene may be on its way
+            view.used = time.monotonic()
+            return view
+        with self._lock:
+            found = self._views.get((project, session))
+            view = found if found is not None and found.until > time.monotonic() else Opened(project, session, workdir)
+            view.used = time.monotonic()
+            if self._runs(view):
+                return view
+            self._make_room()
+            view.port = int(self._ask({"cmd": "open", "view": view.name, "workdir": str(workdir)})["port"])
+            self._views[project, session] = view
+            self._show_again(view)
+            return view
+
+    def _runs(self, view: Opened) -> bool:
+        worker = self._worker
+        return view.port is not None and view.until > time.monotonic() and worker is not None and worker.alive
+
+    def _show_again(self, view: Opened) -> None:
+        """What the view showed before it was closed or its process ended; what is gone meanwhile is not shown."""
+        wish, view.shown = view.shown, None
+        if wish is None:
+            return
+        try:
+            self._ask({"cmd": "show", "view": view.name, **wish})
+            view.shown = wish
+        except InputError:
+            return
+
+    def _make_room(self) -> None:
+        running = [view for view in self._views.values() if view.port is not None]
+        if len(running) < MOST_VIEWS:
+            return
+        idle = sorted((view for view in running if not view.watching), key=lambda view: view.used)
+        if not idle:
+            raise Unavailable(f"{len(running)} people look at 3D views already", hint="try again when one has left")
+        self._end(idle[0])
+
+    def _end(self, view: Opened) -> None:
+        port, view.port = view.port, None
+        if port is not None and self._worker is not None and self._worker.alive:
+            try:
+                self._ask({"cmd": "close", "view": view.name})
+            except (Unavailable, InputError):
+                return
 
     def _ask(self, command: dict[str, Any]) -> dict[str, Any]:
         with self._lock:
             worker = self._running()
             self._number += 1
             if not worker.say({"id": self._number, **command}):
+                self._forget(worker)
                 raise self._down()
             answer = self._answer(worker)
         if "error" in answer:
@@ -132,8 +197,7 @@ class Viewer:
             except queue.Empty:
                 break
             if line is None:
-                self._forget(worker)
-                raise self._down()
+                break
             if line.get("id") == self._number:
                 return line
         self._forget(worker)
@@ -143,7 +207,8 @@ class Viewer:
         worker.kill()
         worker.close()
         self._worker = None
-        self._ports.clear()
+        for view in self._views.values():
+            view.port = None
 
     def _running(self) -> Worker:
         if not self.enabled:

@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from app.viewer import gizmo as handles
+from app.viewer.reduced import MAX_FACES, reduced
 from r2c2r_core.errors import InputError
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.workspace import Workspace
 
@@ -28,7 +31,7 @@ class Joint:
 
 @dataclass(slots=True)
 class View:
-    """One project's server and what is on it."""
+    """One person's server for one project, and what is on it."""
 
     server: Any
     work: Workspace
@@ -39,12 +42,16 @@ class View:
     joints: list[Joint] = field(default_factory=list)
     mode: str = ""
     text: str = ""
+    full: bool = False  # every point and face was asked for
+    reduced: bool = False  # fewer points or faces are shown than there are
+    gizmo: handles.Gizmo | None = None
     known_capture: Any = None
 
     def show(self, wish: dict[str, Any]) -> None:
         """Replace what is shown."""
         self._clear()
-        self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud", bool(wish.get("full")))
+        self.full, self.reduced = bool(wish.get("full")), False
+        self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud")
         self.mode = wish["mode"]
         self.text = _MODES[self.mode](self, wish)
         for number, mark in enumerate(wish.get("marks", ())):
@@ -62,28 +69,43 @@ class View:
         if self.urdf is not None and self.joints:
             self.urdf.update_cfg(np.array([joint.value for joint in self.joints]))
 
+    def place(self, pose: np.ndarray) -> None:
+        """Put what is being moved at a pose, world_from_object (4, 4)."""
+        if self.gizmo is None:
+            raise InputError("nothing is being moved", hint="choose an object over the scan and press Move it")
+        self.gizmo.put(Rigid3.from_matrix(pose))
+
+    @property
+    def pose(self) -> list[list[float]] | None:
+        """Where what is being moved is, world_from_object; None when nothing is."""
+        return self.gizmo.pose.matrix.tolist() if self.gizmo is not None else None
+
     def _clear(self) -> None:
         for handle in self.shown:
             handle.remove()
         self.shown.clear()
+        if self.gizmo is not None:
+            self.gizmo.remove()
+            self.gizmo = None
         if self.urdf is not None:
             with warnings.catch_warnings(action="ignore"):  # it removes frames before the meshes that hang on them
                 self.urdf.remove()
         self.urdf, self.joints = None, []
 
-    def _show_cloud(self, wanted: bool, full: bool) -> None:
-        if wanted and (not self.cloud or (full and not self.cloud_full)):
+    def _show_cloud(self, wanted: bool) -> None:
+        if wanted and (not self.cloud or self.full != self.cloud_full):
             for handle in self.cloud:
                 handle.remove()
-            self.cloud = self._add_cloud(full)
-            self.cloud_full = full
+            self.cloud = self._add_cloud()
+            self.cloud_full = self.full
         for handle in self.cloud:
             handle.visible = wanted
+        self.reduced |= wanted and not self.full and len(self._capture().surface.vertices_world) > MAX_POINTS
 
-    def _add_cloud(self, full: bool) -> list[Any]:
+    def _add_cloud(self) -> list[Any]:
         surface = self._capture().surface
         order = np.random.default_rng(0).permutation(len(surface.vertices_world))
-        order = order if full else order[:MAX_POINTS]
+        order = order if self.full else order[:MAX_POINTS]
         size = max(surface.voxel_m, 0.004)
         return [
             self.server.scene.add_point_cloud(
@@ -111,8 +133,7 @@ class View:
         rotation = np.asarray(wish.get("rotation", np.eye(3)), dtype=np.float64)
         vertices = asset.mesh.vertices @ rotation.T
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        for handle in self.cloud:  # a candidate has its own frame: the scan means nothing beside it
-            handle.visible = False
+        self._show_cloud(False)  # a candidate has its own frame: the scan means nothing beside it
         self.shown.append(self._add_mesh("/shown/0", asset.mesh, vertices, float(wish.get("opacity", 1.0))))
         radius = float(np.linalg.norm(vertices, axis=1).max())
         self._look(np.array([-0.5, -1.6, 0.6]) * 1.6 * radius, np.zeros(3))
@@ -121,6 +142,9 @@ class View:
     def _show_aligned(self, wish: dict[str, Any]) -> str:
         names = [wish["name"]] if wish.get("name") else self.work.names("align")
         centres = []
+        moved = wish.get("box") if wish.get("name") else None
+        if moved:
+            self.gizmo = handles.add(self.server.scene, Rigid3.from_matrix(np.asarray(moved["pose"])), moved["size"])
         for number, name in enumerate(names):
             placement = self.work.load_latest("align", name)
             if placement is None:
@@ -129,11 +153,16 @@ class View:
                 continue
             asset = self._asset({"name": name, "candidate": placement.candidate_id})
             vertices = placement.world_from_mesh.apply(asset.mesh.vertices)
-            self.shown.append(self._add_mesh(f"/shown/{number}", asset.mesh, vertices, float(wish.get("opacity", 1.0))))
+            opacity = float(wish.get("opacity", 1.0))
+            if self.gizmo is not None:
+                local = self.gizmo.pose.inverse.apply(vertices)
+                self._add_mesh(f"{handles.NODE}/mesh", asset.mesh, local, opacity)
+            else:
+                self.shown.append(self._add_mesh(f"/shown/{number}", asset.mesh, vertices, opacity))
             centres.append((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
         if not centres:
             raise InputError("nothing is placed yet", hint="run the project first")
-        self._look_from_path(np.mean(centres, axis=0))
+        self._look_from_path(np.mean(centres, axis=0), distance=0.6 if self.gizmo is not None else 1.15)
         return f"{len(centres)} placed mesh{'es' if len(centres) > 1 else ''} over the scan"
 
     def _show_scene(self, wish: dict[str, Any]) -> str:
@@ -183,6 +212,9 @@ class View:
             look |= {"baseColorFactor": [255, 255, 255, round(255 * opacity)], "alphaMode": "BLEND"}
         visual = trimesh.visual.TextureVisuals(uv=mesh.uv, material=trimesh.visual.material.PBRMaterial(**look))
         shown = trimesh.Trimesh(vertices, mesh.faces, visual=visual, process=False)
+        if len(mesh.faces) > MAX_FACES:
+            self.reduced |= not self.full
+            shown = shown if self.full else reduced(shown)
         _ = shown.vertex_normals  # without them every face is shaded flat
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 

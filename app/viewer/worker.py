@@ -1,7 +1,7 @@
-"""The viewer's process: `python -m app.viewer.worker`, one viser server per open project, commanded by JSON lines.
+"""The viewer's process: `python -m app.viewer.worker`, one viser server per open view, commanded by JSON lines.
 
-Reads {"id", "cmd": "open" | "show" | "joints" | "close", "project", …} and prints {"id", "ok": {…}} or {"id", "error": {…}}.
-The first line is the key that the app's proxy will show. End of input ends it.
+Reads {"id", "cmd": "open" | "show" | "joints" | "place" | "close", "view", …} and prints {"id", "ok": {…}}
+or {"id", "error": {…}}. The first line is the key that the app's proxy will show. End of input ends it.
 """
 
 import json
@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from app.viewer import contract
 from app.viewer.scene import View
@@ -41,10 +43,10 @@ def main() -> int:
 
 
 def _open(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
-    project = command["project"]
-    if project not in views:
-        views[project] = View(_prepared(contract.open_server(key)), Workspace(Path(command["workdir"])))
-    return {"port": views[project].server.get_port()}
+    name = command["view"]
+    if name not in views:
+        views[name] = View(_prepared(contract.open_server(key)), Workspace(Path(command["workdir"])))
+    return {"port": views[name].server.get_port()}
 
 
 def _show(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
@@ -59,21 +61,29 @@ def _joints(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[s
     return _state(view)
 
 
+def _place(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    view = _view(views, command)
+    if command["pose"] is not None:
+        view.place(np.asarray(command["pose"], dtype=np.float64))
+    return {"pose": view.pose}
+
+
 def _close(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
-    view = views.pop(command["project"], None)
+    view = views.pop(command["view"], None)
     if view is not None:
         view.server.stop()
     return {}
 
 
 def _view(views: dict[str, View], command: dict[str, Any]) -> View:
-    if command["project"] not in views:
+    if command["view"] not in views:
         raise InputError("the 3D view of this project is not open", hint="open it first")
-    return views[command["project"]]
+    return views[command["view"]]
 
 
 def _state(view: View) -> dict[str, Any]:
-    return {"mode": view.mode, "text": view.text, "joints": [asdict(joint) for joint in view.joints]}
+    joints = [asdict(joint) for joint in view.joints]
+    return {"mode": view.mode, "text": view.text, "reduced": view.reduced, "joints": joints}
 
 
 def _prepared(server: Any) -> Any:
@@ -88,6 +98,7 @@ _COMMANDS: dict[str, Callable[[dict[str, View], str, dict[str, Any]], dict[str, 
     "open": _open,
     "show": _show,
     "joints": _joints,
+    "place": _place,
     "close": _close,
 }
 

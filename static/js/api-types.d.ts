@@ -769,12 +769,28 @@ export interface VerdictIn {
   version?: number | null;
 }
 
+/** The box of an object that is to be moved by hand. */
+export interface ViewerBox {
+  pose: number[][];
+  size: [number, number, number];
+}
+
 /** One joint of the scene the 3D view shows. */
 export interface ViewerJoint {
   name: string;
   lower: number;
   upper: number;
   value: number;
+}
+
+/** Where to put the object that is moved by hand, world_from_object; null leaves it where it is. */
+export interface ViewerPlace {
+  pose: number[][] | null;
+}
+
+/** Where the object that is moved by hand is, world_from_object; null when none is. */
+export interface ViewerPlaced {
+  pose: number[][] | null;
 }
 
 /** Where the 3D view of a project is; `fallback` when it is down. */
@@ -794,6 +810,7 @@ export interface ViewerShow {
   cloud?: boolean;
   opacity?: number;
   collision?: boolean;
+  box?: ViewerBox | null;
   full?: boolean;
 }
 
@@ -801,6 +818,7 @@ export interface ViewerShow {
 export interface ViewerShown {
   mode: string;
   text: string;
+  reduced: boolean;
   joints: ViewerJoint[];
 }
 
@@ -942,6 +960,8 @@ export interface Operations {
   openViewer: { parameters: { project: string }; body: undefined; answer: ViewerSession };
   /** POST /api/projects/{project}/viewer/joints */
   setJoints: { parameters: { project: string }; body: JointValues; answer: ViewerShown };
+  /** POST /api/projects/{project}/viewer/place */
+  placeInViewer: { parameters: { project: string }; body: ViewerPlace; answer: ViewerPlaced };
   /** POST /api/projects/{project}/viewer/show */
   showInViewer: { parameters: { project: string }; body: ViewerShow; answer: ViewerShown };
   /** GET /api/system */

@@ -1,11 +1,10 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, ObjectIn, ObjectPatch, PointIn, PointPatch, Undone, Lane, Proposals,
- *   FrameMask, LiveStatus, Job, JobEvent, CandidateGroup, Reviewed, VerdictIn, OverridePatch, SceneSummary, Certificate,
- *   Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment, CommentIn, Figures, ObjectPhotos, ViewerSession, ViewerShown, ViewerShow,
- *   BundleChange, BundleCheck, RunRequest, HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo,
- *   AccountIn, AccountPatch
+ *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, Lane, Proposals, FrameMask, LiveStatus, Job, JobEvent,
+ *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
+ *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
+ *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch
  * } from "./api-types" */
 
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
@@ -22,23 +21,10 @@ export class ApiError extends Error {
     this.hint = body.hint ?? "";
     this.current = body.current;
   }
-}
 
-/** @type {{ key: string, calls: number } | null} */
-let marking = null;
-
-/**
- * Mark the changes that `act` asks for at once: sent again under the same key, the server makes them no second time.
- * @template T
- * @param {string} key
- * @param {() => T} act
- */
-export function marked(key, act) {
-  marking = { key, calls: 0 };
-  try {
-    return act();
-  } finally {
-    marking = null;
+  /** Whether nobody answered for the server: not it, or only what stands before it. */
+  get unreachable() {
+    return this.status === 0 || (this.kind === "internal" && [502, 503, 504].includes(this.status));
   }
 }
 
@@ -49,7 +35,6 @@ export function marked(key, act) {
 async function call(path, { method = "GET", json, body, signal, headers: more = {} } = {}) {
   /** @type {Record<string, string>} */
   const headers = method === "GET" ? {} : { "X-Requested-With": "r2c2r", ...more };
-  if (marking && method !== "GET") headers["Idempotency-Key"] = `${marking.key}.${marking.calls++}`;
   if (json !== undefined) headers["Content-Type"] = "application/json";
   else if (body !== undefined) headers["Content-Type"] = "application/octet-stream";
   /** @type {Response} */
@@ -95,6 +80,17 @@ const get = async (path, signal) => (await call(path, { signal })).json();
 const send = async (method, path, json = {}) => (await call(path, { method, json })).json();
 /** @param {string} id */
 const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
+
+/**
+ * Send a change; the server does it once however often it comes with the same key.
+ * @param {string} method
+ * @param {string} path
+ * @param {Record<string, unknown>} json
+ * @param {string} key
+ * @returns {Promise<unknown>}
+ */
+export const perform = async (method, path, json, key) =>
+  (await call(path, { method, json, headers: { "Idempotency-Key": key } })).json();
 
 /** @param {string} name @param {string} password */
 export const signIn = (name, password) => call("/api/login", { method: "POST", json: { name, password } });
@@ -165,31 +161,8 @@ export async function uploadRecording(file, onProgress, signal) {
 
 /** @param {string} id @returns {Promise<SceneObject[]>} */
 export const listObjects = (id) => get(`${of(id)}/objects`);
-/** @param {string} id @param {Partial<ObjectIn>} object @param {boolean} infer @returns {Promise<SceneObject>} */
-export const addObject = (id, object, infer = true) => send("POST", `${of(id)}/objects?infer=${infer}`, object);
-/** @param {string} id @param {number} object @param {Partial<ObjectPatch>} patch @returns {Promise<SceneObject>} */
-export const changeObject = (id, object, patch) => send("PATCH", `${of(id)}/objects/${object}`, patch);
-/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
-export const deleteObject = (id, object) => send("DELETE", `${of(id)}/objects/${object}`);
-/** @param {string} id @param {number} object @param {PointIn} point @param {boolean} infer @returns {Promise<SceneObject>} */
-export const addPoint = (id, object, point, infer = true) =>
-  send("POST", `${of(id)}/objects/${object}/points?infer=${infer}`, point);
-/** @param {string} id @param {number} object @param {PointIn[]} points @param {boolean} infer @returns {Promise<SceneObject>} */
-export const addPoints = (id, object, points, infer = true) =>
-  send("POST", `${of(id)}/objects/${object}/clicks?infer=${infer}`, { points });
 /** @param {string} id @param {number} object @param {AbortSignal} [signal] @returns {Promise<ObjectPoints>} */
 export const getObjectPoints = (id, object, signal) => get(`${of(id)}/objects/${object}/cloud`, signal);
-/** @param {string} id @param {number} object @param {number} point @param {Partial<PointPatch>} patch @returns {Promise<SceneObject>} */
-export const changePoint = (id, object, point, patch) =>
-  send("PATCH", `${of(id)}/objects/${object}/points/${point}`, patch);
-/** @param {string} id @param {number} object @param {number} point @returns {Promise<SceneObject>} */
-export const deletePoint = (id, object, point) => send("DELETE", `${of(id)}/objects/${object}/points/${point}`);
-/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
-export const segmentObject = (id, object) => send("POST", `${of(id)}/objects/${object}/segment`);
-/** @param {string} id @param {number} object @returns {Promise<SceneObject>} */
-export const cancelSegment = (id, object) => send("POST", `${of(id)}/objects/${object}/segment/cancel`);
-/** @param {string} id @param {"undo" | "redo"} which @param {number | null} object @param {"prompts" | "review"} scope @returns {Promise<Undone>} */
-export const undoRedo = (id, which, object, scope) => send("POST", `${of(id)}/${which}`, { object, scope });
 
 /** @param {string} id @returns {Promise<LiveStatus>} */
 export const openLive = (id) => send("POST", `${of(id)}/live/open`);
@@ -200,10 +173,6 @@ export const getMasks = (id, frame, signal) => get(`${of(id)}/masks/${frame}`, s
 
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Proposals>} */
 export const getProposals = (id, signal) => get(`${of(id)}/proposals`, signal);
-/** @param {string} id @param {string[]} ids @returns {Promise<SceneObject[]>} */
-export const confirmProposals = (id, ids) => send("POST", `${of(id)}/proposals/confirm`, { ids });
-/** @param {string} id @param {string[]} ids @returns {Promise<Proposals>} */
-export const dismissProposals = (id, ids) => send("POST", `${of(id)}/proposals/dismiss`, { ids });
 /** @param {string} id @returns {Promise<Proposals>} */
 export const restoreProposals = (id) => send("POST", `${of(id)}/proposals/restore`);
 
@@ -224,10 +193,6 @@ export const getJobLog = async (job) => (await call(`/api/jobs/${job}/log`)).tex
 
 /** @param {string} id @returns {Promise<CandidateGroup[]>} */
 export const listCandidates = (id) => get(`${of(id)}/candidates`);
-/** @param {string} id @param {number} object @param {VerdictIn} verdict @returns {Promise<Reviewed>} */
-export const giveVerdict = (id, object, verdict) => send("POST", `${of(id)}/objects/${object}/verdicts`, verdict);
-/** @param {string} id @param {number} object @param {Partial<OverridePatch>} patch @returns {Promise<Reviewed>} */
-export const changeOverride = (id, object, patch) => send("PATCH", `${of(id)}/objects/${object}/override`, patch);
 /** @param {string} id @param {number} object @param {File} file @returns {Promise<Reviewed>} */
 export const uploadCandidate = async (id, object, file) => {
   const query = new URLSearchParams({ filename: file.name });
@@ -242,8 +207,6 @@ export const stepReview = (id, step) => send("POST", `${of(id)}/review`, step);
 export const getFigures = (id) => get(`${of(id)}/figures`);
 /** @param {string} id @returns {Promise<Comment[]>} */
 export const listComments = (id) => get(`${of(id)}/comments`);
-/** @param {string} id @param {Partial<CommentIn>} comment @returns {Promise<Comment>} */
-export const addComment = (id, comment) => send("POST", `${of(id)}/comments`, comment);
 /** @param {string} id @param {number} comment @param {boolean} resolved @returns {Promise<Comment>} */
 export const resolveComment = (id, comment, resolved) => send("PATCH", `${of(id)}/comments/${comment}`, { resolved });
 
@@ -266,3 +229,5 @@ export const openViewer = (id) => send("POST", `${of(id)}/viewer`);
 export const showInViewer = (id, what) => send("POST", `${of(id)}/viewer/show`, what);
 /** @param {string} id @param {Record<string, number>} values @returns {Promise<ViewerShown>} */
 export const moveJoints = (id, values) => send("POST", `${of(id)}/viewer/joints`, { values });
+/** Put what is being moved in the 3D view somewhere; with null, learn where it was dragged. @param {string} id @param {number[][] | null} pose @returns {Promise<ViewerPlaced>} */
+export const placeInViewer = (id, pose) => send("POST", `${of(id)}/viewer/place`, { pose });

@@ -46,6 +46,17 @@ export function icon(name) {
   return svg;
 }
 
+/**
+ * A labelled field for a number.
+ * @param {string} text
+ * @param {number} value
+ * @param {Record<string, string>} options
+ */
+export function numberField(text, value, options) {
+  const input = h("input", { type: "number", value: String(Math.round(10 * value) / 10), ...options });
+  return { input, label: h("label", {}, h("span", { class: "muted" }, text), input) };
+}
+
 /** An element whose listeners, fetches and timers end when it leaves the page. */
 export class LiveElement extends HTMLElement {
   #controller = new AbortController();

@@ -1,5 +1,6 @@
 /** The only file with side effects: defines the elements and starts the router. */
 
+import { merged } from "./conflict.js";
 import { AppShell } from "./elements/app-shell.js";
 import { BackendChoice } from "./elements/backend-choice.js";
 import { CommandPalette } from "./elements/command-palette.js";
@@ -14,6 +15,7 @@ import { DownloadPage } from "./pages/download.js";
 import { OverviewPage } from "./pages/overview.js";
 import { ProjectsPage } from "./pages/projects.js";
 import { RunPage } from "./pages/run.js";
+import { outbox } from "./outbox.js";
 import { Presence } from "./presence.js";
 import { startRouter } from "./router.js";
 
@@ -33,5 +35,6 @@ customElements.define("r2c2r-run", RunPage);
 customElements.define("r2c2r-download", DownloadPage);
 customElements.define("r2c2r-app", AppShell);
 
+outbox.merge = merged;
 const shell = document.querySelector("r2c2r-app");
 if (shell instanceof AppShell) startRouter((route) => shell.show(route));

@@ -1,79 +1,165 @@
 /**
- * Changes on their way to the server, one after the other. What cannot be sent waits and is tried again, so that a lost
- * connection loses no click; one key for all tries, so that a lost answer repeats none. Says "change" whenever the number of waiting ones or the state does.
+ * Changes on their way to the server, one after the other. Each is kept in the browser's storage until it is answered, so that
+ * neither a lost connection nor a closed tab loses any; its key lets the server do it once however often it is sent.
+ * Says "change" whenever the number of waiting ones or the state does, "refused" when one of an earlier visit is.
  */
 
-import { ApiError, marked } from "./api.js";
+import { ApiError, perform } from "./api.js";
+import { forget, keep, keptBy, named } from "./lib/kept.js";
 import { live } from "./live.js";
+
+/** @typedef {import("./lib/kept.js").Kept} Kept */
+/**
+ * @template T
+ * @typedef {import("./changes.js").Change<T>} Change
+ */
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5000;
 
 class Outbox extends EventTarget {
   #chain = Promise.resolve();
-  waiting = 0;
+  #user = "";
+  /** @type {Kept[]} */
+  #waiting = [];
+  /** What to send instead of a change that somebody else's disagrees with; null lets theirs stand. @type {(change: Kept, stored: unknown) => Promise<Change<unknown> | null>} */
+  merge = async () => null;
   /** Whether the server did not answer last time. */
   stuck = false;
+  /** Whether what waits would outlive this page. */
+  safe = true;
 
   constructor() {
     super();
-    addEventListener("beforeunload", (event) => this.waiting && event.preventDefault());
+    addEventListener("beforeunload", (event) => this.#waiting.length && !this.safe && event.preventDefault());
+  }
+
+  get waiting() {
+    return this.#waiting.length;
+  }
+
+  /**
+   * Know whose changes these are, and send what an earlier visit of that person left.
+   * @param {string} user
+   */
+  begin(user) {
+    this.#user = user;
+    const here = new Set(this.#waiting.map(({ key }) => key));
+    for (const change of keptBy(localStorage, user).filter(({ key }) => !here.has(key))) {
+      this.#enqueue(change).then(
+        () => this.dispatchEvent(new Event("caught-up")),
+        (error) => this.dispatchEvent(new CustomEvent("refused", { detail: error })),
+      );
+    }
   }
 
   /**
    * Send a change after those before it; resolves with what the server said, rejects with what it refused.
    * @template T
-   * @param {() => Promise<T>} act
+   * @param {Change<T>} change
+   * @param {string} [key]
    * @returns {Promise<T>}
    */
-  send(act) {
-    this.#say(1);
-    const done = this.#chain.then(() => this.#try(act));
-    this.#chain = done.then(
-      () => this.#say(-1),
-      () => this.#say(-1),
-    );
+  send(change, key = newKey()) {
+    const kept = { ...change, key, user: this.#user, at: now() };
+    this.safe = keep(localStorage, kept) && this.safe;
+    return /** @type {Promise<T>} */ (this.#enqueue(kept));
+  }
+
+  /** @param {Kept} change */
+  #enqueue(change) {
+    this.#waiting.push(change);
+    this.#tell();
+    const done = this.#chain.then(() => this.#deliver(change.key));
+    const next = () => this.#tell();
+    this.#chain = done.then(next, next);
     return done;
   }
 
+  /** @param {string} key of the change that is next */
+  async #deliver(key) {
+    const change = this.#waiting.find((one) => one.key === key);
+    if (!change) throw new Error(`no change ${key} waits`);
+    try {
+      const answer = await this.#answered(change);
+      this.#settle(change, answer);
+      return answer;
+    } catch (error) {
+      if (!(error instanceof ApiError && error.status === 401)) this.#settle(change, null); // after signing in it is sent
+      throw error;
+    }
+  }
+
   /**
-   * @template T
-   * @param {() => Promise<T>} act
+   * @param {Kept} change
+   * @returns {Promise<unknown>}
    */
-  async #try(act) {
-    const key = newKey();
+  async #answered(change) {
+    try {
+      return await this.#persist(change);
+    } catch (error) {
+      if (!(error instanceof ApiError) || error.kind !== "conflict" || !error.current || !change.seen) throw error;
+      const instead = await this.merge(change, error.current);
+      return instead ? this.#answered({ ...change, ...instead, key: newKey() }) : error.current;
+    }
+  }
+
+  /** Until the server answers. @param {Kept} change */
+  async #persist({ key, method, path, json }) {
     for (let wait = FIRST_WAIT_MS; ; wait = Math.min(2 * wait, LONGEST_WAIT_MS)) {
       try {
-        const answer = await marked(key, act);
+        const answer = await perform(method, path, json, key);
         this.#stick(false);
         return answer;
       } catch (error) {
-        if (!(error instanceof ApiError) || error.status !== 0) {
-          this.#stick(false);
-          throw error;
-        }
-        this.#stick(true);
+        const unreachable = error instanceof ApiError && error.unreachable;
+        this.#stick(unreachable);
+        if (!unreachable) throw error;
         await online(wait);
       }
     }
+  }
+
+  /**
+   * @param {Kept} change
+   * @param {unknown} answer
+   */
+  #settle(change, answer) {
+    forget(localStorage, change);
+    this.#waiting = this.#waiting.filter((one) => one.key !== change.key);
+    const id = /** @type {{ id?: unknown } | null} */ (answer)?.id;
+    if (typeof id !== "number") return;
+    this.#waiting = this.#waiting.map((one) => {
+      const known = named(one, change.key, id);
+      if (known !== one) keep(localStorage, known);
+      return known;
+    });
   }
 
   /** @param {boolean} stuck */
   #stick(stuck) {
     if (this.stuck === stuck) return;
     this.stuck = stuck;
-    this.dispatchEvent(new Event("change"));
+    this.#tell();
   }
 
-  /** @param {1 | -1} by */
-  #say(by) {
-    this.waiting += by;
+  #tell() {
     this.dispatchEvent(new Event("change"));
   }
 }
 
-/** 128 random bits; crypto.randomUUID is missing where the page did not come over TLS. */
-const newKey = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (n) => n.toString(36)).join("-");
+/** What the server knows a change by; `crypto.randomUUID` is there on secure origins only. */
+export function newKey() {
+  return [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+let last = 0;
+
+/** Microseconds since 1970, later at every call. */
+function now() {
+  last = Math.max(last + 1, Date.now() * 1000);
+  return last;
+}
 
 /**
  * Until the live connection is back, at most that long.

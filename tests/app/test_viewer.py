@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
+from app.errors import Unavailable
 from app.settings import Settings
 from app.viewer import contract
 from app.viewer.client import Viewer
@@ -17,6 +19,8 @@ from tests.app.nouns import finish
 from tests.app.test_jobs import run
 
 PROTOCOL = "viser-v1.1.1"
+STANDING = np.eye(4).tolist()
+MOVED = [[0.0, -1.0, 0.0, 0.3], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]]
 
 
 @pytest.fixture
@@ -79,10 +83,8 @@ def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
     project = seen.sample()
     url = seen.post(f"/api/projects/{project}/viewer")["url"]
     seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud", "opacity": 0.123}, 503)  # the fake dies of it
-    answer = seen.client.get(url)
-    assert (answer.status_code, answer.json()["kind"]) == (503, "unavailable")
-    assert seen.post(f"/api/projects/{project}/viewer")["url"] == url
     assert seen.client.get(url).status_code == 200
+    assert seen.post(f"/api/projects/{project}/viewer")["url"] == url
 
 
 def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any], tmp_path: Path) -> None:
@@ -108,11 +110,10 @@ def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> Non
             socket.send_text("still there")
             assert socket.receive_text() == "still there"
             assert web.client.get(url).status_code == 200
-        web.until(lambda: not any(viewer._watching.values()))
+        web.until(lambda: not any(view.watching for view in viewer._views.values()))
         viewer.close_idle()
-        assert web.client.get(url).status_code == 503
-        assert web.post(f"/api/projects/{project}/viewer")["url"] == url
         assert web.client.get(url).status_code == 200
+        assert web.post(f"/api/projects/{project}/viewer")["url"] == url
 
 
 def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
@@ -123,6 +124,39 @@ def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
     moved = seen.post(f"/api/projects/{project}/viewer/joints", {"values": {"door": 0.5}})
     assert moved["joints"] == [{"name": "door", "lower": 0.0, "upper": 1.0, "value": 0.5}]
     assert seen.post(f"/api/projects/{project}/viewer/show", {"mode": "dance"}, 422)["kind"] == "invalid"
+
+
+def test_what_one_person_shows_another_does_not_see(seen: Running) -> None:
+    project = seen.sample()
+    other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
+    other.get(f"/?token={seen.settings.launch_token}")
+    mine, theirs = (client.post(f"/api/projects/{project}/viewer").json()["url"] for client in (seen.client, other))
+    assert mine != theirs
+    show = f"/api/projects/{project}/viewer/show"
+    assert seen.post(show, {"mode": "cloud"})["text"] == "shown 1 times"
+    assert other.post(show, json={"mode": "cloud"}).json()["text"] == "shown 1 times"
+    assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"
+
+
+def test_a_view_started_anew_shows_what_it_showed(seen: Running) -> None:
+    project = seen.sample()
+    show = f"/api/projects/{project}/viewer/show"
+    seen.post(show, {"mode": "cloud"})
+    assert seen.context.viewer._worker
+    seen.context.viewer._worker.kill()
+    seen.until(lambda: not (seen.context.viewer._worker and seen.context.viewer._worker.alive))
+    assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"  # the first was again what had been shown
+
+
+def test_the_view_used_least_makes_room(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.viewer.client.MOST_VIEWS", 2)
+    viewer, folder = seen.context.viewer, seen.settings.data_dir
+    tokens = [viewer.open("p", folder, session) for session in ("a", "b")]
+    with viewer.watched(tokens[0]):
+        viewer.open("p", folder, "c")
+        assert [view.session for view in viewer._views.values() if view.port] == ["a", "c"]
+        with viewer.watched(viewer.open("p", folder, "c")), pytest.raises(Unavailable, match="2 people"):
+            viewer.open("p", folder, "d")
 
 
 def test_the_installed_viser_keeps_the_contract() -> None:
@@ -170,6 +204,13 @@ def test_the_real_viewer_shows_the_scan_a_candidate_the_placement_and_a_scene_th
     moved = web.post(f"/api/projects/{project}/viewer/joints", {"values": {"drawer_1_slide": 9.0}})
     assert moved["joints"][0]["value"] == 0.4  # clamped
     web.post(f"/api/projects/{project}/viewer/joints", {"values": {"absent": 1.0}}, 422)
+    place = f"/api/projects/{project}/viewer/place"
+    assert web.post(place, {"pose": None})["pose"] is None  # nothing is being moved
+    web.post(place, {"pose": MOVED}, 422)
+    web.post(show, {"mode": "aligned", "object": drawer, "box": {"pose": STANDING, "size": [0.5, 0.6, 0.2]}})
+    assert web.post(place, {"pose": None})["pose"] == STANDING
+    assert np.allclose(web.post(place, {"pose": MOVED})["pose"], MOVED, atol=1e-6)  # single precision on the way
+    web.post(place, {"pose": [[0.0] * 4] * 3}, 422)
     web.post(show, {"mode": "aligned", "object": drawer + 1}, 422)
     with web.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
         assert len(socket.receive_bytes()) > 0

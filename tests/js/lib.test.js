@@ -4,13 +4,15 @@ import { ago, bytes, counted, duration, jointValue } from "../../static/js/lib/f
 import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { strips } from "../../static/js/lib/strips.js";
-import { fit, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
+import { fit, pinch, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { clicksOfBox } from "../../static/js/lib/box.js";
 import { ranked } from "../../static/js/lib/commands.js";
 import { nextDoubtful, worstFirst } from "../../static/js/lib/lanes.js";
 import { disagreements } from "../../static/js/lib/merge.js";
 import { project } from "../../static/js/lib/points.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
+import { forget, keep, keptBy, named } from "../../static/js/lib/kept.js";
+import { moved, shiftBetween } from "../../static/js/lib/moved.js";
 import { together } from "../../static/js/lib/together.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
@@ -208,4 +210,49 @@ test("the others are named once each, with where they are, and oneself not at al
     { who: "you, in another tab", where: "run" },
   ]);
   assert.deepEqual(together([here("a", "ann", "annotate")], "a"), []);
+});
+
+test("a box moved and moved back is where it was, whichever way it faces", () => {
+  const [c, s] = [Math.cos(0.7), Math.sin(0.7)];
+  const pose = [[c, -s, 0, 1], [s, c, 0, 2], [0, 0, 1, 0.5], [0, 0, 0, 1]];
+  const shift = { right: 0.1, back: -0.02, up: 0.3, turn: -0.4 };
+  const back = shiftBetween(pose, moved(pose, shift));
+  for (const name of Object.keys(shift)) assert.ok(Math.abs(back[name] - shift[name]) < 1e-12, name);
+  const faced = moved([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], { right: 1, back: 2, up: 3, turn: Math.PI / 2 });
+  assert.deepEqual(faced.slice(0, 3).map((row) => row[3]), [1, 2, 3]); // right of who faces its front at -Y
+  assert.deepEqual(faced.slice(0, 2).map((row) => Math.round(row[0])), [0, 1]); // its width now runs along +Y
+});
+
+test("changes are kept in order, each person's own, until they are answered; what cannot be read is passed over", () => {
+  const items = new Map();
+  const store = {
+    get length() { return items.size; },
+    key: (k) => [...items.keys()][k] ?? null,
+    getItem: (name) => items.get(name) ?? null,
+    setItem: (name, text) => items.set(name, text),
+    removeItem: (name) => items.delete(name),
+  };
+  const change = (key, at, user = "ann") => ({ key, at, user, method: "POST", path: `/p/{${key}}`, json: {} });
+  for (const one of [change("c", 30), change("a", 4), change("b", 5, "bob")]) assert.ok(keep(store, one));
+  items.set("theme", "dark");
+  items.set("r2c2r-change-0-torn", "{");
+  assert.deepEqual(keptBy(store, "ann").map(({ key }) => key), ["a", "c"]);
+  forget(store, change("a", 4));
+  assert.deepEqual(keptBy(store, "ann").map(({ key }) => key), ["c"]);
+  assert.equal(keep({ ...store, setItem: () => { throw new Error("full"); } }, change("d", 1)), false);
+});
+
+test("a click on an object that is still being made finds it once that has a number", () => {
+  const click = { method: "POST", path: "/api/projects/p/objects/{k1}/points?infer=true", json: {} };
+  assert.equal(named(click, "k1", 7).path, "/api/projects/p/objects/7/points?infer=true");
+  assert.equal(named(click, "k2", 7), click);
+});
+
+test("two fingers keep what is between them, and spread it as they spread", () => {
+  const view = { scale: 2, x: 10, y: -5 };
+  const [before, after] = [[{ x: 0, y: 0 }, { x: 10, y: 20 }], [{ x: 40, y: 40 }, { x: 60, y: 80 }]];
+  const pinched = pinch(view, before, after, 0.1);
+  assert.equal(pinched.scale, 4);
+  const [there, still] = [toImage(view, { x: 5, y: 10 }), toImage(pinched, { x: 50, y: 60 })];
+  assert.ok(Math.abs(there.x - still.x) < 1e-9 && Math.abs(there.y - still.y) < 1e-9);
 });

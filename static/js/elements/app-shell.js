@@ -1,7 +1,7 @@
 /** Header, navigation, the current page, messages and help. */
 
 import { getProject } from "../api.js";
-import { h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
 import { fetched } from "../later.js";
 import { actionOf, KEYMAP } from "../lib/keymap.js";
 import { counted } from "../lib/format.js";
@@ -76,6 +76,7 @@ export class AppShell extends LiveElement {
     const { signal } = this;
     for (const type of ["offline", "online"]) live.addEventListener(type, () => this.#drawOnline(), { signal });
     outbox.addEventListener("change", () => this.#drawOnline(), { signal });
+    outbox.addEventListener("refused", (event) => sayError(detailOf(event)), { signal });
     live.addEventListener("project", () => this.#route && this.#drawProject(this.#route), { signal });
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
   }
@@ -133,7 +134,7 @@ export class AppShell extends LiveElement {
   /** Lost connections are said, with what still waits; it is sent by itself once the server answers. */
   #drawOnline() {
     const waiting = outbox.stuck
-      ? ` ${counted(outbox.waiting, "change")} not stored yet: nothing is lost while this page stays open.`
+      ? ` ${counted(outbox.waiting, "change")} not stored yet: kept in this browser and sent by ${outbox.waiting === 1 ? "itself" : "themselves"}${outbox.safe ? "" : ", as long as this page stays open"}.`
       : "";
     this.#online.hidden = live.connected && !outbox.stuck;
     this.#online.textContent = `The server does not answer; trying again.${waiting}`;

@@ -1,9 +1,11 @@
 /** What people said about a spot. Emits "show-comment" Comment, "comments" Comment[] (open ones) whenever they change. */
 
-import { addComment, listComments, resolveComment } from "../api.js";
+import { listComments, resolveComment } from "../api.js";
+import { addComment } from "../changes.js";
 import { h, LiveElement } from "../dom.js";
 import { ago, counted } from "../lib/format.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
 import { askForText } from "./ask-dialog.js";
 import { say, sayError } from "./toasts.js";
 
@@ -50,7 +52,7 @@ export class CommentList extends LiveElement {
     const text = await askForText(`Comment on ${about}`, "What should change?", { button: "Comment" });
     if (!text) return;
     try {
-      await addComment(this.project, { ...pin, text });
+      await outbox.send(addComment(this.project, { ...pin, text }));
       say("Comment stored", { kind: "good" });
       this.load();
     } catch (error) {

@@ -22,6 +22,10 @@ export class FilmStrip extends LiveElement {
     const { signal } = this;
     this.#slider.addEventListener("input", () => this.emit("seek", Number(this.#slider.value)), { signal });
     this.#play.addEventListener("click", () => this.emit("play"), { signal });
+    for (const type of ["pointerdown", "pointermove"])
+      this.#thumbs.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), this.#thumbs), {
+        signal,
+      });
     this.replaceChildren(
       h("div", { class: "transport" }, this.#play, this.#slider, this.#text),
       this.#thumbs,
@@ -66,6 +70,19 @@ export class FilmStrip extends LiveElement {
     for (const canvas of this.#lanes.querySelectorAll("canvas")) canvas.dispatchEvent(new Event("redraw"));
   }
 
+  /**
+   * Show the frame under a pressed mouse or a finger.
+   * @param {PointerEvent} event
+   * @param {HTMLElement} over
+   */
+  #scrub(event, over) {
+    if (event.buttons !== 1) return;
+    const { left, width } = over.getBoundingClientRect();
+    const share = Math.min(Math.max((event.clientX - left) / Math.max(width, 1), 0), 1);
+    const position = Math.round(share * (this.#frames.length - 1));
+    if (position !== this.#position) this.emit("seek", position);
+  }
+
   /** @param {boolean} playing */
   setPlaying(playing) {
     this.#play.replaceChildren(icon(playing ? "pause" : "play"));
@@ -80,10 +97,8 @@ export class FilmStrip extends LiveElement {
         const canvas = h("canvas", { role: "img", "aria-label": label, title: label, width: 1200, height: 12 });
         const draw = () => this.#drawLane(canvas, lane);
         canvas.addEventListener("redraw", draw);
-        canvas.addEventListener("click", (event) => {
-          const share = event.offsetX / Math.max(canvas.clientWidth, 1);
-          this.emit("seek", Math.round(share * (this.#frames.length - 1)));
-        });
+        for (const type of ["pointerdown", "pointermove"])
+          canvas.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), canvas));
         draw();
         const name = h(
           "button",

@@ -1,13 +1,14 @@
 /**
  * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
  * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id.
- * Zoom with the wheel, pan with the middle button or Alt-drag; a crosshair moved by arrows replaces the mouse.
+ * Zoom with the wheel or two fingers, pan with the middle button, Alt-drag or two fingers; a crosshair moved by arrows
+ * replaces the mouse.
  */
 
 import { h, LiveElement } from "../dom.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
 import { drawOutline } from "../lib/outlines.js";
-import { fit, toImage, toScreen, zoom } from "../lib/view.js";
+import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {import("../api-types").Point} Point */
@@ -17,6 +18,8 @@ import { fit, toImage, toScreen, zoom } from "../lib/view.js";
 /** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
 const GRIP_PX = 11;
+const STILL_PX = 3; // a press that wanders less is a click
+const STILL_TOUCH_PX = 10; // a finger is less steady
 
 export class FrameCanvas extends LiveElement {
   #canvas = h("canvas", { tabIndex: 0, role: "img", "aria-label": "Frame" });
@@ -39,6 +42,10 @@ export class FrameCanvas extends LiveElement {
   /** @type {{ marker: Marker | null, x: number, y: number, start: { x: number, y: number }, pan: boolean, moved: boolean } | null} */
   #drag = null;
   #paintings = 0;
+  /** Fingers and pens that are down. @type {Map<number, { x: number, y: number }>} */
+  #pressed = new Map();
+  /** What a click says: 1 adds, 0 takes away; the right button and Shift say the opposite. @type {0 | 1} */
+  sign = 1;
   opacity = 0.42;
   raw = false;
 
@@ -49,6 +56,7 @@ export class FrameCanvas extends LiveElement {
     canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
     canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
     canvas.addEventListener("pointerup", (event) => this.#up(event), { signal });
+    canvas.addEventListener("pointercancel", (event) => this.#cancel(event), { signal });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
     canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
     const observer = new ResizeObserver(() => this.#resize());
@@ -256,6 +264,8 @@ export class FrameCanvas extends LiveElement {
   #down(event) {
     this.#canvas.setPointerCapture(event.pointerId);
     const at = this.#at(event);
+    this.#pressed.set(event.pointerId, at);
+    if (this.#pressed.size > 1) return this.#cancel(); // two fingers zoom and pan
     const pan = event.button === 1 || event.altKey;
     this.#drag = { ...at, start: at, marker: pan ? null : (this.#markerAt(at) ?? null), pan, moved: false };
     if (event.button === 1) event.preventDefault();
@@ -264,9 +274,11 @@ export class FrameCanvas extends LiveElement {
   /** @param {PointerEvent} event */
   #move(event) {
     const drag = this.#drag;
-    if (!drag) return;
     const at = this.#at(event);
-    if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) > 3) drag.moved = true;
+    if (this.#pressed.size > 1) return this.#pinch(event.pointerId, at);
+    if (!drag) return;
+    const still = event.pointerType === "touch" ? STILL_TOUCH_PX : STILL_PX;
+    if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) > still) drag.moved = true;
     if (!drag.moved) return;
     if (drag.pan) {
       this.#view = { ...this.#view, x: this.#view.x + at.x - drag.x, y: this.#view.y + at.y - drag.y };
@@ -282,6 +294,7 @@ export class FrameCanvas extends LiveElement {
   #up(event) {
     const drag = this.#drag;
     this.#drag = null;
+    this.#pressed.delete(event.pointerId);
     if (!drag || drag.pan) return;
     const position = toImage(this.#view, this.#at(event));
     if (drag.marker && drag.moved) this.emit("move-point", { id: drag.marker.id, ...this.#clamped(position) });
@@ -289,9 +302,33 @@ export class FrameCanvas extends LiveElement {
     else if (drag.moved) this.#endBox(drag.start, position, event);
     else if (this.#pinAt(this.#at(event))) this.emit("pick-pin", this.#pinAt(this.#at(event))?.id);
     else if (this.#inside(position)) {
-      const label = event.button === 2 || event.shiftKey ? 0 : 1;
+      const label = event.button === 2 || event.shiftKey ? (this.sign === 1 ? 0 : 1) : this.sign;
       this.emit("click-point", { ...position, label, hold: event.ctrlKey || event.metaKey });
     }
+  }
+
+  /** Forget what was being pressed. @param {PointerEvent} [event] */
+  #cancel(event) {
+    if (event) this.#pressed.delete(event.pointerId);
+    this.#drag = null;
+    this.draw();
+  }
+
+  /**
+   * @param {number} pointer that moved
+   * @param {{ x: number, y: number }} to
+   */
+  #pinch(pointer, to) {
+    const before = [...this.#pressed.values()].slice(0, 2);
+    this.#pressed.set(pointer, to);
+    this.#view = pinch(this.#view, before, [...this.#pressed.values()].slice(0, 2), this.#least);
+    this.#fitted = false;
+    this.draw();
+  }
+
+  /** The smallest scale worth having. */
+  get #least() {
+    return 0.8 * fit(this.#size, { width: this.clientWidth, height: this.clientHeight }).scale;
   }
 
   /**
@@ -330,8 +367,7 @@ export class FrameCanvas extends LiveElement {
   /** @param {WheelEvent} event */
   #wheel(event) {
     event.preventDefault();
-    const least = fit(this.#size, { width: this.clientWidth, height: this.clientHeight }).scale * 0.8;
-    this.#view = zoom(this.#view, Math.exp(-event.deltaY / 400), this.#at(event), least);
+    this.#view = zoom(this.#view, Math.exp(-event.deltaY / 400), this.#at(event), this.#least);
     this.#fitted = false;
     this.draw();
   }

@@ -77,6 +77,7 @@ export class ObjectList extends LiveElement {
    */
   #item(object, number, current, hidden, colour) {
     const pick = h("button", { type: "button", class: "pick", "aria-pressed": String(current) }, object.name);
+    pick.title = object.name;
     pick.addEventListener("click", () => this.emit("pick-object", object.id));
     const eye = h(
       "button",
@@ -95,7 +96,7 @@ export class ObjectList extends LiveElement {
       "li",
       { class: current ? "current" : "" },
       h("div", { class: "head" }, badge, pick, eye, remove),
-      h("div", { class: "row muted" }, state(object), this.#stop(object)),
+      h("div", { class: "row muted state" }, state(object, current), this.#stop(object)),
       current ? this.#fields(object) : null,
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
@@ -137,16 +138,21 @@ export class ObjectList extends LiveElement {
   }
 }
 
-/** @param {SceneObject} object */
-function state(object) {
+/**
+ * @param {SceneObject} object
+ * @param {boolean} current
+ */
+function state(object, current) {
   if (!object.points.length) return "no click yet";
   const clicks = counted(object.points.length, "click");
   if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
   if (object.mask_frames) {
     if (object.segment === "partial") return `${clicks} · stopped after ${counted(object.mask_frames, "frame")}`;
+    const text = `${clicks} · ${counted(object.mask_frames, "frame")} `;
+    if (!current) return text;
     const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
-    return h("span", {}, `${clicks} · ${counted(object.mask_frames, "frame")} `, drawn);
+    return h("span", {}, text, drawn);
   }
   return clicks;
 }

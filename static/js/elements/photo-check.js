@@ -55,8 +55,10 @@ export class PhotoCheck extends LiveElement {
   async show(object) {
     const same = object === this.#object;
     this.#object = object;
-    if (!same) this.#at = 0;
-    this.#preview = null;
+    if (!same) {
+      this.#at = 0;
+      this.#all = null;
+    }
     try {
       const found = await getPhotos(this.project, object);
       if (this.#object !== object) return;
@@ -68,9 +70,9 @@ export class PhotoCheck extends LiveElement {
     }
   }
 
-  /** The box of the finished scene; null where there is none. */
-  get box() {
-    const { world_from_object: pose, dimensions_m: size } = this.#all ?? {};
+  /** An object's box of the finished scene; null where there is none, or while it is not known. @param {number} object */
+  boxOf(object) {
+    const { world_from_object: pose, dimensions_m: size } = (object === this.#object && this.#all) || {};
     return pose && size ? { pose, size } : null;
   }
 

@@ -3,11 +3,13 @@
  * "objects-made" SceneObject[]. The page asks for the outlines of a frame with `outlinesOn`.
  */
 
-import { confirmProposals, dismissProposals, getProposals, restoreProposals } from "../api.js";
+import { getProposals, restoreProposals } from "../api.js";
+import { confirmProposals, dismissProposals } from "../changes.js";
 import { detailOf, h, icon, LiveElement } from "../dom.js";
 import { counted } from "../lib/format.js";
 import { neighbour, surest } from "../lib/proposals.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
 import { say, sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").Proposal} Proposal */
@@ -126,7 +128,7 @@ export class ProposalList extends LiveElement {
   /** @param {string[]} ids */
   #confirm(ids) {
     this.#leave(ids, async () => {
-      const made = await confirmProposals(this.project, ids);
+      const made = await outbox.send(confirmProposals(this.project, ids));
       this.emit("objects-made", made);
       say(made.length === 1 ? `Confirmed ${made[0]?.name}` : `Confirmed ${counted(made.length, "proposal")}`);
     });
@@ -135,7 +137,7 @@ export class ProposalList extends LiveElement {
   /** @param {Proposal} item */
   #dismiss(item) {
     this.#leave([item.id], async () => {
-      await dismissProposals(this.project, [item.id]);
+      await outbox.send(dismissProposals(this.project, [item.id]));
     });
   }
 

@@ -1,19 +1,32 @@
-/** The 3D view: viser in an iframe of our own origin; the bundle's own 3D page, or a picture, and a retry when it is down. */
+/**
+ * The 3D view: viser in an iframe of our own origin; the bundle's own 3D page, or a picture, and a retry when it is down.
+ * Emits "shown" ViewerShown, "not-ready" message, "dragging" while somebody drags in it.
+ */
 
 import { ApiError, openViewer, showInViewer } from "../api.js";
-import { h, LiveElement } from "../dom.js";
+import { detailOf, h, LiveElement } from "../dom.js";
+import { live } from "../live.js";
 import { sayError } from "./toasts.js";
 
+/** @typedef {import("../api-types").ViewerSession} ViewerSession */
 /** @typedef {import("../api-types").ViewerShow} ViewerShow */
 /** @typedef {import("../api-types").ViewerShown} ViewerShown */
+
+const LAST_MS = 250; // where a drag ended is told a moment after it did
 
 export class ViewerFrame extends LiveElement {
   #project = "";
   /** @type {Partial<ViewerShow>} */
   #wanted = {};
-  #opened = false;
+  #url = "";
   /** @type {Promise<void>} one request after the other, so that the last wish wins */
   #queue = Promise.resolve();
+
+  connected() {
+    const again = (/** @type {Event} */ event) =>
+      detailOf(event).reset && this.#url && this.open(this.#project, this.#wanted);
+    live.addEventListener("hello", again, { signal: this.signal }); // the server was started anew, without our view
+  }
 
   /**
    * @param {string} project
@@ -22,13 +35,11 @@ export class ViewerFrame extends LiveElement {
   async open(project, what) {
     this.#project = project;
     this.#wanted = what;
-    this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
+    if (!this.#url) this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
     try {
       const session = await openViewer(project);
       if (session.state === "down" || !session.url) return this.#down(session.message, session);
-      const dark = getComputedStyle(document.documentElement).colorScheme === "dark" || isDark() ? "?darkMode" : "";
-      this.replaceChildren(h("iframe", { src: session.url + dark, title: "3D view of the project" }));
-      this.#opened = true;
+      if (session.url !== this.#url) this.#embed(session.url);
       this.show(this.#wanted); // it may have changed while the view opened
     } catch (error) {
       this.#down(error instanceof Error ? error.message : String(error), null);
@@ -38,25 +49,50 @@ export class ViewerFrame extends LiveElement {
   /** @param {Partial<ViewerShow>} what */
   show(what) {
     this.#wanted = what;
-    if (!this.#opened) return;
-    this.#queue = this.#queue.then(async () => {
-      if (this.#wanted !== what) return;
-      try {
-        this.emit("shown", await showInViewer(this.#project, what));
-      } catch (error) {
-        if (error instanceof ApiError && error.status === 503) this.#down(error.message, null);
-        else if (error instanceof ApiError && error.kind === "not-ready") this.emit("not-ready", error.message);
-        else sayError(error);
-      }
-    });
+    if (!this.#url) return;
+    this.#queue = this.#queue.then(() => (this.#wanted === what ? this.#ask(what, true) : undefined));
+  }
+
+  /**
+   * @param {Partial<ViewerShow>} what
+   * @param {boolean} again whether to try once more with a view started anew
+   * @returns {Promise<void>}
+   */
+  async #ask(what, again) {
+    try {
+      this.emit("shown", await showInViewer(this.#project, what));
+    } catch (error) {
+      if (!(error instanceof ApiError)) return sayError(error);
+      if (error.kind === "not-ready") this.emit("not-ready", error.message);
+      else if (error.status !== 503) sayError(error);
+      else if (again) return this.#ask(what, false);
+      else this.#down(error.message, await openViewer(this.#project).catch(() => null));
+    }
+  }
+
+  /** @param {string} url */
+  #embed(url) {
+    this.#url = url;
+    const frame = h("iframe", { src: url + (isDark() ? "?darkMode" : ""), title: "3D view of the project" });
+    frame.addEventListener("load", () => this.#listen(frame));
+    this.replaceChildren(frame);
+  }
+
+  /** Drags inside the frame, which is of our own origin. @param {HTMLIFrameElement} frame */
+  #listen(frame) {
+    const inside = frame.contentWindow;
+    const dragging = (/** @type {PointerEvent} */ event) => event.buttons && this.emit("dragging");
+    inside?.addEventListener("pointermove", dragging, { signal: this.signal });
+    const ended = () => setTimeout(() => this.emit("dragging"), LAST_MS);
+    inside?.addEventListener("pointerup", ended, { signal: this.signal, capture: true });
   }
 
   /**
    * @param {string} message
-   * @param {{ fallback_page: string | null, fallback_image: string | null } | null} instead
+   * @param {Pick<ViewerSession, "fallback_page" | "fallback_image"> | null} instead
    */
   #down(message, instead) {
-    this.#opened = false;
+    this.#url = "";
     const retry = h("button", { type: "button", onClick: () => this.open(this.#project, this.#wanted) }, "Try again");
     const said = h("p", {}, `The 3D view is not there: ${message}`);
     if (instead?.fallback_page) {

@@ -3,6 +3,7 @@
 import { getSystem, signOut } from "../api.js";
 import { h, LiveElement } from "../dom.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
 import { sayError } from "./toasts.js";
 
 export class WhoIsIn extends LiveElement {
@@ -14,6 +15,7 @@ export class WhoIsIn extends LiveElement {
   async #draw() {
     try {
       const { user, role, account } = await getSystem();
+      outbox.begin(user);
       if (!account) return;
       const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave() }, "Sign out");
       this.replaceChildren(h("span", { class: "muted", title: role }, user), leave);

@@ -1,7 +1,6 @@
-/** An object's box as a camera sees it, and a pose that was nudged. Matrices are rows of four, as the server sends them. */
+/** An object's box as a camera sees it. Matrices are rows of four, as the server sends them. */
 
 /** @typedef {number[][]} Matrix */
-/** @typedef {{ dx: number, dy: number, dz: number, yaw: number }} Nudge metres along the world's axes, radians about its vertical */
 /** @typedef {{ fx: number, fy: number, cx: number, cy: number, camera_from_world: Matrix }} Camera */
 
 const EDGES = [0, 1, 2, 3].flatMap((k) => [
@@ -10,24 +9,6 @@ const EDGES = [0, 1, 2, 3].flatMap((k) => [
   [k, k + 4],
 ]);
 const NEAR_M = 0.05;
-
-/**
- * The pose moved by a nudge: turned about its own centre, then shifted.
- * @param {Matrix} pose world_from_object
- * @param {Nudge} nudge
- * @returns {Matrix}
- */
-export function nudged(pose, { dx, dy, dz, yaw }) {
-  const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
-  const [x = [], y = [], z = []] = pose;
-  const turned = [x.map((v, k) => c * v - s * (y[k] ?? 0)), x.map((v, k) => s * v + c * (y[k] ?? 0)), [...z]];
-  return [
-    [...(turned[0] ?? []).slice(0, 3), (x[3] ?? 0) + dx],
-    [...(turned[1] ?? []).slice(0, 3), (y[3] ?? 0) + dy],
-    [...z.slice(0, 3), (z[3] ?? 0) + dz],
-    [0, 0, 0, 1],
-  ];
-}
 
 /**
  * The box's edges in pixels, front face first; those behind the camera are left out.

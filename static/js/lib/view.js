@@ -29,6 +29,30 @@ export function zoom(view, factor, at, least) {
 }
 
 /**
+ * Zoom and pan with two fingers: what was between them stays between them.
+ * @param {View} view
+ * @param {{ x: number, y: number }[]} before where both were
+ * @param {{ x: number, y: number }[]} after where both are
+ * @param {number} least
+ * @returns {View}
+ */
+export function pinch(view, before, after, least) {
+  const [was, is] = [middle(before), middle(after)];
+  const zoomed = zoom(view, spread(after) / Math.max(spread(before), 1), was, least);
+  return { ...zoomed, x: zoomed.x + is.x - was.x, y: zoomed.y + is.y - was.y };
+}
+
+/** @param {{ x: number, y: number }[]} points */
+function middle([a = { x: 0, y: 0 }, b = a]) {
+  return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
+}
+
+/** @param {{ x: number, y: number }[]} points */
+function spread([a = { x: 0, y: 0 }, b = a]) {
+  return Math.hypot(a.x - b.x, a.y - b.y);
+}
+
+/**
  * @param {View} view
  * @param {{ x: number, y: number }} screen
  */

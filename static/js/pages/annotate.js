@@ -1,9 +1,13 @@
 /** The main screen: click things in the frames, see their masks grow, name them. Every click is saved before it shows as saved. */
 
 import * as api from "../api.js";
-import { Frames } from "../annotate/frames.js";
+import { crosshairKey } from "../annotate/crosshair.js";
+import { Edits } from "../annotate/edits.js";
+import { lanesOf, markersOn, masksOn } from "../annotate/layers.js";
 import { Masks } from "../annotate/masks.js";
-import { saveFields } from "../annotate/save-fields.js";
+import { Player } from "../annotate/player.js";
+import { SceneObjects } from "../annotate/scene-objects.js";
+import { StageTools } from "../annotate/stage-tools.js";
 import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
 import { CommentList } from "../elements/comment-list.js";
 import { FilmStrip } from "../elements/film-strip.js";
@@ -15,20 +19,15 @@ import { ProposalList } from "../elements/proposal-list.js";
 import { say, sayError } from "../elements/toasts.js";
 import { clicksOfBox } from "../lib/box.js";
 import { actionOf } from "../lib/keymap.js";
-import { nextDoubtful } from "../lib/lanes.js";
-import { rgbOf } from "../lib/masks.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
-/** @typedef {import("../api-types").LiveStatus} LiveStatus */
 /** @typedef {import("../api-types").FrameMask} FrameMask */
 /** @typedef {import("../api-types").Comment} Comment */
 /** @typedef {import("../api-types").PointIn} PointIn */
 
-const FRAME_MS = 100;
-const SETTLE_MS = 30; // scrubbing passes frames faster: their masks are not asked for
 const LANES_MS = 250;
 /** What a key held down must not do again and again. */
 const ONE_A_PRESS = new Set([
@@ -52,50 +51,41 @@ export class AnnotatePage extends LiveElement {
   #mosaic = new FrameMosaic();
   #cloud = new ObjectCloud();
   #depth = h("img", { class: "depth", alt: "Depth of this frame: red is near, blue is far" });
-  #status = h("span", { class: "chip", role: "status" });
-  #saved = h("span", { class: "chip", role: "status" });
+  #stage = new StageTools();
   #tip = h("div", { class: "tip" });
+  #evidence = h("aside", { class: "evidence", "aria-label": "Depth, shape and comments" });
   #category = h("input", {
     type: "text",
     value: "drawer",
     list: "categories",
     "aria-label": "Category of the next object",
   });
-  #opacity = h("input", { type: "range", min: "0", max: "100", value: "42", "aria-label": "Mask opacity" });
 
-  #frames = new Frames();
+  #player = new Player(this.#canvas, this.#strip);
+  #objects = new SceneObjects();
+  #edits = new Edits(this.#objects);
   #masks = new Masks();
-  #position = 0;
-  /** @type {Map<number, SceneObject>} */
-  #objects = new Map();
-  /** @type {number | null} */
-  #current = null;
-  /** @type {Set<number>} */
-  #hidden = new Set();
-  /** @type {string[]} */
-  #palette = ["#e69f00"];
   /** @type {string[]} */
   #categories = [];
-  #timer = 0;
-  #settling = 0;
   #lanesTimer = 0;
   #batching = false;
   #pinning = false;
-  #asDepth = false;
 
   connected() {
-    for (const element of [this.#proposals, this.#comments, this.#mosaic, this.#cloud]) element.project = this.project;
+    for (const part of [this.#edits, this.#proposals, this.#comments, this.#mosaic, this.#cloud])
+      part.project = this.project;
     this.replaceChildren(
       h(
         "div",
         { class: "annotate" },
         h("aside", { "aria-label": "Objects" }, ...this.#tools()),
-        h("div", { class: "stage" }, this.#canvas, h("div", { class: "status" }, this.#status, this.#saved), this.#tip),
-        h("aside", { class: "evidence", "aria-label": "Depth, shape and comments" }, ...this.#evidence()),
+        h("div", { class: "stage" }, this.#canvas, this.#stage.element, this.#tip),
+        this.#evidence,
         this.#strip,
       ),
       this.#mosaic,
     );
+    this.#fillEvidence();
     this.#listen();
     this.#load();
   }
@@ -106,32 +96,37 @@ export class AnnotatePage extends LiveElement {
     undo.addEventListener("click", () => this.act("undo"));
     redo.addEventListener("click", () => this.act("redo"));
     return [
-      h("h1", {}, "Objects"),
-      h("label", {}, h("span", { class: "muted" }, "Category of the next object"), this.#category),
-      h(
-        "div",
-        { class: "row" },
-        undo,
-        redo,
-        h("label", { class: "grow" }, h("span", { class: "muted" }, "Masks"), this.#opacity),
-      ),
+      h("div", { class: "heading" }, h("h1", {}, "Objects"), undo, redo),
+      h("label", { class: "next" }, h("span", { class: "muted" }, "Category of the next"), this.#category),
       this.#list,
       this.#proposals,
       h("a", { class: "button primary", href: `/p/${this.project}/run` }, "Run…"),
     ];
   }
 
-  #evidence() {
+  #fillEvidence() {
     const many = h("button", { type: "button", onClick: () => this.act("mosaic") }, "On many frames");
     const pin = h("button", { type: "button", onClick: () => this.act("comment") }, "Pin a comment");
-    return [
+    const close = h(
+      "button",
+      { type: "button", class: "narrow-only", onClick: () => this.#showEvidence(false) },
+      "Close",
+    );
+    this.#evidence.replaceChildren(
+      close,
       h("h2", {}, "Depth"),
       this.#depth,
       h("h2", {}, "Shape so far"),
       this.#cloud,
       h("div", { class: "row" }, many, pin),
       this.#comments,
-    ];
+    );
+  }
+
+  /** On a narrow screen depth, shape and comments come and go; a wide one always has room for them. */
+  #showEvidence(on = !this.#evidence.classList.contains("open")) {
+    this.#evidence.classList.toggle("open", on);
+    this.#stage.showEvidence(on);
   }
 
   #listen() {
@@ -140,25 +135,29 @@ export class AnnotatePage extends LiveElement {
     const on = (target, type, act) => target.addEventListener(type, (event) => act(detailOf(event)), { signal });
     on(this.#canvas, "click-point", (point) => this.#click(point));
     on(this.#canvas, "draw-box", (box) => this.#box(box));
-    on(this.#canvas, "move-point", ({ id, x, y }) =>
-      this.#change(id, (object) => api.changePoint(this.project, object, id, { x, y })),
-    );
-    on(this.#canvas, "remove-point", ({ id }) =>
-      this.#change(id, (object) => api.deletePoint(this.project, object, id)),
-    );
-    on(this.#strip, "seek", (position) => this.#seek(position));
-    on(this.#strip, "play", () => this.#play());
+    on(this.#canvas, "move-point", ({ id, x, y }) => this.#edits.movePoint(id, { x, y }));
+    on(this.#canvas, "remove-point", ({ id }) => this.#edits.removePoint(id));
+    on(this.#edits, "object", ({ object }) => this.#keep(object));
+    on(this.#edits, "made", ({ object }) => (this.#keep(object), this.#select(object.id)));
+    on(this.#edits, "saved", ({ text, tone }) => this.#stage.saved(text, tone));
+    on(this.#stage, "opacity", () => this.#drawMasks((this.#canvas.opacity = this.#stage.opacity)));
+    on(this.#stage, "sign", () => (this.#canvas.sign = this.#stage.sign));
+    on(this.#stage, "evidence", () => this.#showEvidence());
+    on(this.#player, "frame", () => this.#drawFrame());
+    on(this.#player, "settled", () => this.#settled());
+    on(this.#strip, "seek", (position) => this.#player.seek(position));
+    on(this.#strip, "play", () => this.#player.play());
     on(this.#strip, "pick-object", (id) => this.#select(id));
     on(this.#list, "pick-object", (id) => this.#select(id));
-    on(this.#list, "toggle", (id) => this.#toggle(id));
-    on(this.#list, "delete", (id) => this.#delete(id));
-    on(this.#list, "stop", (id) => this.#save(async () => this.#keep(await api.cancelSegment(this.project, id))));
-    on(this.#list, "rename", ({ id, name }) => this.#patch(id, { name }));
-    on(this.#list, "categorise", ({ id, category }) => this.#patch(id, { category }));
+    on(this.#list, "toggle", (id) => (this.#objects.toggle(id), this.#draw()));
+    on(this.#list, "delete", (id) => this.#edits.remove(id));
+    on(this.#list, "stop", (id) => this.#edits.stopSegmenting(id));
+    on(this.#list, "rename", ({ id, name }) => this.#edits.patch(id, { name }));
+    on(this.#list, "categorise", ({ id, category }) => this.#categorise(category, id));
     on(this.#proposals, "proposals-changed", () => this.#drawProposals());
-    on(this.#proposals, "show-frame", (index) => this.#seek(this.#frames.positionOf(index)));
+    on(this.#proposals, "show-frame", (index) => this.#player.seekFrame(index));
     on(this.#proposals, "objects-made", (objects) => this.#adopt(objects));
-    on(this.#mosaic, "seek-frame", (index) => this.#seek(this.#frames.positionOf(index)));
+    on(this.#mosaic, "seek-frame", (index) => this.#player.seekFrame(index));
     on(this.#comments, "comments", () => this.#drawPins());
     on(this.#comments, "show-comment", (comment) => this.#showComment(comment));
     on(this.#canvas, "pick-pin", (id) =>
@@ -167,35 +166,31 @@ export class AnnotatePage extends LiveElement {
     on(live, "object", ({ object }) => object.project === this.project && this.#store(object));
     on(live, "mask", (mask) => this.#receive(mask));
     on(live, "segment", (message) => this.#segment(message));
-    on(live, "live", ({ status }) => this.#showLive(status));
-    on(live, "hello", ({ reset }) => reset && this.#frames.list.length && this.#reload());
-    this.#opacity.addEventListener("input", () =>
-      this.#drawMasks((this.#canvas.opacity = Number(this.#opacity.value) / 100)),
-    );
+    on(live, "live", ({ status }) => this.#stage.segmenter.show(status));
+    on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#reload());
+    on(outbox, "caught-up", () => this.#player.frame && this.#reload());
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
     document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
     signal.addEventListener("abort", () => this.#stop());
   }
 
   #stop() {
-    for (const timer of [this.#timer, this.#settling, this.#lanesTimer]) clearTimeout(timer);
-    this.#frames.stop();
+    clearTimeout(this.#lanesTimer);
+    this.#player.stop();
   }
 
   async #load() {
     this.#tip.textContent = "Loading the frames…";
     try {
       const [project, system] = await Promise.all([api.getProject(this.project, this.signal), api.getSystem()]);
-      this.#palette = system.palette;
+      this.#objects.palette = system.palette;
       this.#categories = system.categories.map((category) => category.name);
       this.#list.setCategories(system.categories);
-      this.#frames.fill(this.project, project.media_version, await api.listFrames(this.project));
-      this.#strip.setFrames(this.#frames.list, (frame) => this.#frames.url(frame, 160));
-      const asked = this.#frames.positionOf(Number(this.query.get("frame") ?? -1));
-      this.#seek(Math.max(asked, 0));
+      this.#player.fill(this.project, project.media_version, await api.listFrames(this.project));
+      this.#player.seekFrame(Number(this.query.get("frame") ?? -1));
       await this.#reload();
       this.#select(this.query.has("object") ? Number(this.query.get("object")) : null);
-      this.#showLive(await api.openLive(this.project));
+      this.#stage.segmenter.show(await api.openLive(this.project));
     } catch (error) {
       this.#tip.textContent = error instanceof Error ? error.message : String(error);
       sayError(error);
@@ -204,71 +199,27 @@ export class AnnotatePage extends LiveElement {
 
   async #reload() {
     const [objects, lanes] = await Promise.all([api.listObjects(this.project), api.getLanes(this.project)]);
-    this.#objects = new Map(objects.map((object) => [object.id, object]));
+    this.#objects.fill(objects);
     this.#masks.fill(lanes);
     this.#draw();
     this.#fetchMasks();
   }
 
   get #frame() {
-    return this.#frames.list[this.#position];
+    return this.#player.frame;
   }
 
-  get #chosen() {
-    return this.#current === null ? null : (this.#objects.get(this.#current) ?? null);
-  }
-
-  /** @param {SceneObject} object */
-  #colour(object) {
-    return this.#palette[object.colour % this.#palette.length] ?? "#e69f00";
-  }
-
-  // Frames
-
-  /** @param {number} position */
-  #seek(position) {
-    this.#position = Math.min(Math.max(position, 0), Math.max(this.#frames.list.length - 1, 0));
-    const frame = this.#frame;
-    if (!frame) return;
-    this.#strip.setPosition(this.#position);
-    remember({ frame: frame.index });
-    this.#showPicture();
+  #drawFrame() {
     this.#drawMarkers();
     this.#drawMasks();
     this.#drawProposals();
     this.#drawPins();
-    clearTimeout(this.#settling);
-    this.#settling = window.setTimeout(() => this.#settle(), SETTLE_MS);
   }
 
-  /** The frame's picture, or what is at hand until it is here. */
-  #showPicture() {
-    const frame = this.#frame;
-    if (!frame) return;
-    const image = this.#asDepth ? new Image() : this.#frames.large(frame);
-    if (this.#asDepth) image.src = this.#frames.depthUrl(frame);
-    const show = () => this.#frame === frame && this.#canvas.setFrame(image, frame, `Frame ${frame.index}`);
-    if (image.complete && image.naturalWidth) return void show();
-    image.addEventListener("load", show, { once: true });
-    const meanwhile = this.#asDepth ? null : this.#frames.atOnce(this.#position);
-    if (meanwhile) this.#canvas.setFrame(meanwhile, frame, `Frame ${frame.index}`);
-  }
-
-  /** A frame was stopped at: its masks, its depth and its neighbours are worth fetching. */
-  #settle() {
-    const frame = this.#frame;
-    if (!frame) return;
+  /** A frame was stopped at: its masks and its depth are worth fetching. */
+  #settled() {
     this.#fetchMasks();
-    this.#depth.src = this.#frames.depthUrl(frame);
-    this.#frames.prefetch(this.#position);
-  }
-
-  #play() {
-    const playing = this.#timer !== 0;
-    clearInterval(this.#timer);
-    const next = () => this.#seek((this.#position + 1) % Math.max(this.#frames.list.length, 1));
-    this.#timer = playing ? 0 : window.setInterval(next, FRAME_MS);
-    this.#strip.setPlaying(!playing);
+    this.#depth.src = this.#player.depthUrl;
   }
 
   // Masks
@@ -288,7 +239,7 @@ export class AnnotatePage extends LiveElement {
   #receive(mask) {
     this.#masks.receive(mask);
     if (mask.frame === this.#frame?.index) this.#drawMasks();
-    if (mask.object === this.#current) this.#cloud.refresh();
+    if (mask.object === this.#objects.current) this.#cloud.refresh();
     this.#drawLanesLater();
   }
 
@@ -299,7 +250,7 @@ export class AnnotatePage extends LiveElement {
       this.#drawMasks();
     }
     if (error) say(error.message, { kind: "bad", hint: error.hint });
-    if (object === this.#current) this.#cloud.refresh();
+    if (object === this.#objects.current) this.#cloud.refresh();
     this.#drawLanesLater();
   }
 
@@ -310,7 +261,7 @@ export class AnnotatePage extends LiveElement {
     const frame = this.#frame;
     if (!frame) return;
     if (this.#pinning) return this.#pin({ frame: frame.index, x, y });
-    if (this.#current === null && label === 0) {
+    if (this.#objects.current === null && label === 0) {
       say("Left click on the object first: a right click takes away from the chosen one.");
       return;
     }
@@ -330,98 +281,21 @@ export class AnnotatePage extends LiveElement {
    */
   #place(points, hold) {
     this.#batching = hold;
-    this.#save(async () => {
-      const [only] = points;
-      if (this.#current === null) {
-        const category = this.#category.value.trim() || "object";
-        const object = await api.addObject(this.project, { category, points }, !hold);
-        this.#keep(object);
-        this.#select(object.id);
-      } else if (points.length === 1 && only) this.#keep(await api.addPoint(this.project, this.#current, only, !hold));
-      else this.#keep(await api.addPoints(this.project, this.#current, points, !hold));
-    });
+    this.#edits.place(points, { category: this.#category.value.trim() || "object", infer: !hold });
+    this.#drawMarkers();
   }
 
-  /**
-   * Change a click of whichever object it belongs to.
-   * @param {number} id
-   * @param {(object: number) => Promise<SceneObject>} act
-   */
-  #change(id, act) {
-    const owner = [...this.#objects.values()].find((object) => object.points.some((point) => point.id === id));
-    if (owner) this.#save(async () => this.#keep(await act(owner.id)));
-  }
-
-  /** @param {() => Promise<unknown>} act */
-  #save(act) {
-    this.#showSaved("saving…");
-    outbox.send(act).then(
-      () => this.#showSaved(`saved ${new Date().toLocaleTimeString()}`),
-      (error) => {
-        this.#showSaved("not saved", "bad");
-        sayError(error);
-        this.#draw();
-      },
-    );
-  }
-
-  /**
-   * @param {string} text
-   * @param {string} [tone]
-   */
-  #showSaved(text, tone = "") {
-    this.#saved.textContent = text;
-    this.#saved.className = `chip ${tone}`;
-  }
-
-  /**
-   * @param {number} id
-   * @param {{ name?: string, category?: string }} wanted
-   */
-  #patch(id, wanted) {
-    if (wanted.category) this.#category.value = wanted.category;
-    const seen = this.#objects.get(id);
-    if (!seen) return;
-    this.#save(async () => this.#keep(await saveFields(this.project, seen, wanted)));
-  }
-
-  /** @param {number} id */
-  #delete(id) {
-    const name = this.#objects.get(id)?.name ?? "object";
-    this.#save(async () => {
-      this.#keep(await api.deleteObject(this.project, id));
-      say(`Deleted ${name}; undo brings it back`);
-    });
-  }
-
-  /** Of the chosen object, else of what was changed last. @param {"undo" | "redo"} which */
-  #undoRedo(which) {
-    const mine = which === "undo" ? this.#chosen?.can_undo : this.#chosen?.can_redo;
-    this.#save(async () => {
-      const { object, text, frame } = await api.undoRedo(this.project, which, mine ? this.#current : null, "prompts");
-      this.#keep(object);
-      const where = frame !== null && frame !== this.#frame?.index ? ` (frame ${frame})` : "";
-      say(`${which === "undo" ? "Undone" : "Redone"}: ${text}${where}`);
-    });
-  }
-
-  /**
-   * An answer to a change. What the live connection said of the same change may be newer: masks can be done before it comes.
-   * @param {SceneObject} object
-   */
+  /** An answer to a change. @param {SceneObject} object */
   #keep(object) {
-    const held = this.#objects.get(object.id);
-    if (held && held.version >= object.version) this.#draw();
-    else this.#store(object);
+    if (this.#objects.isNews(object)) this.#store(object);
+    else this.#draw();
   }
 
   /** @param {SceneObject} object */
   #store(object) {
-    if (object.deleted) {
-      this.#objects.delete(object.id);
-      this.#masks.forget(object.id);
-      if (this.#current === object.id) this.#select(null);
-    } else this.#objects.set(object.id, object);
+    this.#objects.store(object);
+    if (object.deleted) this.#masks.forget(object.id);
+    if (object.deleted && this.#objects.current === object.id) this.#select(null);
     this.#draw();
   }
 
@@ -429,28 +303,15 @@ export class AnnotatePage extends LiveElement {
   #adopt(objects) {
     for (const object of objects) this.#keep(object);
     this.#select(null);
-    this.#showSaved(`saved ${new Date().toLocaleTimeString()}`);
+    this.#stage.saved(`saved ${new Date().toLocaleTimeString()}`);
   }
 
   /** @param {number | null} id */
   #select(id) {
-    this.#current = id !== null && this.#objects.has(id) ? id : null;
-    remember({ object: this.#current });
-    this.#cloud.show(this.#current);
-    this.#draw();
-  }
-
-  /** @param {number} id */
-  #toggle(id) {
-    if (!this.#hidden.delete(id)) this.#hidden.add(id);
-    this.#draw();
-  }
-
-  #solo() {
-    if (this.#current === null) return;
-    const others = [...this.#objects.keys()].filter((id) => id !== this.#current);
-    const alone = others.every((id) => this.#hidden.has(id));
-    this.#hidden = new Set(alone ? [] : others);
+    this.#objects.choose(id);
+    this.#edits.finish();
+    remember({ object: this.#objects.current });
+    this.#cloud.show(this.#objects.current);
     this.#draw();
   }
 
@@ -460,54 +321,38 @@ export class AnnotatePage extends LiveElement {
   #pin(pin) {
     this.#pinning = false;
     this.#drawTip();
-    this.#comments.ask({ ...pin, object: this.#current }, this.#chosen?.name ?? `frame ${pin.frame}`);
+    this.#comments.ask({ ...pin, object: this.#objects.current }, this.#objects.chosen?.name ?? `frame ${pin.frame}`);
   }
 
   /** @param {Comment} comment */
   #showComment({ object, frame }) {
     if (object !== null) this.#select(object);
-    if (frame !== null) this.#seek(this.#frames.positionOf(frame));
+    if (frame !== null) this.#player.seekFrame(frame);
   }
 
   // Drawing
 
   #draw() {
-    const view = { current: this.#current, hidden: this.#hidden, colourOf: this.#colour.bind(this) };
-    this.#list.setObjects(this.#sorted, view);
+    const { current, hidden } = this.#objects;
+    this.#list.setObjects(this.#objects.sorted, {
+      current,
+      hidden,
+      colourOf: (object) => this.#objects.colour(object),
+    });
     this.#drawMarkers();
     this.#drawLanes();
     this.#drawMasks();
     this.#drawProposals();
   }
 
-  get #sorted() {
-    return [...this.#objects.values()].toSorted((a, b) => a.id - b.id);
-  }
-
   #drawMarkers() {
-    const markers = this.#sorted.flatMap((object, k) =>
-      object.points
-        .filter((point) => point.frame === this.#frame?.index && !this.#hidden.has(object.id))
-        .map((point) => ({
-          ...point,
-          colour: this.#colour(object),
-          number: k + 1,
-          object: object.id,
-          current: object.id === this.#current,
-        })),
-    );
-    this.#canvas.setMarkers(markers);
+    this.#canvas.setMarkers(markersOn(this.#objects, this.#edits.clicks, this.#frame?.index));
   }
 
   #drawMasks(_opacity = this.#canvas.opacity) {
     const frame = this.#frame;
     if (!frame) return;
-    const layers = [...this.#objects.values()].flatMap((object) => {
-      const mask = this.#masks.on(object.id, frame.index)?.mask;
-      if (!mask || this.#hidden.has(object.id)) return [];
-      return [{ object: object.id, colour: rgbOf(this.#colour(object)), mask, current: object.id === this.#current }];
-    });
-    this.#canvas.setMasks(layers);
+    this.#canvas.setMasks(masksOn(this.#objects, this.#masks, frame.index));
   }
 
   /** Masks arrive by the dozen: redraw the lanes at most every quarter second. */
@@ -520,17 +365,7 @@ export class AnnotatePage extends LiveElement {
   }
 
   #drawLanes() {
-    this.#strip.setLanes(
-      this.#sorted.map((object, k) => ({
-        id: object.id,
-        number: k + 1,
-        colour: this.#colour(object),
-        name: object.name,
-        frames: this.#masks.lane(object.id),
-        prompts: new Set(object.points.map((point) => point.frame)),
-        current: object.id === this.#current,
-      })),
-    );
+    this.#strip.setLanes(lanesOf(this.#objects, this.#masks));
   }
 
   #drawProposals() {
@@ -544,8 +379,8 @@ export class AnnotatePage extends LiveElement {
   }
 
   #drawTip() {
-    if (!this.#frames.list.length) return;
-    const name = this.#chosen?.name;
+    if (!this.#player.frame) return;
+    const name = this.#objects.chosen?.name;
     const proposed = this.#proposals.tip;
     this.#tip.hidden = !this.#pinning && this.#objects.size > 2;
     this.#tip.textContent = this.#pinning
@@ -556,28 +391,15 @@ export class AnnotatePage extends LiveElement {
           : `Not what you expected? Left click adds to ${name}, right click takes away. Enter starts the next object.`));
   }
 
-  /** @param {LiveStatus} status */
-  #showLive(status) {
-    const percent = status.state === "preparing" ? ` ${Math.round(100 * status.fraction)} %` : "";
-    const text = {
-      off: "segmenter off",
-      starting: "segmenter starting…",
-      preparing: "preparing the scan",
-      ready: "ready",
-      failed: "no masks",
-    };
-    this.#status.textContent = `${text[status.state]}${percent}`;
-    this.#status.className = `chip ${status.state === "ready" ? "good" : status.state === "failed" ? "bad" : ""}`;
-    this.#status.title = status.error ? `${status.error.message} ${status.error.hint}` : status.text;
-  }
-
   // Keys and commands
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
     if (isTyping(event) || document.querySelector("dialog[open]")) return;
     if (event.key === "Escape" && this.#pinning) return this.#pinWanted(false);
-    if (this.#canvas.crosshair && this.#crosshairKey(event)) return event.preventDefault();
+    const click = (/** @type {0 | 1} */ label) =>
+      this.#canvas.crosshair && this.#click({ ...this.#canvas.crosshair, label, hold: false });
+    if (crosshairKey(event, this.#canvas, click)) return event.preventDefault();
     const action = actionOf(event, "annotate", plainKeys());
     if (!action || !this.#actions[action]) return;
     event.preventDefault();
@@ -599,9 +421,10 @@ export class AnnotatePage extends LiveElement {
    * @returns {import("../lib/commands.js").Command[]}
    */
   commands(typed) {
-    const position = this.#frames.positionOf(Number(typed || Number.NaN));
-    const frame = position < 0 ? [] : [{ text: `${typed.trim()}: go to that frame`, run: () => this.#seek(position) }];
-    const objects = this.#sorted.map((object) => ({
+    const position = this.#player.frames.positionOf(Number(typed || Number.NaN));
+    const frame =
+      position < 0 ? [] : [{ text: `${typed.trim()}: go to that frame`, run: () => this.#player.seek(position) }];
+    const objects = this.#objects.sorted.map((object) => ({
       text: `Object ${object.name}`,
       run: () => this.#select(object.id),
     }));
@@ -612,67 +435,69 @@ export class AnnotatePage extends LiveElement {
     return [...frame, ...objects, ...categories];
   }
 
-  /** The chosen object's category, else the next one's. @param {string} category */
-  #categorise(category) {
-    if (this.#current === null) this.#category.value = category;
-    else this.#patch(this.#current, { category });
+  /**
+   * An object's category, else the next one's.
+   * @param {string} category
+   * @param {number | null} id
+   */
+  #categorise(category, id = this.#objects.current) {
+    this.#category.value = category;
+    if (id !== null) this.#edits.patch(id, { category });
   }
 
   /** @type {Record<string, (key: string) => void>} */
   #actions = {
-    "next-frame": () => this.#seek(this.#position + 1),
-    "previous-frame": () => this.#seek(this.#position - 1),
-    "forward-ten": () => this.#seek(this.#position + 10),
-    "back-ten": () => this.#seek(this.#position - 10),
-    "first-frame": () => this.#seek(0),
-    "last-frame": () => this.#seek(this.#frames.list.length - 1),
-    play: () => this.#play(),
+    "next-frame": () => this.#player.seek(this.#player.position + 1),
+    "previous-frame": () => this.#player.seek(this.#player.position - 1),
+    "forward-ten": () => this.#player.seek(this.#player.position + 10),
+    "back-ten": () => this.#player.seek(this.#player.position - 10),
+    "first-frame": () => this.#player.seek(0),
+    "last-frame": () => this.#player.seek(this.#player.frames.list.length - 1),
+    play: () => this.#player.play(),
     "next-prompt": () => this.#seekPrompt(1),
     "previous-prompt": () => this.#seekPrompt(-1),
     "next-doubtful": () => this.#seekDoubtful(1),
     "previous-doubtful": () => this.#seekDoubtful(-1),
-    "pick-number": (key) => this.#select(this.#sorted[Number(key) - 1]?.id ?? this.#current),
+    "pick-number": (key) => this.#select(this.#objects.sorted[Number(key) - 1]?.id ?? this.#objects.current),
     finish: () => this.#select(null),
-    undo: () => this.#undoRedo("undo"),
-    redo: () => this.#undoRedo("redo"),
+    undo: () => this.#edits.undoRedo("undo", this.#frame?.index),
+    redo: () => this.#edits.undoRedo("redo", this.#frame?.index),
     "delete-point": () => this.#deleteLast(),
-    segment: () => this.#onChosen((id) => api.segmentObject(this.project, id)),
-    "cancel-segment": () => this.#onChosen((id) => api.cancelSegment(this.project, id)),
+    segment: () => this.#edits.segment(),
+    "cancel-segment": () => this.#edits.stopSegmenting(),
     "confirm-proposal": () => this.#proposals.confirm(),
     "dismiss-proposal": () => this.#proposals.dismiss(),
     "next-proposal": () => this.#proposals.move(1),
     "previous-proposal": () => this.#proposals.move(-1),
     "confirm-all": () => this.#proposals.confirmAll(),
-    hide: () => this.#current !== null && this.#toggle(this.#current),
-    solo: () => this.#solo(),
+    hide: () => this.#hide(),
+    solo: () => (this.#objects.solo(), this.#draw()),
     raw: () => this.#raw(true),
-    depth: () => {
-      this.#asDepth = !this.#asDepth;
-      this.#showPicture();
-    },
+    depth: () => this.#player.switchDepth(),
     mosaic: () => this.#openMosaic(),
     comment: () => this.#pinWanted(!this.#pinning),
     fit: () => this.#canvas.fit(),
+    sign: () => this.#stage.switchSign(),
+    evidence: () => this.#showEvidence(),
     crosshair: () => this.#canvas.showCrosshair(!this.#canvas.crosshair),
   };
 
-  /** @param {(object: number) => Promise<SceneObject>} act */
-  #onChosen(act) {
-    const id = this.#current;
-    if (id === null) say("Choose an object first.");
-    else this.#save(async () => this.#keep(await act(id)));
+  #hide() {
+    if (this.#objects.current !== null) this.#objects.toggle(this.#objects.current);
+    this.#draw();
   }
 
   #openMosaic() {
-    const object = this.#chosen;
+    const object = this.#objects.chosen;
     if (!object) return say("Choose an object first.");
     const looked = {
       id: object.id,
       name: object.name,
-      colour: this.#colour(object),
+      colour: this.#objects.colour(object),
       lane: this.#masks.lane(object.id),
     };
-    this.#mosaic.open(looked, this.#frames.list, (frame, width) => this.#frames.url(frame, width));
+    const { frames } = this.#player;
+    this.#mosaic.open(looked, frames.list, (frame, width) => frames.url(frame, width));
   }
 
   /** @param {boolean} on */
@@ -681,30 +506,12 @@ export class AnnotatePage extends LiveElement {
     this.#drawTip();
   }
 
-  /**
-   * @param {KeyboardEvent} event
-   * @returns {boolean} whether the crosshair took it
-   */
-  #crosshairKey(event) {
-    const reach = event.shiftKey ? 5 : 1;
-    /** @type {Record<string, [number, number]>} */
-    const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const move = moves[event.key];
-    if (move) this.#canvas.moveCrosshair(move[0] * reach, move[1] * reach);
-    else if (event.key === "Escape") this.#canvas.showCrosshair(false);
-    else if (this.#canvas.crosshair && ["+", "=", "-"].includes(event.key)) {
-      this.#click({ ...this.#canvas.crosshair, label: event.key === "-" ? 0 : 1, hold: false });
-    } else return false;
-    return true;
-  }
-
   /** @param {KeyboardEvent} event */
   #onKeyUp(event) {
     if (event.key.toLowerCase() === "t") this.#raw(false);
-    if ((event.key === "Control" || event.key === "Meta") && this.#batching && this.#current !== null) {
+    if ((event.key === "Control" || event.key === "Meta") && this.#batching) {
       this.#batching = false;
-      const object = this.#current;
-      this.#save(() => api.segmentObject(this.project, object));
+      this.#edits.segment();
     }
   }
 
@@ -716,22 +523,18 @@ export class AnnotatePage extends LiveElement {
 
   /** @param {1 | -1} direction */
   #seekPrompt(direction) {
-    const wanted = new Set((this.#chosen?.points ?? []).map((point) => point.frame));
-    for (let k = this.#position + direction; k >= 0 && k < this.#frames.list.length; k += direction) {
-      if (wanted.has(this.#frames.list[k]?.index ?? -1)) return this.#seek(k);
-    }
+    this.#player.seekOneOf(new Set((this.#objects.chosen?.points ?? []).map((point) => point.frame)), direction);
   }
 
   /** @param {1 | -1} direction */
   #seekDoubtful(direction) {
-    const lane = this.#current === null ? new Map() : this.#masks.lane(this.#current);
-    const found = nextDoubtful(this.#frames.list, lane, this.#position, direction);
-    if (found === null) say("No doubtful frame that way.");
-    else this.#seek(found);
+    const { current } = this.#objects;
+    const lane = current === null ? new Map() : this.#masks.lane(current);
+    if (!this.#player.seekDoubtful(lane, direction)) say("No doubtful frame that way.");
   }
 
   #deleteLast() {
-    const last = this.#chosen?.points.findLast((point) => point.frame === this.#frame?.index);
-    if (last) this.#change(last.id, (object) => api.deletePoint(this.project, object, last.id));
+    const last = this.#objects.chosen?.points.findLast((point) => point.frame === this.#frame?.index);
+    if (last) this.#edits.removePoint(last.id);
   }
 }

@@ -1,15 +1,7 @@
 /** Candidates beside their evidence, the mesh over photos and scan, the finished scene with its joints. The verdict is a person's. */
 
-import {
-  changeOverride,
-  getCertificate,
-  getScene,
-  giveVerdict,
-  listCandidates,
-  moveJoints,
-  undoRedo,
-  uploadCandidate,
-} from "../api.js";
+import { getCertificate, getScene, listCandidates, moveJoints, placeInViewer, uploadCandidate } from "../api.js";
+import { changeOverride, giveVerdict, undoRedo } from "../changes.js";
 import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
 import { askForText } from "../elements/ask-dialog.js";
 import { CommentList } from "../elements/comment-list.js";
@@ -25,6 +17,10 @@ import { choice, gallery } from "../review/candidates.js";
 import { corrections } from "../review/corrections.js";
 import { findingsOf, placement } from "../review/evidence.js";
 import { JointPanel } from "../review/joint-panel.js";
+import { Mover } from "../review/mover.js";
+import { nextToReview, objectNav } from "../review/object-nav.js";
+import { Paced } from "../review/paced.js";
+import { ViewBar } from "../review/view-bar.js";
 import { remember } from "../router.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
@@ -37,33 +33,24 @@ import { remember } from "../router.js";
 /** @typedef {import("../api-types").Reviewed} Reviewed */
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 /** @typedef {import("../api-types").ViewerShown} ViewerShown */
-/** @typedef {"candidate" | "aligned" | "photo" | "scene" | "cloud"} Mode */
+/** @typedef {import("../review/view-bar.js").Mode} Mode */
 
-/** @type {[Mode, string][]} */
-const MODES = [
-  ["photo", "Over the photos"],
-  ["candidate", "Candidate"],
-  ["aligned", "Over the scan"],
-  ["scene", "Finished scene"],
-  ["cloud", "Scan"],
-];
 const MOVE_MS = 100;
 
 export class ReviewPage extends LiveElement {
   project = "";
   query = new URLSearchParams();
   #nav = h("nav", { "aria-label": "Objects" });
-  #bar = h("div", { class: "bar" });
+  #bar = new ViewBar();
   #viewer = new ViewerFrame();
   #photos = new PhotoCheck();
   #state = new ReviewState();
   #comments = new CommentList();
   #panel = h("aside", { "aria-label": "Candidates" });
-  #opacity = h("input", { type: "range", min: "0", max: "100", value: "85", "aria-label": "Opacity of the mesh" });
-  #collision = h("input", { type: "checkbox" });
-  #scan = h("input", { type: "checkbox" });
-  #job = h("span", { class: "chip", role: "status", hidden: true });
-  #joints = new JointPanel((values) => this.#move(values));
+  #joints = new JointPanel((values) => this.#turn.add(values));
+  #mover = new Mover();
+  #turn = new Paced(MOVE_MS, (/** @type {Record<string, number>} */ values) => moveJoints(this.project, values));
+  #place = new Paced(MOVE_MS, (/** @type {{ pose?: number[][] }} */ { pose }) => this.#drag(pose ?? null));
 
   /** @type {CandidateGroup[]} */
   #groups = [];
@@ -73,17 +60,26 @@ export class ReviewPage extends LiveElement {
   #certificate = null;
   #object = -1;
   #candidate = "";
-  /** @type {Mode} */
-  #mode = "scene";
 
   connected() {
     for (const element of [this.#state, this.#comments, this.#photos]) element.project = this.project;
     const objects = h("div", { class: "objects" }, this.#state, this.#nav, this.#comments);
-    const centre = h("div", { class: "centre" }, this.#bar, this.#viewer, this.#photos, this.#joints.element);
+    const centre = h(
+      "div",
+      { class: "centre" },
+      this.#bar.element,
+      this.#viewer,
+      this.#photos,
+      this.#joints.element,
+      this.#mover.element,
+    );
     this.replaceChildren(h("div", { class: "review" }, objects, centre, this.#panel));
     const { signal } = this;
-    for (const input of [this.#opacity, this.#collision, this.#scan])
-      input.addEventListener("change", () => this.#show(), { signal });
+    this.#bar.addEventListener("change", () => this.#show(), { signal });
+    this.#mover.addEventListener("shown", () => this.#drawMover(), { signal });
+    this.#mover.addEventListener("moved", () => this.#follow(), { signal });
+    this.#mover.addEventListener("store", (event) => this.#correct(detailOf(event)), { signal });
+    this.#viewer.addEventListener("dragging", () => this.#bar.moving && this.#place.add({}), { signal });
     this.#viewer.addEventListener("shown", (event) => this.#shown(detailOf(event)), { signal });
     this.#viewer.addEventListener(
       "not-ready",
@@ -99,8 +95,8 @@ export class ReviewPage extends LiveElement {
     document.addEventListener("keyup", (event) => event.key.toLowerCase() === "b" && this.#photos.blink(false), {
       signal,
     });
-    signal.addEventListener("abort", () => this.#joints.stop());
-    if (this.query.has("object")) this.#mode = "photo";
+    signal.addEventListener("abort", () => [this.#joints, this.#turn, this.#place].forEach((part) => part.stop()));
+    if (this.query.has("object")) this.#bar.mode = "photo";
     this.#load().then(() => {
       this.#show();
       this.#viewer.open(this.project, this.#wanted());
@@ -142,90 +138,57 @@ export class ReviewPage extends LiveElement {
     this.#object = object;
     this.#candidate = this.#group?.chosen ?? "";
     remember({ object: object < 0 ? null : object });
-    if (show && (this.#mode === "scene" || this.#mode === "cloud")) this.#mode = "photo";
+    this.#bar.moving = false;
     this.#draw();
-    if (show) this.#show();
+    if (show) this.#bar.set(["scene", "cloud"].includes(this.#bar.mode) ? "photo" : this.#bar.mode);
   }
 
   #wanted() {
-    const mode = this.#mode === "photo" ? "aligned" : this.#mode;
+    const { mode, ...look } = this.#bar.wish;
+    const { box } = this.#mover;
     return {
+      ...look,
       mode,
       object: mode === "cloud" || this.#object < 0 ? null : this.#object,
       candidate: mode === "candidate" ? this.#candidate || null : null,
-      cloud: mode === "scene" ? this.#scan.checked : mode !== "candidate",
-      opacity: Number(this.#opacity.value) / 100,
-      collision: this.#collision.checked,
+      box:
+        this.#bar.moving && box ? { pose: box.pose, size: /** @type {[number, number, number]} */ (box.size) } : null,
     };
   }
 
-  #show() {
-    const photo = this.#mode === "photo";
+  async #show() {
+    const photo = this.#bar.mode === "photo";
     this.#viewer.hidden = photo;
     this.#photos.hidden = !photo;
-    if (this.#mode !== "scene") this.#joints.element.hidden = true;
-    this.#drawBar();
+    this.#drawMover();
+    if (this.#bar.mode !== "scene") this.#joints.element.hidden = true;
     if (!photo) this.#viewer.show(this.#wanted());
-    else if (this.#object >= 0) this.#photos.show(this.#object).then(() => this.#drawPanel());
-  }
-
-  /** @param {Mode} mode */
-  #setMode(mode) {
-    this.#mode = mode;
-    this.#show();
+    if (this.#object < 0) return;
+    await this.#photos.show(this.#object);
+    this.#drawPanel();
   }
 
   /** @param {ViewerShown} shown */
   #shown(shown) {
+    this.#bar.told(shown.reduced);
     this.#joints.show(shown.joints, this.#items);
-    this.#joints.element.hidden = this.#mode !== "scene" || !shown.joints.length;
+    this.#joints.element.hidden = this.#bar.mode !== "scene" || !shown.joints.length;
+    this.#follow();
   }
 
   // Drawing
 
   #draw() {
-    this.#drawNav();
+    const view = { current: this.#object, project: this.project, choose: this.#choose.bind(this) };
+    this.#nav.replaceChildren(...objectNav(this.#groups, view));
     this.#drawPanel();
-  }
-
-  #drawNav() {
-    const items = this.#groups.map((group) => {
-      const [text, tone] = standing(group);
-      const button = h("button", { type: "button", "aria-pressed": String(group.object === this.#object) }, group.name);
-      button.append(h("span", { class: `chip ${tone}` }, text));
-      button.addEventListener("click", () => this.#choose(group.object));
-      return h("li", {}, button);
-    });
-    const done = this.#groups.filter((group) => group.accepted).length;
-    this.#nav.replaceChildren(
-      h("h1", {}, "Review"),
-      h(
-        "p",
-        { class: "muted" },
-        this.#groups.length ? `${done} of ${counted(this.#groups.length, "object")} accepted` : "",
-      ),
-      this.#groups.length
-        ? h("ul", {}, ...items)
-        : h("p", {}, "Nothing to review yet. ", h("a", { href: `/p/${this.project}/run` }, "Run the pipeline")),
-    );
-  }
-
-  #drawBar() {
-    this.#bar.replaceChildren(
-      ...MODES.map(([mode, text]) => {
-        const button = h("button", { type: "button", "aria-pressed": String(mode === this.#mode) }, text);
-        button.addEventListener("click", () => this.#setMode(mode));
-        return button;
-      }),
-      this.#mode === "aligned" ? h("label", { class: "row" }, "Opacity", this.#opacity) : "",
-      this.#mode === "scene" ? h("label", { class: "row" }, this.#collision, "Colliders") : "",
-      this.#mode === "scene" ? h("label", { class: "row" }, this.#scan, "Scan") : "",
-      this.#job,
-    );
   }
 
   #drawPanel() {
     const group = this.#group;
+    this.#mover.about(group, this.#photos.boxOf(this.#object));
+    this.#bar.offer(this.#mover.box !== null);
+    this.#drawMover();
     if (!group) return this.#panel.replaceChildren(h("p", { class: "muted" }, "Choose an object."));
     const undo = h(
       "button",
@@ -236,17 +199,12 @@ export class ReviewPage extends LiveElement {
     const upload = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
     upload.addEventListener("change", () => {
       const file = upload.files?.[0];
-      if (file) this.#review(() => uploadCandidate(this.project, group.object, file));
+      if (file) this.#review(uploadCandidate(this.project, group.object, file));
     });
     const told = {
       show: (/** @type {Candidate} */ candidate) => this.#showCandidate(candidate),
       verdict: (/** @type {Candidate} */ candidate, /** @type {"accepted" | "rejected"} */ said) =>
         this.#verdict(candidate, said),
-    };
-    const edits = {
-      change: (/** @type {Partial<OverridePatch>} */ patch) =>
-        this.#review(() => changeOverride(this.project, group.object, patch)),
-      preview: (/** @type {{ pose: number[][], size: number[] } | null} */ box) => this.#photos.preview(box),
     };
     this.#panel.replaceChildren(
       h("div", { class: "row" }, h("h2", {}, group.name), h("span", { class: "chip" }, group.category), undo),
@@ -257,7 +215,7 @@ export class ReviewPage extends LiveElement {
         group.name,
         this.#groups.map((other) => other.name),
       ),
-      corrections(group, this.#item, this.#mode === "photo" ? this.#photos.box : null, edits),
+      corrections(group, this.#item, this.#mover.box && (() => this.#bar.move(true)), (patch) => this.#correct(patch)),
       h("h3", {}, counted(group.candidates.length, "candidate")),
       gallery(group, this.#candidate, told),
       h(
@@ -281,7 +239,7 @@ export class ReviewPage extends LiveElement {
   #showCandidate(candidate) {
     this.#candidate = candidate.id;
     this.#drawPanel();
-    this.#setMode("candidate");
+    this.#bar.set("candidate");
   }
 
   /**
@@ -297,19 +255,24 @@ export class ReviewPage extends LiveElement {
       : "";
     if (reason === null) return;
     const verdict = again ? /** @type {const} */ ("cleared") : said;
-    await this.#review(() =>
-      giveVerdict(this.project, object, { candidate: candidate.id, verdict, reason, rerun: true }),
-    );
+    const change = giveVerdict(this.project, object, { candidate: candidate.id, verdict, reason, rerun: true });
+    await this.#review(outbox.send(change));
     if (verdict === "accepted" && this.#object === object) this.#nextToReview();
   }
 
-  /** @param {() => Promise<Reviewed>} request */
-  async #review(request) {
+  /** @param {Partial<OverridePatch>} patch */
+  #correct(patch) {
+    const group = this.#group;
+    if (group) this.#review(outbox.send(changeOverride(this.project, group.object, patch)));
+  }
+
+  /** @param {Promise<Reviewed>} answer */
+  async #review(answer) {
     try {
-      const { text, job } = await outbox.send(request);
+      const { text, job } = await answer;
       say(text, { kind: "good" });
       if (job) this.#hear(job);
-      this.#photos.preview(null);
+      this.#mover.drop();
       await this.#load();
     } catch (error) {
       sayError(error);
@@ -319,7 +282,7 @@ export class ReviewPage extends LiveElement {
   /** @param {"undo" | "redo"} which */
   async #undo(which) {
     try {
-      const { text } = await outbox.send(() => undoRedo(this.project, which, this.#object, "review"));
+      const { text } = await outbox.send(undoRedo(this.project, which, this.#object, "review"));
       say(`${which === "undo" ? "Undone" : "Redone"}: ${text}`);
       await this.#load();
     } catch (error) {
@@ -336,33 +299,35 @@ export class ReviewPage extends LiveElement {
   /** @param {Comment} comment */
   #showComment({ object, point_world: point }) {
     if (object !== null) this.#choose(object);
-    if (point) this.#setMode("scene");
+    if (point) this.#bar.set("scene");
   }
 
   /** @param {Job} job */
   #hear(job) {
     if (job.project !== this.project || job.kind !== "run") return;
     const running = ["queued", "running"].includes(job.state);
-    this.#job.hidden = !running;
-    this.#job.textContent = `running ${job.stage} ${Math.round(100 * job.progress)} %`;
+    this.#bar.job.hidden = !running;
+    this.#bar.job.textContent = `running ${job.stage} ${Math.round(100 * job.progress)} %`;
     if (job.state === "done") this.#load().then(() => this.#show());
     if (job.state === "failed" && job.error) say(job.error.message, { kind: "bad", hint: job.error.hint });
   }
 
-  /** @type {Record<string, number>} */
-  #moving = {};
-  #moveTimer = 0;
+  #drawMover() {
+    const { moving } = this.#bar;
+    this.#mover.element.hidden = !moving;
+    this.#photos.preview(moving ? (this.#mover.wanted ?? this.#mover.box) : null);
+  }
 
-  /** At most ten moves a second. @param {Record<string, number>} values */
-  #move(values) {
-    Object.assign(this.#moving, values);
-    if (this.#moveTimer) return;
-    this.#moveTimer = window.setTimeout(() => {
-      this.#moveTimer = 0;
-      const sent = this.#moving;
-      this.#moving = {};
-      moveJoints(this.project, sent).catch(sayError);
-    }, MOVE_MS);
+  /** The handles in the 3D view go where a number or a key moved the object. */
+  #follow() {
+    const { box, wanted } = this.#mover;
+    if (this.#bar.moving && box) this.#place.add({ pose: (wanted ?? box).pose });
+  }
+
+  /** Put the handles somewhere, or learn where they were dragged. @param {number[][] | null} pose */
+  async #drag(pose) {
+    const placed = await placeInViewer(this.project, pose);
+    if (!pose && placed.pose) this.#mover.dragged(placed.pose);
   }
 
   // Keys and commands
@@ -373,12 +338,17 @@ export class ReviewPage extends LiveElement {
     const action = actionOf(event, "review", plainKeys());
     if (!action || !this.#actions[action]) return;
     event.preventDefault();
-    if (!event.repeat || action !== "comment") this.act(action);
+    if (!event.repeat || action !== "comment") this.act(action, event.key, event.shiftKey);
   }
 
-  /** Do what a key or the palette asks for. @param {string} action */
-  act(action) {
-    this.#actions[action]?.();
+  /**
+   * Do what a key or the palette asks for.
+   * @param {string} action
+   * @param {string} [key]
+   * @param {boolean} [fine]
+   */
+  act(action, key = "", fine = false) {
+    this.#actions[action]?.(key, fine);
   }
 
   /** @returns {import("../lib/commands.js").Command[]} */
@@ -386,7 +356,7 @@ export class ReviewPage extends LiveElement {
     return this.#groups.map((group) => ({ text: `Object ${group.name}`, run: () => this.#choose(group.object) }));
   }
 
-  /** @type {Record<string, () => void>} */
+  /** @type {Record<string, (key: string, fine: boolean) => void>} */
   #actions = {
     accept: () => this.#onCandidate("accepted"),
     reject: () => this.#onCandidate("rejected"),
@@ -398,11 +368,15 @@ export class ReviewPage extends LiveElement {
     blink: () => this.#photos.blink(true),
     sweep: () => this.#joints.sweep(this.#group?.name ?? null),
     comment: () => this.#comment(),
-    "view-candidate": () => this.#setMode("candidate"),
-    "view-aligned": () => this.#setMode("aligned"),
-    "view-scene": () => this.#setMode("scene"),
-    "view-cloud": () => this.#setMode("cloud"),
-    "view-photo": () => this.#setMode("photo"),
+    "view-candidate": () => this.#bar.set("candidate"),
+    "view-aligned": () => this.#bar.set("aligned"),
+    "view-scene": () => this.#bar.set("scene"),
+    "view-cloud": () => this.#bar.set("cloud"),
+    "view-photo": () => this.#bar.set("photo"),
+    "move-object": () => this.#bar.move(!this.#bar.moving),
+    nudge: (key, fine) => (this.#bar.moving || this.#bar.move(true), this.#mover.nudge(key, fine)),
+    "store-move": () => this.#mover.store(),
+    "drop-move": () => this.#mover.drop(),
     undo: () => this.#undo("undo"),
     redo: () => this.#undo("redo"),
   };
@@ -411,8 +385,7 @@ export class ReviewPage extends LiveElement {
   #more() {
     const group = this.#group;
     if (!group) return;
-    const regenerate = (group.override.regenerate ?? 0) + 1;
-    this.#review(() => changeOverride(this.project, group.object, { regenerate }));
+    this.#correct({ regenerate: (group.override.regenerate ?? 0) + 1 });
   }
 
   /** @param {"accepted" | "rejected"} verdict */
@@ -421,10 +394,8 @@ export class ReviewPage extends LiveElement {
     if (candidate) this.#verdict(candidate, verdict);
   }
 
-  /** The next object that nobody accepted yet; stay when all are. */
   #nextToReview() {
-    const at = this.#groups.findIndex((group) => group.object === this.#object);
-    const left = [...this.#groups.slice(at + 1), ...this.#groups.slice(0, at)].find((group) => !group.accepted);
+    const left = nextToReview(this.#groups, this.#object);
     if (left) this.#choose(left.object);
   }
 
@@ -434,14 +405,4 @@ export class ReviewPage extends LiveElement {
     const next = this.#groups[(at + by + this.#groups.length) % Math.max(this.#groups.length, 1)];
     if (next) this.#choose(next.object);
   }
-}
-
-/**
- * @param {CandidateGroup} group
- * @returns {[string, string]} text and tone
- */
-function standing(group) {
-  if (group.accepted) return ["accepted", "good"];
-  if (!group.placement) return ["not placed", ""];
-  return group.placement.unsure ? ["unsure", "warn"] : ["to review", ""];
 }

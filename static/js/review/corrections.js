@@ -1,12 +1,10 @@
 /** What a person may correct about one object: hinge, limits, size, place. Each is an override; what depends on it runs again. */
 
-import { h } from "../dom.js";
-import { nudged } from "../lib/box-view.js";
+import { h, numberField } from "../dom.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
 /** @typedef {import("../api-types").SceneItem} SceneItem */
-/** @typedef {{ pose: number[][], size: number[] }} Box */
 
 const SIDES = /** @type {const} */ (["automatic", "left", "right", "top", "bottom"]);
 const DEGREES = Math.PI / 180;
@@ -14,10 +12,10 @@ const DEGREES = Math.PI / 180;
 /**
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
- * @param {Box | null} box as it stands in the finished scene
- * @param {{ change: (patch: Partial<OverridePatch>) => void, preview: (box: Box | null) => void }} told
+ * @param {(() => void) | null} move begins to move it; null where there is no box yet
+ * @param {(patch: Partial<OverridePatch>) => void} change
  */
-export function corrections(group, item, box, told) {
+export function corrections(group, item, move, change) {
   return h(
     "details",
     { open: hasCorrection(group) },
@@ -25,9 +23,9 @@ export function corrections(group, item, box, told) {
     h(
       "div",
       { class: "stack" },
-      hinge(group, told.change),
-      limits(group, item, told.change),
-      box ? place(group, box, told) : null,
+      hinge(group, change),
+      limits(group, item, change),
+      move && h("button", { type: "button", onClick: move }, "Move or resize it…"),
     ),
   );
 }
@@ -62,7 +60,7 @@ function limits(group, item, change) {
   const joint = item?.joints[0];
   if (!joint) return null;
   const unit = joint.type === "revolute" ? DEGREES : 0.01;
-  const field = number(joint.type === "revolute" ? "Opens to (degrees)" : "Opens to (cm)", joint.upper / unit, {
+  const field = numberField(joint.type === "revolute" ? "Opens to (degrees)" : "Opens to (cm)", joint.upper / unit, {
     min: "1",
     step: "any",
   });
@@ -77,59 +75,7 @@ function limits(group, item, change) {
   );
 }
 
-/**
- * Size and place in numbers; the box over the photo follows while they are typed.
- * @param {CandidateGroup} group
- * @param {Box} box
- * @param {{ change: (patch: Partial<OverridePatch>) => void, preview: (box: Box | null) => void }} told
- */
-function place(group, box, { change, preview }) {
-  const moves = ["x (mm)", "y (mm)", "up (mm)", "turn (°)"].map((name) => number(`Move ${name}`, 0, { step: "1" }));
-  const sides = ["Width", "Depth", "Height"].map((name, k) =>
-    number(`${name} (cm)`, 100 * (box.size[k] ?? 0), { min: "1", step: "0.1" }),
-  );
-  const wanted = () => {
-    const [dx = 0, dy = 0, dz = 0, turn = 0] = moves.map(({ input }) => Number(input.value));
-    const pose = nudged(box.pose, { dx: dx / 1000, dy: dy / 1000, dz: dz / 1000, yaw: turn * DEGREES });
-    return {
-      pose,
-      size: sides.map(({ input }) => Number(input.value) / 100),
-      moved: [dx, dy, dz, turn].some((value) => value !== 0),
-    };
-  };
-  const form = h(
-    "form",
-    { class: "nudge" },
-    ...moves.map(({ label }) => label),
-    ...sides.map(({ label }) => label),
-    h("button", { type: "submit", class: "primary" }, "Use this place and size"),
-    group.override.pose || group.override.dimensions_m ? again(() => change({ pose: null, dimensions_m: null })) : null,
-  );
-  form.addEventListener("input", () => preview(wanted()));
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    const { pose, size, moved } = wanted();
-    const resized = size.some((side, k) => Math.abs(side - (box.size[k] ?? 0)) > 5e-4);
-    if (!moved && !resized) return preview(null);
-    change({
-      ...(moved ? { pose } : {}),
-      ...(resized ? { dimensions_m: /** @type {[number, number, number]} */ (size) } : {}),
-    });
-  });
-  return form;
-}
-
 /** @param {() => void} act */
 function again(act) {
   return h("button", { type: "button", class: "quiet", onClick: act }, "Compute it again");
-}
-
-/**
- * @param {string} text
- * @param {number} value
- * @param {Record<string, string>} options
- */
-function number(text, value, options) {
-  const input = h("input", { type: "number", value: String(Math.round(10 * value) / 10), ...options });
-  return { input, label: h("label", {}, h("span", { class: "muted" }, text), input) };
 }

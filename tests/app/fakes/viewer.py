@@ -35,13 +35,15 @@ def choose(_: ServerConnection, offered: Any) -> Any:
 server = serve(echo, "127.0.0.1", 0, process_request=page, select_subprotocol=choose, compression=None)
 threading.Thread(target=server.serve_forever, daemon=True).start()
 port = server.socket.getsockname()[1]
+shown: dict[str, int] = {}  # times, by view
 for line in sys.stdin:
     command = json.loads(line)
     if command.get("opacity") == 0.123:
         sys.exit(1)
     answer: dict[str, Any] = {"port": port}
     if command["cmd"] == "show":
-        answer = {"mode": command["mode"], "text": "shown", "joints": []}
+        shown[command["view"]] = shown.get(command["view"], 0) + 1
+        answer = {"mode": command["mode"], "text": f"shown {shown[command['view']]} times", "joints": []}
     if command["cmd"] == "joints":
         joints = [{"name": name, "lower": 0.0, "upper": 1.0, "value": value} for name, value in command["values"].items()]
         answer = {"mode": "scene", "text": "moved", "joints": joints}

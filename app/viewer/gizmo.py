@@ -1,0 +1,60 @@
+"""Handles to move one object by in the 3D view, with its box and its mesh hanging on them: they follow in the browser.
+
+viser's handles come with every ring or with none, but a ring is there only where both its arrows are. So the lower handles
+have right, back and the ring about the vertical, and the upper ones, which hang on them, have up.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import viser.transforms as vtf
+
+from r2c2r_core.geometry.transforms import Rigid3
+
+NODE = "/moved/up"  # what is moved hangs here
+_EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_FRONT, _SIDE = (255, 225, 77), (242, 245, 250)
+
+
+@dataclass(frozen=True, slots=True)
+class Gizmo:
+    """Both handles."""
+
+    lower: Any
+    upper: Any
+
+    @property
+    def pose(self) -> Rigid3:
+        """Where they are: world_from_object."""
+        return _pose(self.lower) @ _pose(self.upper)
+
+    def put(self, world_from_object: Rigid3) -> None:
+        """Move the handles, and what hangs on them."""
+        self.lower.wxyz = vtf.SO3.from_matrix(world_from_object.rotation).wxyz
+        self.lower.position = world_from_object.translation
+        self.upper.position = np.zeros(3)
+
+    def remove(self) -> None:
+        """Take them away, with what hangs on them."""
+        self.lower.remove()
+
+
+def add(scene: Any, world_from_object: Rigid3, size_m: Sequence[float]) -> Gizmo:
+    """Arrows along the object's own axes, a ring about its vertical, and its box with the front in another colour."""
+    look: dict[str, Any] = {"scale": max(0.8 * max(size_m), 0.3), "disable_sliders": True, "depth_test": False}
+    lower = scene.add_transform_controls("/moved", active_axes=(True, True, False), **look)
+    upper = scene.add_transform_controls(NODE, active_axes=(False, False, True), disable_rotations=True, **look)
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * np.asarray(size_m)
+    ends = np.array([[corners[a], corners[b]] for a, b in _EDGES], np.float32)
+    front = np.all(ends[:, :, 1] < 0, axis=1)  # the object's front is at -Y
+    colours = np.where(np.reshape(front, (-1, 1, 1)), np.array(_FRONT), np.array(_SIDE)).astype(np.uint8)
+    scene.add_line_segments(f"{NODE}/box", ends, np.broadcast_to(colours, (len(ends), 2, 3)), thickness=0.006)
+    handles = Gizmo(lower, upper)
+    handles.put(world_from_object)
+    return handles
+
+
+def _pose(handle: Any) -> Rigid3:
+    return Rigid3(vtf.SO3(np.asarray(handle.wxyz)).as_matrix(), np.asarray(handle.position, dtype=np.float64))

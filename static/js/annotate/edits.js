@@ -1,0 +1,186 @@
+/**
+ * What a person does to the objects, sent through the outbox. Says "object" {object} for every answer, "made" {object} when a
+ * click made a new one, "saved" {text, tone} about how it stands.
+ */
+
+import * as changes from "../changes.js";
+import { say, sayError } from "../elements/toasts.js";
+import { newKey, outbox } from "../outbox.js";
+
+/** @typedef {import("../api-types").SceneObject} SceneObject */
+/** @typedef {import("../api-types").PointIn} PointIn */
+/** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
+/**
+ * @template T
+ * @typedef {import("../changes.js").Change<T>} Change
+ */
+
+export class Edits extends EventTarget {
+  project = "";
+  #objects;
+  /** The object whose making is on its way: further clicks are on it. @type {string | null} */
+  #coming = null;
+  /** @type {Map<string, PointIn[]>} clicks that are not stored yet */
+  #clicks = new Map();
+
+  /** @param {SceneObjects} objects */
+  constructor(objects) {
+    super();
+    this.#objects = objects;
+  }
+
+  /** Clicks that are not stored yet. */
+  get clicks() {
+    return [...this.#clicks.values()].flat();
+  }
+
+  /** The next click starts a new object, even when the last one has not been stored yet. */
+  finish() {
+    this.#coming = null;
+  }
+
+  /**
+   * Clicks on the current object, or on a new one.
+   * @param {PointIn[]} points
+   * @param {{ category: string, infer: boolean }} how
+   */
+  place(points, { category, infer }) {
+    const key = newKey();
+    const target = this.#objects.current ?? this.#coming;
+    this.#clicks.set(key, points);
+    const sent = target === null ? this.#make(key, points, category, infer) : this.#add(key, target, points, infer);
+    sent
+      .finally(() => this.#clicks.delete(key))
+      .then(
+        (object) => this.#say("object", { object }),
+        () => {},
+      );
+  }
+
+  /**
+   * @param {string} key
+   * @param {PointIn[]} points
+   * @param {string} category
+   * @param {boolean} infer
+   */
+  async #make(key, points, category, infer) {
+    this.#coming = `{${key}}`;
+    const object = await this.save(changes.addObject(this.project, { category, points }, infer), key);
+    const mine = this.#coming === `{${key}}`;
+    if (mine) this.#coming = null;
+    if (mine) this.#say("made", { object });
+    return object;
+  }
+
+  /**
+   * @param {string} key
+   * @param {number | string} target
+   * @param {PointIn[]} points
+   * @param {boolean} infer
+   */
+  #add(key, target, points, infer) {
+    const [only] = points;
+    const change =
+      points.length === 1 && only
+        ? changes.addPoint(this.project, target, only, infer)
+        : changes.addPoints(this.project, target, points, infer);
+    return this.save(change, key);
+  }
+
+  /**
+   * @param {number} id of a click
+   * @param {{ x: number, y: number }} to
+   */
+  movePoint(id, to) {
+    const owner = this.#objects.ownerOf(id);
+    if (owner) this.#tell(changes.changePoint(this.project, owner.id, id, to));
+  }
+
+  /** @param {number} id of a click */
+  removePoint(id) {
+    const owner = this.#objects.ownerOf(id);
+    if (owner) this.#tell(changes.deletePoint(this.project, owner.id, id));
+  }
+
+  /**
+   * @param {number} id
+   * @param {{ name?: string, category?: string }} wanted
+   */
+  patch(id, wanted) {
+    const seen = this.#objects.get(id);
+    if (seen) this.#tell(changes.changeObject(this.project, seen, wanted));
+  }
+
+  /** @param {number} id */
+  async remove(id) {
+    const name = this.#objects.get(id)?.name ?? "object";
+    if (await this.#tell(changes.deleteObject(this.project, id))) say(`Deleted ${name}; undo brings it back`);
+  }
+
+  /** @param {number | string | null} object */
+  segment(object = this.#objects.current ?? this.#coming) {
+    if (object === null) say("Choose an object first.");
+    else this.#tell(changes.segmentObject(this.project, object));
+  }
+
+  /** @param {number | null} object */
+  stopSegmenting(object = this.#objects.current) {
+    if (object === null) say("Choose an object first.");
+    else this.#tell(changes.cancelSegment(this.project, object));
+  }
+
+  /**
+   * Of the chosen object, else of what was changed last.
+   * @param {"undo" | "redo"} which
+   * @param {number | undefined} frame that is looked at
+   */
+  undoRedo(which, frame) {
+    const { chosen } = this.#objects;
+    const mine = which === "undo" ? chosen?.can_undo : chosen?.can_redo;
+    const wanted = changes.undoRedo(this.project, which, mine ? (chosen?.id ?? null) : null, "prompts");
+    this.save(wanted).then(
+      ({ object, text, frame: at }) => {
+        this.#say("object", { object });
+        const where = at !== null && at !== frame ? ` (frame ${at})` : "";
+        say(`${which === "undo" ? "Undone" : "Redone"}: ${text}${where}`);
+      },
+      () => {},
+    );
+  }
+
+  /**
+   * Send a change and say how it stands; what the server refuses is said here.
+   * @template T
+   * @param {Change<T>} change
+   * @param {string} [key]
+   * @returns {Promise<T>}
+   */
+  async save(change, key) {
+    this.#say("saved", { text: "saving…", tone: "" });
+    try {
+      const answer = await outbox.send(change, key);
+      this.#say("saved", { text: `saved ${new Date().toLocaleTimeString()}`, tone: "" });
+      return answer;
+    } catch (error) {
+      this.#say("saved", { text: "not saved", tone: "bad" });
+      sayError(error);
+      throw error;
+    }
+  }
+
+  /** @param {Change<SceneObject>} change */
+  #tell(change) {
+    return this.save(change).then(
+      (object) => (this.#say("object", { object }), true),
+      () => false,
+    );
+  }
+
+  /**
+   * @param {string} type
+   * @param {object} detail
+   */
+  #say(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}

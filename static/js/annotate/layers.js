@@ -1,0 +1,61 @@
+/** What is drawn over a frame and in the lanes, from the objects and their masks. */
+
+import { rgbOf } from "../lib/masks.js";
+
+/** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
+/** @typedef {import("./masks.js").Masks} Masks */
+/** @typedef {import("../api-types").PointIn} PointIn */
+
+/** A click on its way: of no object yet, so it is neither moved nor removed. */
+const COMING = { id: -1, colour: "#c8ccd4", number: 0, object: -1, current: false };
+
+/**
+ * The clicks on a frame, with those that are not stored yet.
+ * @param {SceneObjects} objects
+ * @param {PointIn[]} coming
+ * @param {number | undefined} frame
+ */
+export function markersOn(objects, coming, frame) {
+  const stored = objects.sorted.flatMap((object, k) =>
+    object.points
+      .filter((point) => point.frame === frame && !objects.hidden.has(object.id))
+      .map((point) => ({
+        ...point,
+        colour: objects.colour(object),
+        number: k + 1,
+        object: object.id,
+        current: object.id === objects.current,
+      })),
+  );
+  const shown = coming.filter((point) => point.frame === frame);
+  return [...stored, ...shown.map((point) => ({ ...point, label: point.label ?? 1, ...COMING }))];
+}
+
+/**
+ * @param {SceneObjects} objects
+ * @param {Masks} masks
+ * @param {number} frame
+ */
+export function masksOn(objects, masks, frame) {
+  return objects.sorted.flatMap((object) => {
+    const mask = masks.on(object.id, frame)?.mask;
+    if (!mask || objects.hidden.has(object.id)) return [];
+    return [{ object: object.id, colour: rgbOf(objects.colour(object)), mask, current: object.id === objects.current }];
+  });
+}
+
+/**
+ * @param {SceneObjects} objects
+ * @param {Masks} masks
+ */
+export function lanesOf(objects, masks) {
+  return objects.sorted.map((object, k) => ({
+    id: object.id,
+    number: k + 1,
+    colour: objects.colour(object),
+    name: object.name,
+    frames: masks.lane(object.id),
+    prompts: new Set(object.points.map((point) => point.frame)),
+    current: object.id === objects.current,
+  }));
+}

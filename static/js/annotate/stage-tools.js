@@ -1,0 +1,69 @@
+/**
+ * What lies over the frame's upper edge: how things stand, what a click does, how strong the masks are; on a narrow screen the
+ * way to depth, shape and comments. Says "opacity", "sign" and "evidence" when they are changed.
+ */
+
+import { h } from "../dom.js";
+import { SegmenterChip } from "./segmenter-chip.js";
+
+export class StageTools extends EventTarget {
+  segmenter = new SegmenterChip();
+  #saved = h("span", { class: "chip", role: "status" });
+  #opacity = h("input", { type: "range", min: "0", max: "100", value: "42", "aria-label": "Mask opacity" });
+  #adds = h("button", { type: "button" }, "+ Add");
+  #takes = h("button", { type: "button" }, "− Take away");
+  #evidence = h("button", { type: "button", class: "narrow-only", "aria-expanded": "false" }, "Depth, shape, comments");
+  /** @type {0 | 1} what a click says */
+  sign = 1;
+  element = h(
+    "div",
+    { class: "stage-tools" },
+    this.segmenter.element,
+    this.#saved,
+    h("span", { class: "spring" }),
+    h("div", { class: "signs", role: "group", "aria-label": "What a click does" }, this.#adds, this.#takes),
+    h("label", { class: "row" }, "Masks", this.#opacity),
+    this.#evidence,
+  );
+
+  constructor() {
+    super();
+    this.#opacity.addEventListener("input", () => this.dispatchEvent(new Event("opacity")));
+    this.#adds.addEventListener("click", () => this.#mean(1));
+    this.#takes.addEventListener("click", () => this.#mean(0));
+    this.#evidence.addEventListener("click", () => this.dispatchEvent(new Event("evidence")));
+    this.#mean(1);
+  }
+
+  /** Of the masks, 0 to 1. */
+  get opacity() {
+    return Number(this.#opacity.value) / 100;
+  }
+
+  /** What a click does is the other thing now. */
+  switchSign() {
+    this.#mean(this.sign === 1 ? 0 : 1);
+  }
+
+  /** @param {boolean} on whether depth, shape and comments are shown */
+  showEvidence(on) {
+    this.#evidence.setAttribute("aria-expanded", String(on));
+  }
+
+  /**
+   * @param {string} text
+   * @param {string} [tone]
+   */
+  saved(text, tone = "") {
+    this.#saved.textContent = text;
+    this.#saved.className = `chip ${tone}`;
+  }
+
+  /** @param {0 | 1} sign */
+  #mean(sign) {
+    this.sign = sign;
+    this.#adds.setAttribute("aria-pressed", String(sign === 1));
+    this.#takes.setAttribute("aria-pressed", String(sign === 0));
+    this.dispatchEvent(new Event("sign"));
+  }
+}

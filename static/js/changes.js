@@ -1,0 +1,110 @@
+/**
+ * Changes that must not get lost, as data: the outbox keeps each of them until the server has answered it.
+ * An object that the server has not named yet is `{key}` of the change that makes it.
+ */
+
+/** @import {
+ *   Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, VerdictIn
+ * } from "./api-types" */
+
+/**
+ * `seen` is what the person saw of the fields set: should somebody else have changed them, only what disagrees is asked about.
+ * @template [T=unknown]
+ * @typedef {{ method: string, path: string, json: Record<string, unknown>, seen?: Record<string, unknown>, answer?: T }} Change
+ */
+/** @typedef {number | string} Ref */
+
+/** @param {string} project */
+const at = (project) => `/api/projects/${encodeURIComponent(project)}`;
+/** @param {string} project @param {Ref} object */
+const on = (project, object) => `${at(project)}/objects/${object}`;
+/** @param {object} json @returns {Record<string, unknown>} */
+const body = (json) => ({ ...json });
+
+/** @param {string} project @param {Partial<ObjectIn>} object @param {boolean} infer @returns {Change<SceneObject>} */
+export const addObject = (project, object, infer = true) => ({
+  method: "POST",
+  path: `${at(project)}/objects?infer=${infer}`,
+  json: body(object),
+});
+/** @param {string} project @param {SceneObject} seen @param {Partial<ObjectPatch>} wanted @returns {Change<SceneObject>} */
+export const changeObject = (project, seen, wanted) => ({
+  method: "PATCH",
+  path: on(project, seen.id),
+  json: { ...wanted, version: seen.version },
+  seen: { name: seen.name, category: seen.category },
+});
+/** @param {string} project @param {number} object @returns {Change<SceneObject>} */
+export const deleteObject = (project, object) => ({ method: "DELETE", path: on(project, object), json: {} });
+/** @param {string} project @param {Ref} object @param {PointIn} point @param {boolean} infer @returns {Change<SceneObject>} */
+export const addPoint = (project, object, point, infer = true) => ({
+  method: "POST",
+  path: `${on(project, object)}/points?infer=${infer}`,
+  json: body(point),
+});
+/** @param {string} project @param {Ref} object @param {PointIn[]} points @param {boolean} infer @returns {Change<SceneObject>} */
+export const addPoints = (project, object, points, infer = true) => ({
+  method: "POST",
+  path: `${on(project, object)}/clicks?infer=${infer}`,
+  json: { points },
+});
+/** @param {string} project @param {number} object @param {number} point @param {Partial<PointPatch>} patch @returns {Change<SceneObject>} */
+export const changePoint = (project, object, point, patch) => ({
+  method: "PATCH",
+  path: `${on(project, object)}/points/${point}`,
+  json: body(patch),
+});
+/** @param {string} project @param {number} object @param {number} point @returns {Change<SceneObject>} */
+export const deletePoint = (project, object, point) => ({
+  method: "DELETE",
+  path: `${on(project, object)}/points/${point}`,
+  json: {},
+});
+/** @param {string} project @param {Ref} object @returns {Change<SceneObject>} */
+export const segmentObject = (project, object) => ({
+  method: "POST",
+  path: `${on(project, object)}/segment`,
+  json: {},
+});
+/** @param {string} project @param {number} object @returns {Change<SceneObject>} */
+export const cancelSegment = (project, object) => ({
+  method: "POST",
+  path: `${on(project, object)}/segment/cancel`,
+  json: {},
+});
+/** @param {string} project @param {"undo" | "redo"} which @param {number | null} object @param {"prompts" | "review"} scope @returns {Change<Undone>} */
+export const undoRedo = (project, which, object, scope) => ({
+  method: "POST",
+  path: `${at(project)}/${which}`,
+  json: { object, scope },
+});
+/** @param {string} project @param {string[]} ids @returns {Change<SceneObject[]>} */
+export const confirmProposals = (project, ids) => ({
+  method: "POST",
+  path: `${at(project)}/proposals/confirm`,
+  json: { ids },
+});
+/** @param {string} project @param {string[]} ids @returns {Change<Proposals>} */
+export const dismissProposals = (project, ids) => ({
+  method: "POST",
+  path: `${at(project)}/proposals/dismiss`,
+  json: { ids },
+});
+/** @param {string} project @param {number} object @param {VerdictIn} verdict @returns {Change<Reviewed>} */
+export const giveVerdict = (project, object, verdict) => ({
+  method: "POST",
+  path: `${on(project, object)}/verdicts`,
+  json: body(verdict),
+});
+/** @param {string} project @param {number} object @param {Partial<OverridePatch>} patch @returns {Change<Reviewed>} */
+export const changeOverride = (project, object, patch) => ({
+  method: "PATCH",
+  path: `${on(project, object)}/override`,
+  json: body(patch),
+});
+/** @param {string} project @param {Partial<CommentIn>} comment @returns {Change<Comment>} */
+export const addComment = (project, comment) => ({
+  method: "POST",
+  path: `${at(project)}/comments`,
+  json: body(comment),
+});

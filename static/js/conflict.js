@@ -1,0 +1,74 @@
+/** Two people changed one thing: ask only about what really disagrees, and say what is to be stored then. */
+
+import { askToMerge } from "./elements/merge-dialog.js";
+import { disagreements } from "./lib/merge.js";
+
+/** @typedef {import("./changes.js").Change} Change */
+/** @typedef {{ version: number, name: string, override?: Record<string, unknown> }} Stored */
+
+/** @type {Record<string, string>} */
+const LABELS = {
+  name: "Name",
+  category: "Category",
+  hinge: "Hinge",
+  joint_lower: "Opens from",
+  joint_upper: "Opens to",
+  dimensions_m: "Width, depth, height",
+  pose: "Place",
+  candidate: "Candidate",
+  regenerate: "Batches of candidates",
+  accepted: "Accepted candidate",
+};
+
+/**
+ * The change to send instead; null when the other's is to stay as it is.
+ * @param {Change} change
+ * @param {unknown} current what is stored now
+ * @returns {Promise<Change | null>}
+ */
+export async function merged(change, current) {
+  const stored = /** @type {Stored} */ (current);
+  const theirs = { ...stored, ...stored.override };
+  const { version: _, rerun, ...wanted } = change.json;
+  const kept = await wantedStill(stored.name, change.seen ?? {}, wanted, theirs);
+  if (!Object.keys(kept).length) return null;
+  const again = rerun === undefined ? {} : { rerun };
+  return { ...change, json: { ...kept, ...again, version: stored.version }, seen: theirs };
+}
+
+/**
+ * @param {string} name
+ * @param {Record<string, unknown>} seen
+ * @param {Record<string, unknown>} wanted
+ * @param {Record<string, unknown>} theirs
+ */
+async function wantedStill(name, seen, wanted, theirs) {
+  const names = disagreements(seen, wanted, theirs);
+  if (!names.length) return wanted;
+  const fields = names.map((field) => ({
+    name: field,
+    label: LABELS[field] ?? field,
+    mine: inWords(field, wanted[field]),
+    theirs: inWords(field, theirs[field]),
+  }));
+  const mine = await askToMerge(`${name} was changed twice`, fields);
+  return Object.fromEntries(Object.entries(wanted).filter(([field]) => mine?.has(field) || !names.includes(field)));
+}
+
+/**
+ * @param {string} field
+ * @param {unknown} value
+ */
+function inWords(field, value) {
+  if (value === null || value === undefined || value === "") return "computed";
+  if (field === "pose" && Array.isArray(value)) {
+    return `at ${value
+      .slice(0, 3)
+      .map((row) => `${(100 * row[3]).toFixed(1)}`)
+      .join(", ")} cm`;
+  }
+  if (field === "dimensions_m" && Array.isArray(value))
+    return `${value.map((side) => (100 * side).toFixed(1)).join(" × ")} cm`;
+  if (typeof value === "number" && field.startsWith("joint_")) return `${value.toFixed(3)} (radians or metres)`;
+  return String(value);
+}

@@ -1,0 +1,74 @@
+/** Changes kept in the browser's storage until the server has answered them, each in an item of its own: tabs do not overwrite each other's. */
+
+/** @typedef {import("../changes.js").Change} Change */
+/** @typedef {Change & { key: string, user: string, at: number }} Kept */
+/** @typedef {Pick<Storage, "getItem" | "setItem" | "removeItem" | "key" | "length">} Store */
+
+const PREFIX = "r2c2r-change-";
+
+/**
+ * @param {Store} store
+ * @param {Kept} change
+ * @returns {boolean} whether there was room for it
+ */
+export function keep(store, change) {
+  try {
+    store.setItem(nameOf(change), JSON.stringify(change));
+    return true;
+  } catch {
+    return false; // full, or switched off
+  }
+}
+
+/**
+ * @param {Store} store
+ * @param {Kept} change
+ */
+export function forget(store, change) {
+  store.removeItem(nameOf(change));
+}
+
+/**
+ * A person's changes that wait, in the order they were made; what cannot be read is dropped.
+ * @param {Store} store
+ * @param {string} user
+ * @returns {Kept[]}
+ */
+export function keptBy(store, user) {
+  const names = Array.from({ length: store.length }, (_, k) => store.key(k)).filter((name) => name?.startsWith(PREFIX));
+  return names
+    .toSorted()
+    .map((name) => parsed(store.getItem(name ?? "")))
+    .filter((change) => change?.user === user)
+    .filter((change) => change !== null);
+}
+
+/**
+ * A change with the object it is about named, once the server has made that.
+ * @template {Change} C
+ * @param {C} change
+ * @param {string} key of the change that made the object
+ * @param {number} id of the object
+ * @returns {C}
+ */
+export function named(change, key, id) {
+  return change.path.includes(`{${key}}`) ? { ...change, path: change.path.replace(`{${key}}`, String(id)) } : change;
+}
+
+/** @param {Kept} change */
+function nameOf({ at, key }) {
+  return `${PREFIX}${String(at).padStart(16, "0")}-${key}`;
+}
+
+/**
+ * @param {string | null} text
+ * @returns {Kept | null}
+ */
+function parsed(text) {
+  try {
+    const change = JSON.parse(text ?? "");
+    return typeof change.path === "string" && typeof change.key === "string" ? change : null;
+  } catch {
+    return null;
+  }
+}
