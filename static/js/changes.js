@@ -4,7 +4,7 @@
  */
 
 /** @import {
- *   Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, VerdictIn
+ *   CandidateGroup, Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, VerdictIn
  * } from "./api-types" */
 
 /**
@@ -90,21 +90,31 @@ export const dismissProposals = (project, ids) => ({
   path: `${at(project)}/proposals/dismiss`,
   json: { ids },
 });
-/** @param {string} project @param {number} object @param {VerdictIn} verdict @returns {Change<Reviewed>} */
-export const giveVerdict = (project, object, verdict) => ({
+/** @param {string} project @param {CandidateGroup} seen @param {VerdictIn} verdict @returns {Change<Reviewed>} */
+export const giveVerdict = (project, seen, verdict) => ({
   method: "POST",
-  path: `${on(project, object)}/verdicts`,
-  json: body(verdict),
+  path: `${on(project, seen.object)}/verdicts`,
+  json: { ...verdict, version: versionOf(seen) },
+  seen: { verdict: verdictOf(seen) },
 });
-/** @param {string} project @param {number} object @param {Partial<OverridePatch>} patch @returns {Change<Reviewed>} */
-export const changeOverride = (project, object, patch) => ({
+/** @param {string} project @param {CandidateGroup} seen @param {Partial<OverridePatch>} patch @returns {Change<Reviewed>} */
+export const changeOverride = (project, seen, patch) => ({
   method: "PATCH",
-  path: `${on(project, object)}/override`,
-  json: body(patch),
+  path: `${on(project, seen.object)}/override`,
+  json: { ...patch, version: versionOf(seen) },
+  seen: body(seen.override),
 });
+/** What people said of an object's candidates. @param {CandidateGroup} group */
+export const verdictOf = (group) =>
+  group.candidates
+    .filter(({ verdict }) => verdict)
+    .map(({ id, verdict }) => `${verdict} ${id}`)
+    .join(", ");
 /** @param {string} project @param {Partial<CommentIn>} comment @returns {Change<Comment>} */
 export const addComment = (project, comment) => ({
   method: "POST",
   path: `${at(project)}/comments`,
   json: body(comment),
 });
+/** @param {CandidateGroup} group @returns {number | undefined} */
+const versionOf = (group) => /** @type {{ version?: number }} */ (group).version;

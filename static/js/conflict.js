@@ -1,10 +1,13 @@
 /** Two people changed one thing: ask only about what really disagrees, and say what is to be stored then. */
 
+import { verdictOf } from "./changes.js";
 import { askToMerge } from "./elements/merge-dialog.js";
 import { disagreements } from "./lib/merge.js";
 
 /** @typedef {import("./changes.js").Change} Change */
-/** @typedef {{ version: number, name: string, override?: Record<string, unknown> }} Stored */
+/** @typedef {import("./api-types").CandidateGroup} CandidateGroup */
+/** @typedef {Record<string, unknown>} Fields */
+/** @typedef {{ version: number, name?: string, override?: Fields, group?: CandidateGroup }} Stored what a 409 brings */
 
 /** @type {Record<string, string>} */
 const LABELS = {
@@ -17,7 +20,7 @@ const LABELS = {
   pose: "Place",
   candidate: "Candidate",
   regenerate: "Batches of candidates",
-  accepted: "Accepted candidate",
+  verdict: "Verdict",
 };
 
 /**
@@ -28,19 +31,25 @@ const LABELS = {
  */
 export async function merged(change, current) {
   const stored = /** @type {Stored} */ (current);
-  const theirs = { ...stored, ...stored.override };
-  const { version: _, rerun, ...wanted } = change.json;
-  const kept = await wantedStill(stored.name, change.seen ?? {}, wanted, theirs);
+  const { version: _, ...json } = change.json;
+  const says = "verdict" in json;
+  const wanted = says ? { verdict: `${json.verdict} ${json.candidate}` } : json;
+  const theirs = fieldsOf(stored);
+  const kept = await wantedStill(stored.name ?? stored.group?.name ?? "It", change.seen ?? {}, wanted, theirs);
   if (!Object.keys(kept).length) return null;
-  const again = rerun === undefined ? {} : { rerun };
-  return { ...change, json: { ...kept, ...again, version: stored.version }, seen: theirs };
+  return { ...change, json: { ...(says ? json : kept), version: stored.version }, seen: theirs };
+}
+
+/** @param {Stored} stored @returns {Fields} */
+function fieldsOf({ group, override, ...fields }) {
+  return group ? { ...override, verdict: verdictOf(group) } : fields;
 }
 
 /**
  * @param {string} name
- * @param {Record<string, unknown>} seen
- * @param {Record<string, unknown>} wanted
- * @param {Record<string, unknown>} theirs
+ * @param {Fields} seen
+ * @param {Fields} wanted
+ * @param {Fields} theirs
  */
 async function wantedStill(name, seen, wanted, theirs) {
   const names = disagreements(seen, wanted, theirs);
@@ -60,6 +69,7 @@ async function wantedStill(name, seen, wanted, theirs) {
  * @param {unknown} value
  */
 function inWords(field, value) {
+  if (value === "" && field === "verdict") return "none";
   if (value === null || value === undefined || value === "") return "computed";
   if (field === "pose" && Array.isArray(value)) {
     return `at ${value

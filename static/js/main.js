@@ -1,6 +1,5 @@
 /** The only file with side effects: defines the elements and starts the router. */
 
-import { merged } from "./conflict.js";
 import { AppShell } from "./elements/app-shell.js";
 import { BackendChoice } from "./elements/backend-choice.js";
 import { CommandPalette } from "./elements/command-palette.js";
@@ -35,6 +34,6 @@ customElements.define("r2c2r-run", RunPage);
 customElements.define("r2c2r-download", DownloadPage);
 customElements.define("r2c2r-app", AppShell);
 
-outbox.merge = merged;
+outbox.merge = async (change, stored) => (await import("./conflict.js")).merged(change, stored);
 const shell = document.querySelector("r2c2r-app");
 if (shell instanceof AppShell) startRouter((route) => shell.show(route));

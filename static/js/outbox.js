@@ -98,7 +98,9 @@ class Outbox extends EventTarget {
     try {
       return await this.#persist(change);
     } catch (error) {
-      if (!(error instanceof ApiError) || error.kind !== "conflict" || !error.current || !change.seen) throw error;
+      if (!(error instanceof ApiError) || error.kind !== "conflict") throw error;
+      if (!error.current) this.dispatchEvent(new Event("caught-up")); // stored before the server stopped: look anew
+      if (!error.current || !change.seen) throw error;
       const instead = await this.merge(change, error.current);
       return instead ? this.#answered({ ...change, ...instead, key: newKey() }) : error.current;
     }

@@ -89,6 +89,7 @@ export class ReviewPage extends LiveElement {
     this.#photos.addEventListener("pin-point", (event) => this.#comment(detailOf(event)), { signal });
     this.#comments.addEventListener("show-comment", (event) => this.#showComment(detailOf(event)), { signal });
     live.addEventListener("review", () => this.#load(), { signal });
+    outbox.addEventListener("caught-up", () => this.#load(), { signal });
     live.addEventListener("hello", (event) => detailOf(event).reset && this.#load(), { signal });
     live.addEventListener("job", (event) => this.#hear(/** @type {{ job: Job }} */ (detailOf(event)).job), { signal });
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
@@ -247,7 +248,8 @@ export class ReviewPage extends LiveElement {
    * @param {"accepted" | "rejected"} said
    */
   async #verdict(candidate, said) {
-    const object = this.#object;
+    const group = this.#group;
+    if (!group) return;
     const again = candidate.verdict === said;
     const asks = said === "rejected" && !again;
     const reason = asks
@@ -255,15 +257,15 @@ export class ReviewPage extends LiveElement {
       : "";
     if (reason === null) return;
     const verdict = again ? /** @type {const} */ ("cleared") : said;
-    const change = giveVerdict(this.project, object, { candidate: candidate.id, verdict, reason, rerun: true });
+    const change = giveVerdict(this.project, group, { candidate: candidate.id, verdict, reason, rerun: true });
     await this.#review(outbox.send(change));
-    if (verdict === "accepted" && this.#object === object) this.#nextToReview();
+    if (verdict === "accepted" && this.#object === group.object) this.#nextToReview();
   }
 
   /** @param {Partial<OverridePatch>} patch */
   #correct(patch) {
     const group = this.#group;
-    if (group) this.#review(outbox.send(changeOverride(this.project, group.object, patch)));
+    if (group) this.#review(outbox.send(changeOverride(this.project, group, patch)));
   }
 
   /** @param {Promise<Reviewed>} answer */

@@ -27,7 +27,7 @@ export class ViewBar extends EventTarget {
   #movable = false;
   #modes = MODES.map(([mode, text]) => ({ mode, button: toggle(text, () => this.set(mode)) }));
   #move = toggle("Move it", () => this.move(!this.moving));
-  #all = toggle("Full resolution", () => ((this.full = !this.full), this.#say()));
+  #all = toggle("All points", () => ((this.full = !this.full), this.#say()));
   #see = h("label", { class: "row" }, "Opacity", this.#opacity);
   #inScene = [this.#collision, this.#scan].map((input, k) =>
     h("label", { class: "row" }, input, ["Colliders", "Scan"][k]),

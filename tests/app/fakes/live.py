@@ -1,7 +1,7 @@
 """A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
-A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded. Two drawers and a bottle
-are proposed.
+A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded; one at x >= 156 gets one
+frame and no further until it is superseded or stopped. Two drawers and a bottle are proposed.
 """
 
 import json
@@ -85,7 +85,7 @@ def main() -> None:
             say(object=number, key=key, frame=frame, confidence=0.9, area=0.005, mask=rectangle(point["x"], point["y"]))
             time.sleep(0.3 if point["x"] >= 150 else 0)
             try:
-                newer = commands.get_nowait()
+                newer = commands.get(block=point["x"] >= 156)
             except Empty:
                 continue
             commands.put(newer)

@@ -1,0 +1,248 @@
+"""Two people on one project, from the first click to the approval, with everything in between that goes wrong."""
+
+import json
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
+
+from app.db.engine import open_engine
+from app.services import accounts
+from tests.app.nouns import finish
+from tests.browser.conftest import PATIENCE_MS
+from tests.browser.test_journey import picture
+
+ROOT = Path(__file__).parents[2]
+PASSWORD = "correct horse battery"
+FRAME = (160, 120)
+STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
+
+
+class Server:
+    """The app on a port of its own, to be stopped and started again on the same data."""
+
+    def __init__(self, data: Path) -> None:
+        self.data, self.port = data, free_port()
+        self.process: subprocess.Popen[str] | None = None
+
+    @property
+    def address(self) -> str:
+        return f"http://localhost:{self.port}"
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), "localhost"]
+        self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        assert self.process.stdout is not None
+        assert "http://localhost" in self.process.stdout.readline()
+
+    def kill(self) -> None:
+        assert self.process is not None and self.process.stdout is not None
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    data = tmp_path_factory.mktemp("together")
+    engine = open_engine(data / "r2c2r.db")
+    accounts.add(engine, "ann", "admin", PASSWORD)
+    accounts.add(engine, "bea", "reviewer", PASSWORD)
+    engine.dispose()
+    running = Server(data)
+    running.start()
+    yield running
+    running.kill()
+
+
+@pytest.fixture
+def people(browser: Browser, server: Server) -> Iterator[tuple[Page, Page]]:
+    """A page of Ann's and one of Bea's, both signed in."""
+    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
+    pages = [signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True)]
+    yield pages[0], pages[1]
+    for context in contexts:
+        context.close()
+
+
+def signed_in(context: BrowserContext, server: Server, name: str) -> Page:
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{server.address}/login")
+    page.get_by_label("Name").fill(name)
+    page.get_by_label("Password").fill(PASSWORD)
+    page.get_by_role("button", name="Sign in").click()
+    page.get_by_role("heading", name="Projects").wait_for()
+    return page
+
+
+def sample(page: Page) -> str:
+    """A new sample project; the address of its overview."""
+    page.get_by_role("button", name="Sample kitchen", exact=True).click()
+    page.get_by_role("link", name="Run on 2 objects").wait_for()
+    return page.url
+
+
+def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
+    canvas = page.locator("r2c2r-frame-canvas canvas")
+    box = canvas.bounding_box()
+    assert box
+    scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
+    left, top = (box["width"] - FRAME[0] * scale) / 2, (box["height"] - FRAME[1] * scale) / 2
+    canvas.click(position={"x": left + x * scale, "y": top + y * scale}, button=button)  # type: ignore[arg-type]
+
+
+def rows(page: Page) -> Locator:
+    return page.locator(".object-list > li")
+
+
+def pick(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def rename(page: Page, name: str, to: str) -> None:
+    pick(page, name)
+    page.get_by_label(f"Name of {name}").fill(to)
+    page.get_by_label(f"Name of {name}").press("Enter")
+
+
+def ready(page: Page) -> None:
+    page.locator(".chip", has_text=re.compile("^ready$")).wait_for()
+
+
+def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_server(
+    people: tuple[Page, Page], server: Server
+) -> None:
+    ann, bea = people
+    project = sample(ann)
+    ann.goto(f"{project}/annotate?frame=3")
+    ready(ann)
+
+    # a wrong click, taken back; a propagation, stopped
+    click_frame(ann, 30, 60)
+    expect(rows(ann)).to_have_count(3)
+    click_frame(ann, 100, 100, button="right")
+    expect(rows(ann).last).to_contain_text("2 clicks")
+    ann.keyboard.press("Control+z")
+    expect(rows(ann).last).to_contain_text("1 click ")
+    ann.keyboard.press("Control+Shift+z")
+    expect(rows(ann).last).to_contain_text("2 clicks")
+    ann.keyboard.press("Control+z")
+    ann.keyboard.press("Enter")
+    click_frame(ann, STUCK_X, 60)
+    ann.get_by_role("button", name=re.compile("^Stop finding")).click()
+    expect(rows(ann).last).to_contain_text("stopped after")
+    ann.reload()
+    expect(rows(ann)).to_have_count(4)
+    expect(rows(ann).nth(2)).to_contain_text("1 click ")
+
+    # somebody else is there; both rename the same thing, one of them without a connection
+    bea.goto(f"{project}/annotate?frame=3")
+    expect(ann.locator("r2c2r-presence")).to_contain_text("bea · annotate")
+    expect(bea.locator("r2c2r-presence")).to_contain_text("ann · annotate")
+    ann.context.set_offline(True)
+    rename(ann, "mug_1", "cup_of_ann")
+    expect(ann.locator(".banner")).to_contain_text("1 change not stored yet")
+    rename(bea, "mug_1", "cup_of_bea")
+    expect(bea.get_by_role("button", name="cup_of_bea", exact=True)).to_be_visible()
+    ann.context.set_offline(False)
+    merge = ann.get_by_role("dialog", name=re.compile("changed twice"))
+    expect(merge).to_contain_text("cup_of_bea")
+    picture(ann, "16-merge")
+    merge.get_by_role("button", name="Keep what is chosen").click()
+    for page in people:
+        expect(page.get_by_role("button", name="cup_of_ann", exact=True)).to_be_visible()
+
+    # the server dies; what is clicked meanwhile is sent when it is back, even from a page that was closed
+    server.kill()
+    pick(ann, "drawer_1")
+    click_frame(ann, 60, 60)
+    click_frame(ann, 64, 60, button="right")
+    expect(ann.locator(".banner")).to_contain_text("2 changes not stored yet")
+    context = ann.context
+    ann.close()
+    server.start()
+    again = context.new_page()
+    again.goto(f"{project}/annotate?frame=3")
+    expect(rows(again).first).to_contain_text("3 clicks")
+    expect(rows(bea).first).to_contain_text("3 clicks")
+    assert again.evaluate("Object.keys(localStorage).filter((name) => name.startsWith('r2c2r-change')).length") == 0
+
+
+def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server: Server) -> None:
+    ann, bea = people
+    project = sample(ann)
+    folder = server.data / "projects" / project.rsplit("/", 1)[-1]
+
+    # a run that is cancelled, one that fails, and one that gets through
+    told = folder / "behave.json"
+    told.write_text(json.dumps({"align": "hang"}))
+    ann.goto(f"{project}/run")
+    ann.get_by_role("button", name="Run", exact=True).click()
+    expect(ann.locator("r2c2r-job li", has_text="align")).to_contain_text("running")
+    ann.get_by_role("button", name="Cancel").click()
+    expect(ann.locator("r2c2r-job")).to_contain_text("cancelled")
+    told.write_text(json.dumps({"align": "fail"}))
+    ann.get_by_role("button", name="Try again").click()
+    expect(ann.locator("r2c2r-job")).to_contain_text("no frame shows drawer_1")
+    ann.get_by_role("button", name="Show the log").click()
+    expect(ann.get_by_label("Log")).to_contain_text("a traceback that a person may want to read")
+    picture(ann, "17-failed")
+    told.unlink()
+    finish(folder / "work")
+    ann.get_by_role("button", name="Try again").click()
+    expect(ann.get_by_role("heading", name=re.compile("Certificate"))).to_contain_text("passed")
+
+    # a comment on a spot of a frame
+    ann.goto(f"{project}/annotate?frame=3")
+    ready(ann)
+    ann.keyboard.press("i")
+    click_frame(ann, 90, 40)
+    say(ann, "Comment", "is this one drawer or two?")
+    expect(ann.locator("r2c2r-comments")).to_contain_text("1 open comment")
+
+    # to review, back, and to review again: reasons are asked for where something is unmet or refused
+    ann.goto(f"{project}/review")
+    move(ann, "Send to review", "the stand-in sees little")
+    expect(bea.get_by_text("ready", exact=True)).to_be_visible()  # on the list of projects, by itself
+    bea.goto(f"{project}/review")
+    move(bea, "Start the review")
+    move(bea, "Request changes", "answer the comment")
+    expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
+    ann.get_by_role("button", name=re.compile("^Resolve")).click()
+    move(ann, "Send to review again", "one drawer")
+    move(bea, "Start the review")
+    bea.get_by_role("button", name="drawer_1").first.click()
+    bea.keyboard.press("y")
+    expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
+    bea.keyboard.press("Control+z")
+    expect(bea.get_by_text("0 of 1 object accepted")).to_be_visible()
+    bea.keyboard.press("Control+y")
+    expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
+    move(bea, "Approve", "the mug is not part of it")
+    for page in people:
+        expect(page.locator("r2c2r-review-state")).to_contain_text("approved")
+    picture(bea, "18-approved")
+
+
+def say(page: Page, button: str, text: str) -> None:
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("textbox").fill(text)
+    dialog.get_by_role("button", name=button, exact=True).click()
+
+
+def move(page: Page, step: str, reason: str = "") -> None:
+    page.get_by_role("button", name=step, exact=True).click()
+    if reason:
+        say(page, step, reason)
