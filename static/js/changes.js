@@ -94,14 +94,14 @@ export const dismissProposals = (project, ids) => ({
 export const giveVerdict = (project, seen, verdict) => ({
   method: "POST",
   path: `${on(project, seen.object)}/verdicts`,
-  json: { ...verdict, version: versionOf(seen) },
+  json: { ...verdict, version: seen.version },
   seen: { verdict: verdictOf(seen) },
 });
 /** @param {string} project @param {CandidateGroup} seen @param {Partial<OverridePatch>} patch @returns {Change<Reviewed>} */
 export const changeOverride = (project, seen, patch) => ({
   method: "PATCH",
   path: `${on(project, seen.object)}/override`,
-  json: { ...patch, version: versionOf(seen) },
+  json: { ...patch, version: seen.version },
   seen: body(seen.override),
 });
 /** What people said of an object's candidates. @param {CandidateGroup} group */
@@ -116,5 +116,3 @@ export const addComment = (project, comment) => ({
   path: `${at(project)}/comments`,
   json: body(comment),
 });
-/** @param {CandidateGroup} group @returns {number | undefined} */
-const versionOf = (group) => /** @type {{ version?: number }} */ (group).version;

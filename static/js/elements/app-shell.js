@@ -48,7 +48,12 @@ export class AppShell extends LiveElement {
     const help = h("button", { class: "quiet", type: "button", "aria-label": "Keyboard and mouse help" });
     help.append(icon("help"));
     help.addEventListener("click", () => this.#help.toggle());
-    const palette = h("button", { class: "quiet palette-button", type: "button", "aria-label": "Commands" }, h("span", {}, "Commands "), h("kbd", {}, "Ctrl K"));
+    const palette = h(
+      "button",
+      { class: "quiet palette-button", type: "button", "aria-label": "Commands" },
+      h("span", {}, "Commands "),
+      h("kbd", {}, "Ctrl K"),
+    );
     palette.addEventListener("click", () => this.#openPalette());
     const logo = h("img", { src: "/static/icons/logo.svg", alt: "" });
     this.replaceChildren(

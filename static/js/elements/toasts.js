@@ -44,7 +44,8 @@ export function say(text, options) {
  */
 export function sayError(error) {
   if (error instanceof DOMException && error.name === "AbortError") return;
-  if (error instanceof ApiError && error.unreachable) say(error.message); // the banner stays until it is back
+  if (error instanceof ApiError && error.unreachable)
+    say(error.message); // the banner stays until it is back
   else if (error instanceof ApiError) say(error.message, { kind: "bad", hint: error.hint });
   else {
     say(error instanceof Error ? error.message : String(error), { kind: "bad", hint: "reload the page" });
