@@ -1,4 +1,4 @@
-"""The app with stand-ins for its slow parts: `python -m tests.browser.stand_in DATA PORT [NAME]`; with a NAME, for accounts only."""
+"""The app with stand-ins for its slow parts: `python -m tests.browser.stand_in DATA PORT [NAME]`; a NAME asks for accounts."""
 
 import sys
 from functools import partial

@@ -41,7 +41,8 @@ class Server:
         assert "http://localhost" in self.process.stdout.readline()
 
     def kill(self) -> None:
-        assert self.process is not None and self.process.stdout is not None
+        assert self.process is not None
+        assert self.process.stdout is not None
         self.process.kill()
         self.process.wait()
         self.process.stdout.close()

@@ -1,0 +1,75 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+
+const kept = new Map();
+globalThis.addEventListener ??= () => {};
+globalThis.localStorage = {
+  get length() {
+    return kept.size;
+  },
+  key: (k) => [...kept.keys()][k] ?? null,
+  getItem: (name) => kept.get(name) ?? null,
+  setItem: (name, text) => kept.set(name, text),
+  removeItem: (name) => kept.delete(name),
+};
+const { outbox } = await import("../../static/js/outbox.js");
+const { live } = await import("../../static/js/live.js");
+
+/** A server that answers what it is told to. */
+function serve(...answers) {
+  const asked = [];
+  globalThis.fetch = async (path, { headers, body }) => {
+    asked.push({ path, key: headers["Idempotency-Key"], body: JSON.parse(body) });
+    const answer = answers.shift();
+    if (answer === undefined) {
+      setTimeout(() => live.dispatchEvent(new Event("online")));
+      throw new TypeError("no network");
+    }
+    return new Response(JSON.stringify(answer.body), { status: answer.status ?? 200 });
+  };
+  return asked;
+}
+
+const change = (path, json = {}) => ({ method: "POST", path, json });
+
+test("a change whose answer is lost is sent again under its own key, the next under another, and both are kept until then", async () => {
+  const asked = serve(undefined, undefined, { body: { id: 1 } }, { body: { id: 2 } });
+  const both = Promise.all([outbox.send(change("/a")), outbox.send(change("/b"))]);
+  assert.equal(kept.size, 2);
+  assert.deepEqual(await both, [{ id: 1 }, { id: 2 }]);
+  assert.deepEqual(asked.map(({ path }) => path), ["/a", "/a", "/a", "/b"]);
+  const [first, again, once, other] = asked.map(({ key }) => key);
+  assert.ok(first && first === again && again === once && once !== other);
+  assert.equal(kept.size, 0);
+});
+
+test("a click on an object that is still being made goes to the number it gets, whatever else waits", async () => {
+  const asked = serve({ body: { id: 41 } }, { body: {} });
+  const made = outbox.send(change("/objects"), "k1");
+  const clicked = outbox.send(change("/objects/{k1}/points"));
+  await Promise.all([made, clicked]);
+  assert.deepEqual(asked.map(({ path }) => path), ["/objects", "/objects/41/points"]);
+});
+
+test("what an earlier visit left is sent, that person's alone; a refusal is said and not tried again", async () => {
+  const left = (key, user, at) => JSON.stringify({ ...change(`/${key}`), key, user, at });
+  kept.set("r2c2r-change-0000000000000001-x", left("x", "ann", 1));
+  kept.set("r2c2r-change-0000000000000002-y", left("y", "bea", 2));
+  const asked = serve({ status: 422, body: { kind: "input", message: "no", hint: "" } });
+  const refused = new Promise((resolve) => outbox.addEventListener("refused", ({ detail }) => resolve(detail.message)));
+  outbox.begin("ann");
+  assert.equal(await refused, "no");
+  assert.deepEqual(asked.map(({ path, key }) => [path, key]), [["/x", "x"]]);
+  assert.deepEqual([...kept.keys()], ["r2c2r-change-0000000000000002-y"]);
+  kept.clear();
+});
+
+test("what disagrees with somebody else's change is merged, and sent as another change", async () => {
+  const conflict = { status: 409, body: { kind: "conflict", message: "changed", hint: "", current: { version: 8 } } };
+  const asked = serve(conflict, { body: { version: 9 } });
+  outbox.merge = async (old, stored) => ({ ...old, json: { ...old.json, version: stored.version } });
+  const answer = await outbox.send({ ...change("/a", { name: "mug", version: 7 }), seen: { name: "cup" } });
+  assert.deepEqual(answer, { version: 9 });
+  assert.deepEqual(asked.map(({ body }) => body.version), [7, 8]);
+  assert.notEqual(asked[0].key, asked[1].key);
+});
