@@ -94,7 +94,9 @@ def test_the_same_change_sent_at_once_is_made_once(web: Running, at: str) -> Non
     assert len(web.get(f"{at}/objects")[0]["points"]) == before + 1
 
 
-def test_keys_are_forgotten_after_a_while_and_with_their_project(web: Running, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keys_are_forgotten_after_a_while_and_with_their_project(
+    web: Running, at: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
     assert _kept(web) == 1
     sending.tidy(web.context)

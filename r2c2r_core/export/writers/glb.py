@@ -1,4 +1,7 @@
-"""scene.glb: the closed scene for web viewers, one node a link with the link's name. glTF is +Y up: the root node turns it."""
+"""scene.glb: the scene for web viewers, closed, with its joints as clips; one node a link with the link's name.
+
+glTF is +Y up: the root node turns it.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -7,6 +10,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.glb_motion import with_motion
 from r2c2r_core.export.writers.meshes import box_mesh
 
 Y_UP_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
@@ -24,7 +28,7 @@ def write_glb(plan: Plan, path: Path) -> None:
         mesh = _mesh_of(body, pictures)
         if mesh is not None:
             scene.add_geometry(mesh, node_name=f"{body.name}_vis", geom_name=f"{body.name}_vis", parent_node_name=body.name)
-    path.write_bytes(scene.export(file_type="glb"))
+    path.write_bytes(with_motion(scene.export(file_type="glb"), plan.bodies))
 
 
 def _mesh_of(body: Body, pictures: dict[str, Any]) -> Any:
