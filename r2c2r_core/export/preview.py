@@ -179,7 +179,7 @@ def shaded(colour: np.ndarray, normals: np.ndarray, camera_from_world: Rigid3) -
     """Colours lit from the eye, without shadows: for small pictures."""
     length = np.maximum(np.linalg.norm(normals, axis=-1), 1e-6)
     towards_eye = np.abs(normals @ camera_from_world.rotation[2]) / length
-    return np.asarray(colour * (0.6 + 0.4 * towards_eye)[..., None])
+    return np.asarray(colour * (0.8 + 0.2 * towards_eye)[..., None])  # textures of a scan hold its light already
 
 
 def _floor_behind(

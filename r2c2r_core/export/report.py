@@ -1,6 +1,7 @@
 """report.json and report.html: the certificate and the accuracy of a bundle, for programs and for people."""
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +108,8 @@ def _headline(manifest: dict[str, Any], certificate: dict[str, Any]) -> str:
     created = f" · {_text(manifest['created'])}" if manifest.get("created") else ""
     return (
         f"<header><h1>{_text(capture['name'])}</h1><p>Certificate {verdict}</p>"
-        f'<p class="quiet">{source} · r2c2r {_text(manifest["tool_version"])}{created}</p></header>'
+        f'<p class="quiet">{source} · r2c2r {_text(manifest["tool_version"])}{created}</p>'
+        '<p><a href="review.html">Open the scene and its doors</a> · <a href="README.txt">How to load it</a></p></header>'
         f'<dl class="tiles">{cells}</dl>'
     )
 
@@ -116,16 +118,18 @@ def _findings(findings: list[dict[str, Any]]) -> str:
     if not findings:
         return "<h2>Findings</h2><p>The linter and the simulation found nothing to complain about.</p>"
     protects = RULES | SIMULATION_RULES
+    by_rule: dict[str, list[dict[str, Any]]] = {}
+    for found in findings:
+        by_rule.setdefault(found["rule"], []).append(found)
     rows = [
         [
-            _severity(f["severity"]),
-            _name(f["where"]),
-            _text(f["message"]),
-            f'<span class="quiet">{_text(f["rule"])}: {_text(protects[f["rule"]].protects)}</span>',
+            _severity(hits[0]["severity"]),
+            f'<strong>{_text(rule)}</strong><br><span class="quiet">{_text(protects[rule].protects)}</span>',
+            "<ul>" + "".join(f"<li>{_name(hit['where'])} {_text(hit['message'])}</li>" for hit in hits) + "</ul>",
         ]
-        for f in findings
+        for rule, hits in by_rule.items()
     ]
-    return "<h2>Findings</h2>" + _table(["", "where", "what", "rule, and what it protects from"], rows)
+    return "<h2>Findings</h2>" + _table(["", "rule, and what it protects from", "where and what"], rows)
 
 
 def _failures(failures: dict[str, str]) -> str:
@@ -136,7 +140,7 @@ def _failures(failures: dict[str, str]) -> str:
 
 
 def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
-    rows = []
+    rows, below = [], []
     for entry in objects:
         picture = pictures.get(entry["name"])
         image = f'<img class="thumb" src="{_text(picture)}" alt="{_text(entry["name"])}">' if picture else ""
@@ -146,11 +150,11 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
             for size, source in zip(entry["dimensions_m"], entry["dimension_source"], strict=True)
         )
         notes = "".join(f"<li>{_text(line)}</li>" for line in entry["warnings"])
-        remarks = f'<ul class="quiet">{notes}</ul>' if notes else ""
+        below.append(f'<ul class="quiet">{notes}</ul>' if notes else "")
         rows.append(
             [
                 image,
-                f'<strong>{_text(entry["name"])}</strong><br><span class="quiet">{_text(entry["category"])}</span>{remarks}',
+                f'<strong>{_text(entry["name"])}</strong><br><span class="quiet">{_text(entry["category"])}</span>',
                 f'<span class="sizes">{sizes}</span>',
                 f"{entry['mass_kg']:.1f}",
                 _text((entry["mask"] or {}).get("frames", "–")),
@@ -176,7 +180,7 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
         "Scan to mesh: median distance of the depth points to the closed model; F: points and visible surface within 1 cm. "
     )
     pair = "Pictures: the photo, and the closed model from the same camera.</p>" if pictures else "</p>"
-    return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6, 7, 8)) + legend + pair
+    return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6, 7, 8), below=below) + legend + pair
 
 
 def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str:
@@ -258,12 +262,21 @@ def _losses(losses: dict[str, list[str]]) -> str:
     return f'<h2>What each file leaves out</h2><dl class="losses">{items}</dl>'
 
 
-def _table(head: list[str], rows: list[list[str]], numeric: tuple[int, ...] = ()) -> str:
+def _table(head: list[str], rows: list[list[str]], numeric: tuple[int, ...] = (), below: Sequence[str] = ()) -> str:
+    """A table; `below` holds for each row what stands under all but its first cell, or nothing."""
+
     def cells(tag: str, values: list[str]) -> str:
         marks = [' class="number"' if k in numeric else "" for k in range(len(values))]
         return "".join(f"<{tag}{mark}>{value}</{tag}>" for mark, value in zip(marks, values, strict=True))
 
-    lines = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    def line(row: list[str], note: str) -> str:
+        if not note:
+            return f"<tr>{cells('td', row)}</tr>"
+        rest = cells("td", ["", *row[1:]]).removeprefix("<td></td>")
+        under = f'<tr><td colspan="{len(row) - 1}">{note}</td></tr>'
+        return f'<tr class="noted"><td rowspan="2">{row[0]}</td>{rest}</tr>{under}'
+
+    lines = "".join(line(row, note) for row, note in zip(rows, below or [""] * len(rows), strict=True))
     return f'<div class="scroll"><table><thead><tr>{cells("th", head)}</tr></thead><tbody>{lines}</tbody></table></div>'
 
 

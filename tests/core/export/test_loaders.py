@@ -94,3 +94,11 @@ def test_a_usd_that_says_something_else_fails(good_folder: Path, old: str, new: 
     assert found["USD"].state == "failed"
     assert says in found["USD"].detail
     assert found["yourdfpy"].state == "passed"
+
+
+def test_every_loader_opens_a_bundle_whose_path_has_spaces_and_other_letters(good_folder: Path, tmp_path: Path) -> None:
+    moved = tmp_path / "Küche 1 – キッチン"
+    good_folder.rename(moved)
+    found = verdicts(moved, SAPIEN or None)
+    assert {r.state for r in found.values()} <= {"passed", "not tried"}, found
+    assert found["PyBullet"].state == found["USD"].state == found["MuJoCo (MJCF)"].state == "passed"

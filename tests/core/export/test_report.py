@@ -101,3 +101,15 @@ def test_what_stands_in_a_joints_way_and_how_things_stand_is_on_the_page() -> No
     text = page(certificate(joints=(joint,), things=(thing,))).replace("<wbr>", "")
     for words in ("drawer_1_slide</code> when open, from 92°", "chair_body</code>, from 29°", "mug_1_body", "0.2 mm", "97 %"):
         assert words in text
+
+
+def test_findings_of_one_rule_share_a_row_and_remarks_stand_under_their_object() -> None:
+    hits = (finding("together", "a_joint", "meets b"), finding("together", "c_joint", "meets d"))
+    text = page(certificate(findings=hits))
+    assert text.count("<strong>together</strong>") == 1
+    assert text.count("<li><code>a_<wbr>joint</code> meets b</li><li><code>c_<wbr>joint</code> meets d</li>") == 1
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
+    manifest["objects"][0]["warnings"] = [EVIL]
+    noted = report_html(manifest, report_of(manifest, certificate(), {}), {})
+    assert '<tr class="noted"><td rowspan="2">' in noted
+    assert '<td colspan="8"><ul class="quiet"><li>&lt;script&gt;' in noted
