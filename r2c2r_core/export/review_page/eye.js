@@ -2,6 +2,10 @@
 import { at, cross, dot, plus, product, unit } from "./algebra.js";
 
 const FOCAL = 1 / Math.tan(0.35);
+const ROOM = 1.2; // for doors that open
+const CORNERS = [0, 1].flatMap((x) =>
+  [0, 1].flatMap((y) => [0, 1].map((z) => [x, y, z])),
+);
 
 /** Where the reader looks from: round a target, at a distance. */
 export class Eye {
@@ -45,8 +49,20 @@ export class Eye {
   fit({ low, high }) {
     if (!low.every(Number.isFinite)) return;
     this.target = low.map((value, k) => (value + at(high, k)) / 2);
-    const size = Math.hypot(...plus(high, low, -1));
-    this.distance = Math.max(0.6, 1.5 * size);
+    const { right, up, back } = this.axes();
+    const { clientWidth, clientHeight } = this.canvas;
+    const free = Math.max(1 - this.panel.clientWidth / clientWidth, 0.3); // of the width, beside the panel
+    const slopes = [FOCAL / (free * (clientWidth / clientHeight)), FOCAL];
+    const needed = CORNERS.map((corner) => {
+      const offset = corner.map(
+        (end, k) => (end - 0.5) * (at(high, k) - at(low, k)),
+      );
+      const [across, along] = [dot(offset, right), dot(offset, up)].map(
+        (reach, k) => Math.abs(reach) * at(slopes, k),
+      );
+      return dot(offset, back) + Math.max(across ?? 0, along ?? 0);
+    });
+    this.distance = Math.max(0.6, ROOM * Math.max(...needed));
   }
 
   axes() {
