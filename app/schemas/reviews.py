@@ -28,6 +28,14 @@ class Candidate(Shape):
     thumbnail: str
 
 
+class PoseSpread(Shape):
+    """By how much a pose may be off: standard deviations, each of the direction held least."""
+
+    turn_deg: float
+    shift_m: float
+    scale: float
+
+
 class Placement(Shape):
     """Where the chosen candidate stands, with the evidence for it."""
 
@@ -41,6 +49,8 @@ class Placement(Shape):
     condition: float
     unsure: bool
     runner_up: float | None
+    runner_up_turn_deg: float | None
+    spread: PoseSpread | None
     method: str
     votes: dict[int, int]
     warnings: list[str]

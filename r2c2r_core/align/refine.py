@@ -38,6 +38,7 @@ class Rows(NamedTuple):
     jacobian: np.ndarray
     residual: np.ndarray
     weight: np.ndarray
+    frame_index: np.ndarray  # (n,) int, of the frame it was seen in; -1 where it is of none
 
 
 def refine(
@@ -54,10 +55,10 @@ def refine(
     """Damped Gauss-Newton over turn, shift and (when free) scale; gates shrink from `loose` (a share of the size) on."""
     gate = loose * observation.size_m
     for _ in range(iterations):
-        rows = _all_rows(pose, shape, observation, anchors, lifted, gate)
+        rows = all_rows(pose, shape, observation, anchors, lifted, gate)
         step = _solve(rows, observation.size_m, free_scale)
         pose = moved(pose, step, pivot_of(pose, shape))
-        gate = max(0.75 * gate, 0.012 * observation.size_m, 0.006)
+        gate = max(0.75 * gate, finest_gate(observation))
     return pose
 
 
@@ -65,10 +66,15 @@ def loosest_motion(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
 ) -> tuple[np.ndarray, float]:
     """The step (7,) of turn and shift that all the evidence together holds least, of a metre at the rim, and its spread (m)."""
-    normal, _ = _normal_equations(_all_rows(pose, shape, observation, anchors, lifted, max(0.012 * observation.size_m, 0.006)))
-    unit = _rim_unit(observation.size_m)[:6]
+    normal, _ = normal_equations(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)))
+    unit = rim_unit(observation.size_m)[:6]
     values, vectors = np.linalg.eigh(normal[:6, :6] * np.outer(unit, unit))
     return np.append(unit * vectors[:, 0], 0.0), float(1.0 / np.sqrt(max(values[0], 1e-12)))
+
+
+def finest_gate(observation: Observation) -> float:
+    """Half the distance (m) at which evidence stops counting once a pose has settled."""
+    return max(0.012 * observation.size_m, 0.006)
 
 
 def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anchors:
@@ -98,7 +104,7 @@ def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot:
         weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < -0.1] = 0.0
     # Depth errors are correlated: thousands of points carry the information of some hundreds.
     weight *= 800.0 / len(observed)
-    return Rows(_jacobian(placed - pivot, normals), residual, weight)
+    return Rows(_jacobian(placed - pivot, normals), residual, weight, observation.frame_index)
 
 
 def outline_rows(
@@ -140,6 +146,7 @@ def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, g
         np.concatenate([_jacobian(placed - pivot, side) for side in sides]),
         np.concatenate([np.einsum("nj,nj->n", apart, side) for side in sides]),
         np.tile(weight, 2),
+        np.tile(np.repeat([m.frame_index for m in matched], [len(m.points_mesh) for m in matched]), 2),
     )
 
 
@@ -161,7 +168,8 @@ def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector
             rows.append((_jacobian((lowest - pivot)[None], up_axis)[0], gap, 40.0 / 0.008**2))
     if not rows:
         return _no_rows()
-    return Rows(np.stack([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
+    jacobian, residual, weight = (np.array(column) for column in zip(*rows, strict=True))
+    return Rows(jacobian, residual, weight, np.full(len(rows), -1))
 
 
 def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
@@ -209,7 +217,8 @@ def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: V
     points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
     direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
     weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
-    return Rows(_jacobian(points - pivot, view.world_from_camera.turn(direction)), residual, weight)
+    jacobian = _jacobian(points - pivot, view.world_from_camera.turn(direction))
+    return Rows(jacobian, residual, weight, np.full(len(residual), view.frame_index))
 
 
 def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
@@ -264,10 +273,10 @@ def _jacobian(arms: Points, directions: Points) -> np.ndarray:
 
 
 def _no_rows() -> Rows:
-    return Rows(np.zeros((0, 7)), np.zeros(0), np.zeros(0))
+    return Rows(np.zeros((0, 7)), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
 
 
-def _all_rows(
+def all_rows(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted], gate: float
 ) -> list[Rows]:
     """Every kind of evidence at a pose."""
@@ -280,7 +289,7 @@ def _all_rows(
     ]
 
 
-def _normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
+def normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
     """Weighted normal matrix (7, 7) and right side (7,)."""
     normal, right = np.zeros((7, 7)), np.zeros(7)
     for part in rows:
@@ -290,7 +299,7 @@ def _normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
     return normal, right
 
 
-def _rim_unit(size_m: float) -> np.ndarray:
+def rim_unit(size_m: float) -> np.ndarray:
     """Turn, shift and log scale (7,) that move the object's rim by a metre each."""
     reach = 2.0 / max(size_m, 1e-3)
     return np.array([reach] * 3 + [1.0] * 3 + [reach])
@@ -298,8 +307,8 @@ def _rim_unit(size_m: float) -> np.ndarray:
 
 def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
     """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
-    normal, right = _normal_equations(rows)
-    unit = _rim_unit(size_m)
+    normal, right = normal_equations(rows)
+    unit = rim_unit(size_m)
     scaled = normal * np.outer(unit, unit)
     # One observation of half a size stops directions that nothing holds.
     scaled += np.eye(7) * (1e-6 * np.trace(scaled) / 7 + 4.0 / max(size_m, 1e-3) ** 2)

@@ -9,6 +9,8 @@ from r2c2r_core.align.protocol import Features, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.geometry.descriptors import mutual_pairs
 
+_MARGIN_PX = 12  # kept around the mask, so that descriptors at its rim see what they did
+
 
 class SiftMatcher:
     """The weight-free matcher."""
@@ -19,12 +21,15 @@ class SiftMatcher:
 
     def describe(self, image: Image, mask: Mask) -> Features:
         """Keypoints of `image` inside `mask`."""
-        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-        found, descriptors = self._sift.detectAndCompute(grey, mask.astype(np.uint8) * 255)
+        left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+        low, high = np.maximum([left - _MARGIN_PX, top - _MARGIN_PX], 0), [left + width + _MARGIN_PX, top + height + _MARGIN_PX]
+        part = slice(low[1], high[1]), slice(low[0], high[0])
+        grey = cv2.cvtColor(image[part], cv2.COLOR_RGB2GRAY)
+        found, descriptors = self._sift.detectAndCompute(grey, mask[part].astype(np.uint8) * 255)
         if descriptors is None or not len(found):
             return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
         root = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-6))
-        return Features(np.array([k.pt for k in found], dtype=np.float64) + 0.5, root.astype(np.float32))
+        return Features(np.array([k.pt for k in found], dtype=np.float64) + low + 0.5, root.astype(np.float32))
 
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that are each other's best and clearly better than the second best."""

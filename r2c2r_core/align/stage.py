@@ -10,12 +10,13 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from r2c2r_core.align.certainty import loose_ends, spins_alike, spread_of, ties
 from r2c2r_core.align.hypotheses import Hypothesis, box_hypotheses, settle
 from r2c2r_core.align.judge import Judgement, judge
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation, View, known_corners, look_at, observe
 from r2c2r_core.align.protocol import MATCHERS, Matcher
-from r2c2r_core.align.refine import anchors_for, loosest_motion, point_condition, refine, surface_distance
+from r2c2r_core.align.refine import anchors_for, point_condition, refine, surface_distance
 from r2c2r_core.align.render import render_views
 from r2c2r_core.align.shape import Shape, prepare_shape
 from r2c2r_core.align.sweep import sweep_loosest
@@ -24,9 +25,11 @@ from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
-from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement, Spread
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+
+_TRUSTED_IOU = 0.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,7 +218,8 @@ def _placement(
     rival = _rival(best, trials, shape)
     rms = _rms(pose, shape, observation)
     matched = _matched(lifted, pose, shape)
-    anchors = anchors_for(track, shape, best.hypothesis.up_mesh)
+    spread = spread_of(pose, shape, observation, anchors_for(track, shape, best.hypothesis.up_mesh), lifted)
+    doubts = _doubts(best, rival, trials, spread, track.front)
     placement = Placement(
         object_name=asset.object_name,
         candidate_id=asset.candidate_id,
@@ -226,15 +230,15 @@ def _placement(
         rms_m=rms,
         mask_iou=best.judgement.iou,
         condition=point_condition(pose, shape, observation),
-        unsure=rival is not None and _ties(best.judgement, rival.judgement),
+        unsure=bool(doubts),
         runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
         method=f"{best.hypothesis.source} + {matcher}",
         warnings=(),
-        spread_m=loosest_motion(pose, shape, observation, anchors, lifted)[1],
+        spread=spread,
         runner_up_turn_deg=None if rival is None else _angle_deg(pose, rival.hypothesis.pose),
         matched=matched,
     )
-    return replace(placement, warnings=_warnings(placement, best, observation))
+    return replace(placement, warnings=(*doubts, *_warnings(placement, observation)))
 
 
 def _matched(lifted: list[Lifted], pose: Similarity3, shape: Shape) -> MatchedPoints:
@@ -265,50 +269,45 @@ def _rival(best: Trial, trials: list[Trial], shape: Shape) -> Trial | None:
     for trial in trials:
         if _angle_deg(best.hypothesis.pose, trial.hypothesis.pose) < 20.0:
             continue
-        if _looks_same(best.hypothesis.pose, trial.hypothesis.pose, shape):
+        turn = trial.hypothesis.pose.rotation.T @ best.hypothesis.pose.rotation
+        if spins_alike(shape, Rotation.from_matrix(turn).as_rotvec()):
             continue
         return trial
     return None
 
 
-def _looks_same(a: Similarity3, b: Similarity3, shape: Shape) -> bool:
-    """Whether the turn between two poses is one of a continuous family that leaves the shape as it is (a bottle's yaw)."""
-    axis = Rotation.from_matrix(b.rotation.T @ a.rotation).as_rotvec()  # in the mesh frame
-    axis = axis / np.linalg.norm(axis)
-    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
-    sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
-    radius = float(np.median(np.linalg.norm(np.cross(sample, axis), axis=1)))
-    worst = 0.0
-    for angle in (0.4, 0.9, 1.7):
-        spin = Rotation.from_rotvec(angle * axis).as_matrix()
-        distance, _ = shape.tree.query(sample @ spin.T + middle)
-        worst = max(worst, float(np.quantile(distance, 0.9)))
-    return worst < 0.2 * radius  # a square's corners move by 0.3
-
-
-def _ties(best: Judgement, rival: Judgement) -> bool:
-    """Whether the two cannot be told apart: the scores are close, or close and not consistently ordered over views."""
-    gain = np.array([a.total - b.total for a, b in zip(best.views, rival.views, strict=True)])
-    mean = best.score - rival.score
-    if mean > 0.05:
-        return False
-    if mean < 0.003:
-        return True
-    spread = float(gain.std(ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-    return bool(mean < 2.0 * spread)
-
-
-def _warnings(placement: Placement, best: Trial, observation: Observation) -> tuple[str, ...]:
-    """One line each, for a person."""
+def _doubts(best: Trial, rival: Trial | None, others: list[Trial], spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
+    """Why the pose may be wrong, a line each; none where it can be trusted."""
     lines = []
-    if placement.mask_iou < 0.6:
-        lines.append(f"the placed mesh covers the masks poorly (IoU {placement.mask_iou:.2f})")
+    if rival is not None and ties(best.judgement, rival.judgement):
+        turn = _angle_deg(best.hypothesis.pose, rival.hypothesis.pose)
+        lines.append(f"another orientation ({turn:.0f} degrees) fits about as well: check which side is the front")
+    resized = _resized(best, others)
+    if resized is not None:
+        share = resized.hypothesis.pose.scale / best.hypothesis.pose.scale - 1.0
+        lines.append(f"{abs(share):.0%} {'larger' if share > 0 else 'smaller'} it fits about as well: check its size")
+    if best.judgement.iou < _TRUSTED_IOU:
+        lines.append(f"the placed mesh covers the masks poorly (IoU {best.judgement.iou:.2f})")
+    return (*lines, *loose_ends(spread, front))
+
+
+def _resized(best: Trial, others: list[Trial]) -> Trial | None:
+    """A pose turned alike, of another size, that fits as well."""
+    pose = best.hypothesis.pose
+    for trial in others:
+        other = trial.hypothesis.pose
+        alike = _angle_deg(pose, other) < 20.0 and abs(np.log(other.scale / pose.scale)) > 0.04
+        if alike and ties(best.judgement, trial.judgement):
+            return trial
+    return None
+
+
+def _warnings(placement: Placement, observation: Observation) -> tuple[str, ...]:
+    """What else a person should know, a line each."""
+    lines = []
     allowed = max(0.015, 0.03 * observation.size_m)
     if not placement.rms_m <= allowed:
         lines.append(f"scan and mesh are {placement.rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
-    if placement.unsure:
-        turn = f" ({placement.runner_up_turn_deg:.0f} degrees)" if placement.runner_up_turn_deg is not None else ""
-        lines.append(f"another orientation{turn} fits about as well: check which side is the front")
     if placement.condition > 30000:
         lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")
     if len(observation.views) < 3:

@@ -11,7 +11,7 @@ import numpy as np
 from r2c2r_core.export.plan import Body, Plan
 from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.model.mesh import CandidateSet
-from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.placement import Placement, Spread
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import JointResult
 from r2c2r_core.model.scene import SceneObject
@@ -149,7 +149,15 @@ def _placement_entry(placement: Placement) -> dict[str, Any]:
         "rms_m": _plain(placement.rms_m),
         "mask_iou": _plain(placement.mask_iou),
         "unsure": placement.unsure,
+        "runner_up_turn_deg": _plain(placement.runner_up_turn_deg),
+        "spread": _spread_entry(placement.spread),
     }
+
+
+def _spread_entry(spread: Spread | None) -> dict[str, Any] | None:
+    if spread is None:
+        return None
+    return {"turn_deg": _plain(spread.turn_deg), "shift_m": _plain(spread.shift_m), "scale": _plain(spread.scale)}
 
 
 def _warnings(

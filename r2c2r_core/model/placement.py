@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.arrays import Points
+from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Similarity3
 
 
@@ -29,6 +29,17 @@ NO_MATCHES = MatchedPoints(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spread:
+    """Standard deviations of a pose as all the evidence together holds it, each of the direction held least."""
+
+    turn_deg: float  # turns that leave the shape as it is aside
+    turn_axis_world: Vector3
+    shift_m: float  # of the mesh's middle
+    shift_axis_world: Vector3
+    scale: float  # share
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Placement:
     """A candidate's pose and scale, with the evidence for them."""
 
@@ -45,6 +56,6 @@ class Placement:
     runner_up: float | None  # score of the best different hypothesis over the winner's, 0..1
     method: str
     warnings: tuple[str, ...]
-    spread_m: float | None = None  # standard deviation at the rim of the motion all the evidence together holds least
+    spread: Spread | None = None
     runner_up_turn_deg: float | None = None  # by how much the runner-up is turned from the winner
     matched: MatchedPoints = NO_MATCHES

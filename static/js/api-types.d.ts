@@ -464,6 +464,8 @@ export interface Placement {
   condition: number;
   unsure: boolean;
   runner_up: number | null;
+  runner_up_turn_deg: number | null;
+  spread: PoseSpread | null;
   method: string;
   votes: Record<string, number>;
   warnings: string[];
@@ -496,6 +498,13 @@ export interface PointPatch {
 /** Clicks that belong together: one change, one undo. */
 export interface PointsIn {
   points: PointIn[];
+}
+
+/** By how much a pose may be off: standard deviations, each of the direction held least. */
+export interface PoseSpread {
+  turn_deg: number;
+  shift_m: number;
+  scale: number;
 }
 
 /** One recording and what became of it. */

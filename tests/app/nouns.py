@@ -9,7 +9,7 @@ from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3
 from r2c2r_core.model.capture import Capture, Frame, Room, SceneSurface
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
-from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.placement import Placement, Spread
 from r2c2r_core.model.scene import ArticulatedScene, Box, Inertial, Joint, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
@@ -128,6 +128,10 @@ def placement(name: str) -> Placement:
         condition=float("inf"),
         unsure=False,
         runner_up=0.3,
+        runner_up_turn_deg=180.0,
+        spread=Spread(
+            turn_deg=0.2, turn_axis_world=np.array([0.0, 0.0, 1.0]), shift_m=0.002, shift_axis_world=np.eye(3)[0], scale=0.004
+        ),
         method="fake",
         warnings=(),
     )

@@ -45,6 +45,8 @@ def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed:
         0.004,
         {"3": 12, "7": 18},
     )
+    assert group["placement"]["spread"] == {"turn_deg": 0.2, "shift_m": 0.002, "scale": 0.004}
+    assert group["placement"]["runner_up_turn_deg"] == 180.0
     web.get(f"/api/projects/{project}/objects/{number + 1}/candidates", 409)
 
 

@@ -6,9 +6,10 @@ import { centimetres } from "../lib/format.js";
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Certificate} Certificate */
 /** @typedef {import("../api-types").SceneItem} SceneItem */
+/** @typedef {NonNullable<CandidateGroup["placement"]>} Placement */
 
 /**
- * @param {NonNullable<CandidateGroup["placement"]>} placement
+ * @param {Placement} placement
  * @param {SceneItem | undefined} item
  */
 export function placement(placement, item) {
@@ -18,10 +19,8 @@ export function placement(placement, item) {
     ["Distance to the scan", `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
     ["Silhouette overlap", `${(100 * placement.mask_iou).toFixed(0)} %`],
     ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
-    [
-      "Runner-up",
-      placement.runner_up === null ? "none" : `${(100 * placement.runner_up).toFixed(0)} % of the winner's score`,
-    ],
+    ["Held to", held(placement.spread)],
+    ["Runner-up", runnerUp(placement)],
   ];
   if (item) rows.push(["W × D × H", `${item.dimensions_m.map(centimetres).join(" × ")} cm`]);
   if (item?.warp_residual_m)
@@ -29,11 +28,25 @@ export function placement(placement, item) {
   return h(
     "div",
     { class: "stack" },
-    placement.unsure ? h("span", { class: "chip warn" }, "unsure: another pose fits nearly as well") : "",
+    placement.unsure ? h("span", { class: "chip warn" }, "unsure: check it against the photos") : "",
     h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
     ...joints(item),
     ...[...placement.warnings, ...(item?.warnings ?? [])].map((warning) => h("p", { class: "muted" }, warning)),
   );
+}
+
+/** By how much the pose may be off, at the usual 95 %. @param {Placement["spread"]} spread */
+function held(spread) {
+  if (!spread) return "not measured";
+  const { shift_m, turn_deg, scale } = spread;
+  return `± ${(2000 * shift_m).toFixed(0)} mm, ± ${(2 * turn_deg).toFixed(1)}°, size ± ${(200 * scale).toFixed(1)} %`;
+}
+
+/** How near the best other orientation came. @param {Placement} placement */
+function runnerUp({ runner_up, runner_up_turn_deg }) {
+  if (runner_up === null) return "none";
+  const turned = runner_up_turn_deg === null ? "" : `, turned by ${runner_up_turn_deg.toFixed(0)}°`;
+  return `${(100 * runner_up).toFixed(0)} % of the winner's score${turned}`;
 }
 
 /** Each number of a joint with where it comes from. @param {SceneItem | undefined} item */

@@ -74,8 +74,8 @@ def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
     assert placement.runner_up > 0.99
     assert any("orientation" in w for w in placement.warnings)
     assert placement.runner_up_turn_deg == pytest.approx(180.0, abs=5.0)
-    assert placement.spread_m is not None
-    assert placement.spread_m < 0.005  # its edges hold it, whichever way it is turned
+    assert placement.spread is not None
+    assert placement.spread.shift_m < 0.005  # its edges hold it, whichever way it is turned
     placed = np.sort(np.ptp(placement.world_from_mesh.apply(asset.mesh.vertices), axis=0))
     np.testing.assert_allclose(placed, np.sort(np.ptp(thing.vertices, axis=0)), atol=0.008)
 

@@ -1,0 +1,121 @@
+"""Whether a placement can be trusted: rivals that fit as well, motions that nothing holds, and both in words."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.align.judge import Judgement
+from r2c2r_core.align.lift import Lifted
+from r2c2r_core.align.observe import Observation
+from r2c2r_core.align.refine import Anchors, Rows, all_rows, finest_gate, rim_unit
+from r2c2r_core.align.shape import Shape
+from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.model.placement import Spread
+from r2c2r_core.model.track import FrontPanel
+
+_SIGMAS = 2.0
+_LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
+
+
+def spread_of(pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]) -> Spread:
+    """Standard deviations of turn, shift and scale that all the evidence together leaves.
+
+    Turns that leave the shape as it is (a bottle's yaw) count for nothing.
+    """
+    unit = rim_unit(observation.size_m)
+    covariance = _covariance(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)), unit)
+    covariance *= np.outer(unit, unit)
+    turn_deg, turn_axis = 0.0, np.array([0.0, 0.0, 1.0])
+    values, vectors = np.linalg.eigh(covariance[:3, :3])
+    for value, axis in zip(values[::-1], vectors.T[::-1], strict=True):
+        if not spins_alike(shape, pose.rotation.T @ axis):
+            turn_deg, turn_axis = float(np.degrees(np.sqrt(value))), axis
+            break
+    values, vectors = np.linalg.eigh(covariance[3:6, 3:6])
+    return Spread(
+        turn_deg=turn_deg,
+        turn_axis_world=turn_axis,
+        shift_m=float(np.sqrt(values[-1])),
+        shift_axis_world=vectors[:, -1],
+        scale=float(np.sqrt(covariance[6, 6])),
+    )
+
+
+def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
+    """Covariance (7, 7) of the step in `unit`: what single readings' noise leaves, and what frames disagree by.
+
+    A mask's outline and a depth frame are wrong over whole stretches, so their pixels are no independent readings. What
+    that makes of the pose is seen by leaving out one frame at a time (the jackknife, one Newton step for each). The
+    normal matrix is inverted as a whole: a turn that a shift makes up for counts as free.
+    """
+    joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+    jacobian = joined.jacobian * unit
+    weighted = jacobian * joined.weight[:, None]
+    floor = 1e-3 * np.eye(7)
+    normal, pull = weighted.T @ jacobian + floor, weighted.T @ joined.residual
+    steps = []
+    for frame in np.unique(joined.frame_index[joined.frame_index >= 0]):
+        own = joined.frame_index == frame
+        rest = normal - weighted[own].T @ jacobian[own]
+        steps.append(-np.linalg.solve(rest, pull - weighted[own].T @ joined.residual[own]))
+    noise = np.linalg.inv(normal)
+    if len(steps) < 2:
+        return noise
+    apart = np.array(steps) - np.mean(steps, axis=0)
+    return np.asarray(noise + (len(steps) - 1) / len(steps) * apart.T @ apart)
+
+
+def spins_alike(shape: Shape, axis_mesh: Vector3) -> bool:
+    """Whether any turn about the axis (of any length) leaves the shape as it is."""
+    axis_mesh = axis_mesh / np.linalg.norm(axis_mesh)
+    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
+    sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
+    radius = float(np.median(np.linalg.norm(np.cross(sample, axis_mesh), axis=1)))
+    worst = 0.0
+    for angle in (0.4, 0.9, 1.7):
+        spin: Matrix3 = Rotation.from_rotvec(angle * axis_mesh).as_matrix()
+        distance, _ = shape.tree.query(sample @ spin.T + middle)
+        worst = max(worst, float(np.quantile(distance, 0.9)))
+    return worst < 0.2 * radius  # a square's corners move by 0.3
+
+
+def ties(best: Judgement, rival: Judgement) -> bool:
+    """Whether the two cannot be told apart: the scores are close, or close and not consistently ordered over views."""
+    gain = np.array([a.total - b.total for a, b in zip(best.views, rival.views, strict=True)])
+    mean = best.score - rival.score
+    if mean > 0.05:
+        return False
+    if mean < 0.003:
+        return True
+    spread = float(gain.std(ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
+    return bool(mean < 2.0 * spread)
+
+
+def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
+    """What the scan does not hold as well as a placement should be, a line each; a front tells where the wall is."""
+    figures = np.array([spread.turn_deg, spread.shift_m, spread.scale])
+    texts = (
+        (_turn_in_words(spread.turn_axis_world), f"{_SIGMAS * spread.turn_deg:.1f} degrees"),
+        (_shift_in_words(spread.shift_axis_world, front), f"{1000 * _SIGMAS * spread.shift_m:.0f} mm"),
+        ("its size", f"{100 * _SIGMAS * spread.scale:.0f} %"),
+    )
+    return tuple(
+        f"{what} is hardly held by what the scan shows: it may be off by {how_much}"
+        for (what, how_much), loose in zip(texts, _SIGMAS * figures > _LIMITS, strict=True)
+        if loose
+    )
+
+
+def _turn_in_words(axis_world: Vector3) -> str:
+    return "its turn about the vertical" if abs(axis_world[2]) > 0.8 else "its lean"
+
+
+def _shift_in_words(axis_world: Vector3, front: FrontPanel | None) -> str:
+    if abs(axis_world[2]) > 0.8:
+        return "its height above the floor"
+    if front is None:
+        return "its place on the floor"
+    along, into, _ = np.abs(axis_world @ front.world_from_front.rotation)
+    return "its place along the wall" if along > into else "its distance from the wall"

@@ -1,0 +1,101 @@
+"""What holds a pose and what does not, in figures and in words."""
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.align.certainty import loose_ends, spins_alike, spread_of
+from r2c2r_core.align.observe import Observation, observe
+from r2c2r_core.align.refine import Anchors
+from r2c2r_core.align.shape import Shape, prepare_shape
+from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
+from r2c2r_core.model.placement import Spread
+from r2c2r_core.model.track import FrontPanel
+
+NOTHING = Anchors(up_mesh=None, up_weight=0.0, front=None, support_z_m=None)
+IN_PLACE = Similarity3(1.0, np.eye(3), np.zeros(3))  # the mesh frames here are the world's
+SURE = Spread(
+    turn_deg=0.2,
+    turn_axis_world=np.array([0.0, 0.0, 1.0]),
+    shift_m=0.002,
+    shift_axis_world=np.array([1.0, 0.0, 0.0]),
+    scale=0.004,
+)
+
+
+def seen(thing: Any, capture: Any, track: Any) -> tuple[Shape, Observation]:
+    shape = prepare_shape(thing, point_count=4000, face_limit=4000, rng=np.random.default_rng(0))
+    return shape, observe(capture, track, view_count=6, size_px=96, point_count=800)
+
+
+@pytest.fixture(scope="module")
+def box(bench: Any) -> tuple[Shape, Observation]:
+    return seen(*bench.free_box(textured=False))
+
+
+def test_a_box_seen_from_around_is_held(box: tuple[Shape, Observation]) -> None:
+    spread = spread_of(IN_PLACE, *box, NOTHING, [])
+    assert spread.turn_deg < 0.75
+    assert spread.shift_m < 0.0075
+    assert spread.scale < 0.01
+    assert loose_ends(spread, None) == ()
+
+
+def test_frames_that_disagree_loosen_a_pose(box: tuple[Shape, Observation]) -> None:
+    shape, observation = box
+    first = observation.frame_index == observation.frame_index[0]
+    apart = observation.points_world + np.where(first, 0.02, 0.0)[:, None] * observation.towards_camera
+    torn = spread_of(IN_PLACE, shape, replace(observation, points_world=apart), NOTHING, [])
+    assert torn.shift_m > 1.5 * spread_of(IN_PLACE, shape, observation, NOTHING, []).shift_m
+
+
+def test_a_side_alone_holds_less_than_the_whole(box: tuple[Shape, Observation]) -> None:
+    shape, observation = box
+    view = observation.views[0]
+    own = observation.frame_index == view.frame_index
+    part = replace(
+        observation,
+        views=(view,),
+        points_world=observation.points_world[own],
+        towards_camera=observation.towards_camera[own],
+        noise_m=observation.noise_m[own],
+        frame_index=observation.frame_index[own],
+    )
+    whole, alone = (spread_of(IN_PLACE, shape, o, NOTHING, []) for o in (observation, part))
+    assert alone.scale > 1.5 * whole.scale
+    assert alone.turn_deg > whole.turn_deg
+
+
+def test_the_yaw_of_a_bottle_counts_for_nothing(bench: Any) -> None:
+    shape, observation = seen(*bench.bottle())
+    assert spins_alike(shape, np.array([0.0, 0.0, 2.0]))
+    assert not spins_alike(shape, np.array([1.0, 0.0, 0.0]))
+    spread = spread_of(IN_PLACE, shape, observation, NOTHING, [])
+    assert abs(spread.turn_axis_world[2]) < 0.3  # it is the lean that is told
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"turn_deg": 1.0}, "its turn about the vertical is hardly held by what the scan shows: it may be off by 2.0 degrees"),
+        ({"turn_deg": 1.0, "turn_axis_world": np.array([1.0, 0.0, 0.0])}, "its lean is .* 2.0 degrees"),
+        ({"shift_m": 0.02, "shift_axis_world": np.array([0.0, 0.0, 1.0])}, "its height above the floor is .* 40 mm"),
+        ({"scale": 0.03}, "its size is .* 6 %"),
+    ],
+)
+def test_what_is_loose_is_named(change: dict[str, Any], words: str) -> None:
+    assert loose_ends(SURE, None) == ()
+    (line,) = loose_ends(replace(SURE, **change), None)
+    assert re.search(words, line)
+
+
+def test_a_front_tells_along_the_wall_from_into_it() -> None:
+    facing_x = Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))  # its width runs along world y
+    front = FrontPanel(world_from_front=facing_x, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
+    (slides,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([0.0, 1.0, 0.0])), front)
+    assert slides == "its place along the wall is hardly held by what the scan shows: it may be off by 40 mm"
+    (deep,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([1.0, 0.0, 0.0])), front)
+    assert "its distance from the wall" in deep
