@@ -1,20 +1,23 @@
 """Placement with unknown scale and pose: meshes rendered into sample kitchens, then found again from the frames.
 
-    python benchmarks/placement.py [--trials 200] [--jobs 2] [--meshes DIR] [--candidates WORKDIR ...] [--overlays DIR]
+    python benchmarks/placement.py [--trials 0-199] [--meshes DIR] [--candidates WORKDIR ...] [--overlays DIR] [--seen N]
 
-Writes placement.json beside this file. A trial stands a mesh of true size in a synthetic kitchen (benchmarks/staged.py: ten
+Writes placement.json beside this file: trials it holds already of the same code are not run again, so the work may be done
+in parts, several at a time. A trial stands a mesh of true size in a synthetic kitchen (benchmarks/staged.py: ten
 frames of 960x720 from an arc of 120 degrees, a plank in front of it, a phone's LiDAR depth, masks whose outline is up to 5 px
 wrong) and gives it to the alignment turned at random and of unknown scale. --meshes are scans and models (the mug, the
 refrigerator and the generated figure of shared/data/meshes), --candidates finished workdirs, whose chosen meshes keep the size
 they were placed in; boxes with a picture on each side, and blank ones with a handle, are always among them. Errors are modulo
-the turns that leave the mesh as it is, in shape and in colour.
+the turns that leave the mesh as it is, in shape and in colour. With --seen N masks are given in N neighbouring frames alone:
+too little for many, which is what "unsure" has to notice; these are kept apart, in placement_seen_N.json.
 """
 
 import argparse
+import fcntl
 import json
-import multiprocessing
+import os
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +31,8 @@ from r2c2r_core.align.shape import Shape, prepare_shape
 from r2c2r_core.align.stage import AlignConfig, place_mesh
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.sources import source_key
 
 HERE = Path(__file__).parent
 LOOSE = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: 95 % within
@@ -47,6 +52,9 @@ class Trial:
     unsure: bool
     iou: float
     runner_up: float | None
+    spread: tuple[float, float, float] | None  # standard deviations: degrees, metres, share of scale
+    rms_mm: float | None
+    doubts: tuple[str, ...]  # in words
     note: str
     cpu_s: float
 
@@ -56,32 +64,46 @@ class Trial:
 
 
 def main() -> None:
-    """Run the trials and write what came out."""
+    """Run the trials that are missing and write what came out."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0, help="number of the first trial")
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--trials", default="0-199", help="first and last number")
     parser.add_argument("--meshes", type=Path, default=None)
     parser.add_argument("--candidates", type=Path, nargs="*", default=[])
     parser.add_argument("--overlays", type=Path, default=None, help="a folder for pictures of the failures")
+    parser.add_argument("--seen", type=int, default=None, help="frames with a mask, neighbours; all where not given")
     options = parser.parse_args()
+    first, last = (int(number) for number in options.trials.split("-"))
+    result = HERE / ("placement.json" if options.seen is None else f"placement_seen_{options.seen}.json")
     articles = assortment(options.meshes, options.candidates)
-    numbers = range(options.first, options.first + options.trials)
-    work = [(number, articles[number % len(articles)], options.overlays) for number in numbers]
+    done = {trial.number for trial in merged(result, [])}
+    for number in (n for n in range(first, last + 1) if n not in done):
+        trial = attempt(number, articles[number % len(articles)], options.seen, options.overlays)
+        mark = "  " if trial.within(LOOSE) else "u " if trial.unsure else "! "
+        print(
+            f"{mark}{trial.number:3d} {trial.article:28s} {trial.turn_deg:6.2f} deg {1000 * trial.apart_m:6.1f} mm "
+            f"{100 * trial.scale_off:5.2f} % iou {trial.iou:.3f} rival {trial.runner_up} {trial.cpu_s:.1f} s {trial.note}",
+            flush=True,
+        )
+        merged(result, [trial])
     views = hundred_views(max((a for a in articles if a.kind != "scan"), key=lambda a: len(a.mesh.faces)))
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        trials = []
-        for trial in pool.imap_unordered(attempt, work):
-            trials.append(trial)
-            mark = "  " if trial.within(LOOSE) else "u " if trial.unsure else "! "
-            print(
-                f"{mark}{trial.number:3d} {trial.article:28s} {trial.turn_deg:6.2f} deg {1000 * trial.apart_m:6.1f} mm "
-                f"{100 * trial.scale_off:5.2f} % iou {trial.iou:.3f} rival {trial.runner_up} {trial.cpu_s:.1f} s {trial.note}",
-                flush=True,
-            )
-            summary = {"views": views, **summarise(sorted(trials, key=lambda t: t.number))}
-            (HERE / "placement.json").write_text(json.dumps(summary, indent=1) + "\n")
-    print(json.dumps({k: v for k, v in summary.items() if k != "trials"}, indent=1))
+    merged(result, [], views)
+    print(json.dumps({k: v for k, v in json.loads(result.read_text()).items() if k != "trials"}, indent=1))
+
+
+def merged(result: Path, new: list[Trial], views: dict[str, object] | None = None) -> list[Trial]:
+    """All trials of this code so far with the new ones, as the file then holds them; parts run at once take turns."""
+    with (result.with_suffix(".lock")).open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        held = json.loads(result.read_text()) if result.exists() else {}
+        code = source_key("align", "geometry", "model")
+        known = held.get("trials", []) if held.get("code") == code else []
+        trials = sorted([*(Trial(**t) for t in known), *new], key=lambda t: t.number)
+        if new or views:
+            summary = {"code": code, "views": views or held.get("views"), **summarise(trials)}
+            written = result.with_suffix(".part")
+            written.write_text(json.dumps(summary, indent=1) + "\n")
+            os.replace(written, result)
+    return trials
 
 
 def hundred_views(article: Article) -> dict[str, object]:
@@ -93,12 +115,13 @@ def hundred_views(article: Article) -> dict[str, object]:
     return {"of": article.name, "faces": len(article.mesh.faces), "size_px": config.match_px, "cpu_s": round(seconds, 3)}
 
 
-def attempt(work: tuple[int, Article, Path | None]) -> Trial:
+def attempt(number: int, article: Article, seen: int | None, overlays: Path | None) -> Trial:
     """Stage, film and place one article."""
-    number, article, overlays = work
     rng = np.random.default_rng([number, 11])
     stage = place_for(article, number)
     world, capture, track = film(stage, article.mesh, rng)
+    if seen is not None:
+        track = seen_in(track, seen, int(rng.integers(0, 10)))
     asset, truth = as_candidate(article, world, rng)
     started = time.process_time()
     try:
@@ -107,7 +130,7 @@ def attempt(work: tuple[int, Article, Path | None]) -> Trial:
         seconds = time.process_time() - started
         return Trial(
             number=number, article=article.name, kind=article.kind, turn_deg=180.0, apart_m=9.0, scale_off=9.0, unsure=True,
-            iou=0.0, runner_up=None, note=str(error), cpu_s=round(seconds, 2),
+            iou=0.0, runner_up=None, spread=None, rms_mm=None, doubts=(str(error),), note="failed", cpu_s=round(seconds, 2),
         )  # fmt: skip
     seconds = time.process_time() - started
     shape = prepare_shape(asset.mesh, point_count=8000, face_limit=20000, rng=np.random.default_rng(0))
@@ -115,12 +138,21 @@ def attempt(work: tuple[int, Article, Path | None]) -> Trial:
     trial = Trial(
         number=number, article=article.name, kind=article.kind, turn_deg=round(turn, 3), apart_m=round(apart, 5),
         scale_off=round(scale, 5), unsure=placement.unsure, iou=round(placement.mask_iou, 4),
-        runner_up=None if placement.runner_up is None else round(placement.runner_up, 4), note=placement.method,
+        runner_up=None if placement.runner_up is None else round(placement.runner_up, 4),
+        spread=None if (s := placement.spread) is None else (round(s.turn_deg, 4), round(s.shift_m, 6), round(s.scale, 6)),
+        rms_mm=round(1000 * placement.rms_m, 2), doubts=placement.warnings, note=placement.method,
         cpu_s=round(seconds, 2),
     )  # fmt: skip
     if overlays is not None and not trial.within(LOOSE):
         outlines(overlays / f"{number:03d}_{article.name}.jpg", capture, asset.mesh, placement.world_from_mesh, truth, track)
     return trial
+
+
+def seen_in(track: MaskTrack, count: int, first: int) -> MaskTrack:
+    """The track with masks in so many neighbouring frames alone."""
+    frames = sorted(track.masks)
+    first = min(first, max(len(frames) - count, 0))
+    return replace(track, masks={k: track.masks[k] for k in frames[first : first + count]})
 
 
 def error_of(found: Similarity3, truth: Similarity3, shape: Shape) -> tuple[float, float, float]:
