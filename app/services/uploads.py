@@ -175,9 +175,9 @@ def _check(context: Context, path: Path, file_name: str) -> None:
 
 def _said(name: str, error: dict[str, str]) -> R2C2RError:
     """What the probe said; whatever else went wrong in it, the file is the cause."""
-    message = " ".join(str(error["message"]).split())[:500]
+    message, hint = (" ".join(str(error[part]).split())[:most] for part, most in (("message", 500), ("hint", 400)))
     if error["kind"] in {cls.__name__ for cls, _, _ in KINDS}:
-        return CaptureError(message, hint=error["hint"])
+        return CaptureError(message, hint=hint)
     return CaptureError(f"{name} cannot be read ({message[:200]})", hint="export it again from the app that made it")
 
 
