@@ -31,8 +31,9 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from finished_stages import FinishedStages
 from kept import add_options, report
-from kill_journey import FinishedStages, Journey, until
+from kill_journey import Journey, until
 
 ROOT = Path(__file__).resolve().parent.parent
 SERVER = """

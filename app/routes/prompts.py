@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from app import schemas
 from app.deps import Ctx
 from app.routes.numbers import FrameNumber, RowId
-from app.services import clouds, masks, prompts
+from app.services import clouds, masks, prompt_files, prompts
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
 
@@ -81,13 +81,13 @@ def redo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undon
 @router.get("/prompts.json", operation_id="exportPrompts")
 def export_prompts(context: Ctx, project: str) -> schemas.PromptsFile:
     """The clicks as the command line reads them."""
-    return prompts.export_file(context, project)
+    return prompt_files.export(context, project)
 
 
 @router.post("/prompts.json", operation_id="importPrompts")
 def import_prompts(context: Ctx, project: str, body: schemas.PromptsFile) -> list[schemas.SceneObject]:
     """Add the objects of a prompts file; an object whose name is taken gets that file's points instead of its own."""
-    return prompts.import_file(context, project, body)
+    return prompt_files.adopt(context, project, body)
 
 
 @router.get("/live", operation_id="getLive")

@@ -12,8 +12,8 @@ from app.db.engine import reading
 from app.errors import NotFound, NotReady
 from app.files import ProjectFiles, inside
 from app.services import projects
+from app.services.candidates import candidate_mesh, generate_key
 from app.services.context import Context
-from app.services.reviews import candidate_mesh, generate_key
 from r2c2r_core.workspace import write_atomically
 
 WIDTHS = (160, 320, 480, 960, 1920)

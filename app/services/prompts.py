@@ -11,7 +11,6 @@ from app.db import history, queries
 from app.db.engine import reading, writing
 from app.db.tables import Event, Point, Project, SceneObject
 from app.errors import Conflict, NotFound
-from app.jobs.outcomes import adopt_prompts
 from app.services import masks
 from app.services.context import Context
 from app.services.projects import frame_table
@@ -44,7 +43,7 @@ def create_all(
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         made = [(_create(context, session, project, body, what).id, infer and bool(body.points)) for body in bodies]
-    return [_after(context, project_id, number, follow) for number, follow in made]
+    return [after_change(context, project_id, number, follow) for number, follow in made]
 
 
 def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
@@ -61,7 +60,7 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
-    return _after(context, project_id, object_id, infer="category" in wanted)
+    return after_change(context, project_id, object_id, infer="category" in wanted)
 
 
 def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -72,7 +71,7 @@ def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneOb
             item.deleted = True
             session.add(item)
     context.live.cancel(project_id, object_id)
-    return _after(context, project_id, object_id, infer=False)
+    return after_change(context, project_id, object_id, infer=False)
 
 
 def add_point(context: Context, project_id: str, object_id: int, body: schemas.PointIn, infer: bool) -> schemas.SceneObject:
@@ -80,11 +79,11 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        _check_point(context, project, body.frame, body.x, body.y)
+        check_point(context, project, body.frame, body.x, body.y)
         text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
         with history.change(session, item, "prompts", "add point", text, who=context.who, frame=body.frame):
             session.add(Point(object_id=item.id or 0, **body.model_dump()))
-    return _after(context, project_id, object_id, infer)
+    return after_change(context, project_id, object_id, infer)
 
 
 def add_points(context: Context, project_id: str, object_id: int, body: schemas.PointsIn, infer: bool) -> schemas.SceneObject:
@@ -93,12 +92,12 @@ def add_points(context: Context, project_id: str, object_id: int, body: schemas.
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         for point in body.points:
-            _check_point(context, project, point.frame, point.x, point.y)
+            check_point(context, project, point.frame, point.x, point.y)
         frame = body.points[0].frame
         text = f"{len(body.points)} points on {item.name}, frame {frame}"
         with history.change(session, item, "prompts", "add points", text, who=context.who, frame=frame):
             session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
-    return _after(context, project_id, object_id, infer)
+    return after_change(context, project_id, object_id, infer)
 
 
 def move_point(
@@ -110,12 +109,12 @@ def move_point(
         item = queries.object_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         changes = body.model_dump(exclude_none=True)
-        _check_point(context, project, point.frame, changes.get("x", point.x), changes.get("y", point.y))
+        check_point(context, project, point.frame, changes.get("x", point.x), changes.get("y", point.y))
         text = f"moved a point of {item.name}, frame {point.frame}"
         with history.change(session, item, "prompts", "move point", text, who=context.who, frame=point.frame):
             point.sqlmodel_update(changes)
             session.add(point)
-    return _after(context, project_id, object_id, infer)
+    return after_change(context, project_id, object_id, infer)
 
 
 def delete_point(context: Context, project_id: str, object_id: int, point_id: int, infer: bool) -> schemas.SceneObject:
@@ -126,7 +125,7 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
         text = f"removed a point of {item.name}, frame {point.frame}"
         with history.change(session, item, "prompts", "remove point", text, who=context.who, frame=point.frame):
             session.delete(point)
-    return _after(context, project_id, object_id, infer)
+    return after_change(context, project_id, object_id, infer)
 
 
 def undo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
@@ -139,31 +138,9 @@ def redo(context: Context, project_id: str, body: schemas.UndoRequest) -> schema
     return _step(context, project_id, body, "redo")
 
 
-def export_file(context: Context, project_id: str) -> schemas.PromptsFile:
-    """The clicks as the command line reads them."""
-    with reading(context.engine) as session:
-        queries.project_row(session, project_id)
-        objects = []
-        for item in queries.live_objects(session, project_id):
-            points = [_file_point(point) for point in queries.points_of(session, item.id)]
-            objects.append(schemas.PromptsFileObject(name=item.name, category=item.category, points=points))
-        return schemas.PromptsFile(version=1, objects=objects)
-
-
-def import_file(context: Context, project_id: str, body: schemas.PromptsFile) -> list[schemas.SceneObject]:
-    """Add the objects of a prompts file."""
-    with writing(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        for entry in body.objects:
-            for point in entry.points:
-                _check_point(context, project, point.frame, point.x, point.y)
-        items = adopt_prompts(session, project, body.model_dump(), context.who)
-    return [_after(context, project_id, item.id, infer=False) for item in items]
-
-
 def _create(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
     for point in body.points:
-        _check_point(context, project, point.frame, point.x, point.y)
+        check_point(context, project, point.frame, point.x, point.y)
     category = _category(body.category)
     name = _free_name(session, project.id, category) if not body.name else _name(session, project.id, body.name, None)
     count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
@@ -176,10 +153,6 @@ def _create(context: Context, session: Session, project: Project, body: schemas.
         session.add(item)
         session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
     return item
-
-
-def _file_point(point: Point) -> schemas.PromptsFilePoint:
-    return schemas.PromptsFilePoint(frame=point.frame, x=point.x, y=point.y, label=1 if point.label else 0)
 
 
 def object_shape(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -208,13 +181,13 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
         item = queries.object_row(session, project_id, number, deleted=True)
         step = history.undo if direction == "undo" else history.redo
         event = step(session, item, body.scope, who=context.who)
-    shape = _after(context, project_id, number, infer=body.scope == "prompts")
+    shape = after_change(context, project_id, number, infer=body.scope == "prompts")
     if body.scope == "review":
         context.hub.publish("review", project_id, object=number)
     return schemas.Undone(object=shape, text=event.text, frame=event.frame)
 
 
-def _after(context: Context, project_id: str, object_id: int | None, infer: bool) -> schemas.SceneObject:
+def after_change(context: Context, project_id: str, object_id: int | None, infer: bool) -> schemas.SceneObject:
     """What follows from a stored change: masks where asked for, and every tab told."""
     if infer and object_id is not None:
         masks.follow(context, project_id, object_id)
@@ -268,7 +241,7 @@ def _point(session: Session, item: SceneObject, point_id: int) -> Point:
     return found
 
 
-def _check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
+def check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
     """Raise PromptError for a click that is on no frame or outside its image."""
     table = {entry["index"]: entry for entry in frame_table(context.files(project))}
     if frame not in table:

@@ -1,15 +1,14 @@
-"""Candidates with their evidence, what people say about them, and what they correct."""
+"""What people say about candidates, and what they correct."""
 
 import json
 import re
 import time
 from collections.abc import AsyncIterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import anyio
-from sqlmodel import Session, col, select
+from sqlmodel import Session, select
 
 from app import schemas
 from app.db import history, queries
@@ -17,14 +16,13 @@ from app.db.documents import overrides_entry
 from app.db.engine import reading, writing
 from app.db.tables import Project, SceneObject, Verdict
 from app.errors import Conflict, NotFound, NotReady, TooLarge
-from app.files import ProjectFiles, inside, require_free, safe_name
-from app.jobs.plain import plain
+from app.files import inside, require_free, safe_name
 from app.services import jobs
+from app.services.candidates import facts_of, group_of, override_shape
 from app.services.context import Context
 from app.services.prompts import tell_object
 from r2c2r_core.errors import OverrideError, PromptError
 from r2c2r_core.overrides import MOST_BATCHES
-from r2c2r_core.workspace import Workspace
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 MAX_MESH_BYTES = 512 * 1024 * 1024
@@ -34,7 +32,7 @@ def groups(context: Context, project_id: str) -> list[schemas.CandidateGroup]:
     """Every object's candidates; objects without any are left out."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        found = [_group(context, session, project, item) for item in queries.live_objects(session, project_id)]
+        found = [group_of(context, session, project, item) for item in queries.live_objects(session, project_id)]
     return [group for group in found if group is not None]
 
 
@@ -43,7 +41,7 @@ def group(context: Context, project_id: str, object_id: int) -> schemas.Candidat
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        found = _group(context, session, project, item)
+        found = group_of(context, session, project, item)
     if found is None:
         raise NotReady(f"{item.name} has no candidates yet", hint="run the project first")
     return found
@@ -55,7 +53,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         _refuse_overtaken(context, session, project, item, body)
-        facts = _candidate_facts(context.files(project), item.name)
+        facts = facts_of(context.files(project), item.name)
         before = history.override_data(session, item)
         known = {c["candidate_id"] for c in facts["candidates"]} if facts else set()
         if body.candidate not in known | set(before.get("rejected", [])):
@@ -73,7 +71,7 @@ def get_override(context: Context, project_id: str, object_id: int) -> schemas.O
     """What was corrected about the object."""
     with reading(context.engine) as session:
         item = queries.object_row(session, project_id, object_id)
-        return _override_shape(history.override_data(session, item))
+        return override_shape(history.override_data(session, item))
 
 
 def set_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> schemas.Reviewed:
@@ -118,21 +116,6 @@ async def upload(
     return await anyio.to_thread.run_sync(set_override, context, project_id, object_id, patch)
 
 
-def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
-    """One candidate's noun; NotFound when the object has no such candidate."""
-    found = Workspace(files.work).load_latest("generate", name)
-    for asset in found.candidates if found else ():
-        if asset.candidate_id == candidate:
-            return asset
-    raise NotFound(f"{name} has no candidate {candidate}", hint="the candidates may have been made anew")
-
-
-def generate_key(files: ProjectFiles, name: str) -> str:
-    """Changes whenever the object's candidates do."""
-    path = files.work / "nouns" / "generate" / f"{name}.noun"
-    return f"{path.stat().st_mtime_ns:x}" if path.is_file() else "0"
-
-
 async def _receive(stream: AsyncIterator[bytes], target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     received = 0
@@ -156,7 +139,7 @@ def _refuse_overtaken(
     """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
     if body.version is None or body.version == history.version_of(session, item, "review"):
         return
-    shown = _group(context, session, project, item)
+    shown = group_of(context, session, project, item)
     last = history.stacks_of(session, project.id, item.id, "review").done[-1:]
     said = f": {last[0].who}, {last[0].text}" if last else ""
     raise Conflict(
@@ -215,7 +198,7 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
     wanted = merged.get("candidate")
     if wanted is None or (Path(wanted).is_relative_to(files.uploads) and inside(files.uploads, wanted).is_file()):
         return
-    facts = _candidate_facts(files, item.name)
+    facts = facts_of(files, item.name)
     if facts is None or wanted not in {c["candidate_id"] for c in facts["candidates"]}:
         raise OverrideError(f"{item.name} has no candidate '{wanted}'", hint="choose one of its candidates, or upload a mesh")
 
@@ -235,101 +218,5 @@ def _reviewed(context: Context, project_id: str, object_id: int, job_id: int | N
     context.hub.publish("review", project_id, object=object_id)
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        shown = _group(context, session, project, queries.object_row(session, project_id, object_id))
+        shown = group_of(context, session, project, queries.object_row(session, project_id, object_id))
     return schemas.Reviewed(group=shown, job=jobs.get_job(context, job_id) if job_id is not None else None, text=text)
-
-
-def _group(context: Context, session: Session, project: Project, item: SceneObject) -> schemas.CandidateGroup | None:
-    files = context.files(project)
-    facts = _candidate_facts(files, item.name)
-    if facts is None:
-        return None
-    override = history.override_data(session, item)
-    verdicts = {v.candidate: v for v in session.exec(select(Verdict).where(col(Verdict.object_id) == item.id))}
-    accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
-    stacks = history.stacks_of(session, project.id, item.id, "review")
-    placement = _placement_facts(files, item.name)
-    by_person: str | None = override.get("candidate")
-    known = {c["candidate_id"] for c in facts["candidates"]}
-    chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
-    if placement and by_person and chosen != by_person:
-        chosen = placement["candidate_id"]  # an uploaded mesh: its id is known once it was placed
-    address, version = f"/media/{project.id}/candidates/{item.id}", generate_key(files, item.name)
-    return schemas.CandidateGroup(
-        object=item.id or 0,
-        name=item.name,
-        category=item.category,
-        chosen=chosen,
-        chosen_by="person" if by_person else facts["chosen_by"],
-        reason=f"chosen by {verdicts[accepted].who if accepted else 'a person'}" if by_person else facts["reason"],
-        ranking=facts["ranking"],
-        accepted=accepted,
-        candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],
-        placement=_placement(placement) if placement else None,
-        override=_override_shape(override),
-        version=history.version_of(session, item, "review"),
-        can_undo=bool(stacks.done),
-        can_redo=bool(stacks.undone),
-    )
-
-
-def _candidate(entry: dict[str, Any], verdict: Verdict | None, address: str, version: str) -> schemas.Candidate:
-    said: Any = verdict.verdict if verdict else None
-    return schemas.Candidate(
-        id=entry["candidate_id"],
-        generator=entry["generator"],
-        seed=entry["seed"],
-        watertight=entry["watertight"],
-        faces=entry["faces"],
-        frames=entry["frames"],
-        metrics={key: value for key, value in entry["metrics"].items() if value is not None},
-        parameters={key: value for key, value in entry["parameters"].items() if value is not None},
-        warnings=entry["warnings"],
-        verdict=said,
-        verdict_reason=verdict.reason if verdict else "",
-        verdict_by=verdict.who if verdict else "",
-        glb=f"{address}/{entry['candidate_id']}.glb?v={version}",
-        thumbnail=f"{address}/{entry['candidate_id']}.png?v={version}",
-    )
-
-
-def _placement(facts: dict[str, Any]) -> schemas.Placement:
-    similarity = facts["world_from_mesh"]
-    names = ("matches", "inliers", "unsure", "runner_up", "runner_up_turn_deg", "method", "votes", "warnings")
-    shown = {key: facts[key] for key in names}
-    shown["spread"] = facts["spread"] and {key: facts["spread"][key] for key in ("turn_deg", "shift_m", "scale")}
-    shown |= {key: facts[key] if facts[key] is not None else 0.0 for key in ("rms_m", "mask_iou", "condition")}
-    shown |= {"candidate": facts["candidate_id"], "scale": similarity["scale"], "translation_m": similarity["translation"]}
-    return schemas.Placement.model_validate(shown)
-
-
-def _override_shape(data: dict[str, Any]) -> schemas.OverrideData:
-    return schemas.OverrideData.model_validate(data)
-
-
-def _candidate_facts(files: ProjectFiles, name: str) -> dict[str, Any] | None:
-    """The candidates as JSON, without their meshes."""
-    path = files.work / "nouns" / "generate" / f"{name}.noun"
-    return _candidates_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
-
-
-@lru_cache(maxsize=128)
-def _candidates_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
-    found = Workspace(work).load_latest("generate", name)
-    if found is None:
-        return None
-    kept = ("candidate_id", "generator", "seed", "watertight", "frames", "metrics", "parameters", "warnings")
-    candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
-    about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
-    return {**about, "candidates": candidates}
-
-
-def _placement_facts(files: ProjectFiles, name: str) -> dict[str, Any] | None:
-    path = files.work / "nouns" / "align" / f"{name}.noun"
-    return _placement_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
-
-
-@lru_cache(maxsize=256)
-def _placement_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
-    found = Workspace(work).load_latest("align", name)
-    return plain(found) if found is not None else None

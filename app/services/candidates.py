@@ -1,0 +1,127 @@
+"""What was made for each object: candidates with their evidence, the choice, and what people said about them."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db import history
+from app.db.tables import Project, SceneObject, Verdict
+from app.errors import NotFound
+from app.files import ProjectFiles
+from app.jobs.plain import plain
+from app.services.context import Context
+from r2c2r_core.workspace import Workspace
+
+
+def group_of(context: Context, session: Session, project: Project, item: SceneObject) -> schemas.CandidateGroup | None:
+    files = context.files(project)
+    facts = facts_of(files, item.name)
+    if facts is None:
+        return None
+    override = history.override_data(session, item)
+    verdicts = {v.candidate: v for v in session.exec(select(Verdict).where(col(Verdict.object_id) == item.id))}
+    accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
+    stacks = history.stacks_of(session, project.id, item.id, "review")
+    placement = _placement_facts(files, item.name)
+    by_person: str | None = override.get("candidate")
+    known = {c["candidate_id"] for c in facts["candidates"]}
+    chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
+    if placement and by_person and chosen != by_person:
+        chosen = placement["candidate_id"]  # an uploaded mesh: its id is known once it was placed
+    address, version = f"/media/{project.id}/candidates/{item.id}", generate_key(files, item.name)
+    return schemas.CandidateGroup(
+        object=item.id or 0,
+        name=item.name,
+        category=item.category,
+        chosen=chosen,
+        chosen_by="person" if by_person else facts["chosen_by"],
+        reason=f"chosen by {verdicts[accepted].who if accepted else 'a person'}" if by_person else facts["reason"],
+        ranking=facts["ranking"],
+        accepted=accepted,
+        candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],
+        placement=_placement(placement) if placement else None,
+        override=override_shape(override),
+        version=history.version_of(session, item, "review"),
+        can_undo=bool(stacks.done),
+        can_redo=bool(stacks.undone),
+    )
+
+
+def _candidate(entry: dict[str, Any], verdict: Verdict | None, address: str, version: str) -> schemas.Candidate:
+    said: Any = verdict.verdict if verdict else None
+    return schemas.Candidate(
+        id=entry["candidate_id"],
+        generator=entry["generator"],
+        seed=entry["seed"],
+        watertight=entry["watertight"],
+        faces=entry["faces"],
+        frames=entry["frames"],
+        metrics={key: value for key, value in entry["metrics"].items() if value is not None},
+        parameters={key: value for key, value in entry["parameters"].items() if value is not None},
+        warnings=entry["warnings"],
+        verdict=said,
+        verdict_reason=verdict.reason if verdict else "",
+        verdict_by=verdict.who if verdict else "",
+        glb=f"{address}/{entry['candidate_id']}.glb?v={version}",
+        thumbnail=f"{address}/{entry['candidate_id']}.png?v={version}",
+    )
+
+
+def _placement(facts: dict[str, Any]) -> schemas.Placement:
+    similarity = facts["world_from_mesh"]
+    names = ("matches", "inliers", "unsure", "runner_up", "runner_up_turn_deg", "method", "votes", "warnings")
+    shown = {key: facts[key] for key in names}
+    shown["spread"] = facts["spread"] and {key: facts["spread"][key] for key in ("turn_deg", "shift_m", "scale")}
+    shown |= {key: facts[key] if facts[key] is not None else 0.0 for key in ("rms_m", "mask_iou", "condition")}
+    shown |= {"candidate": facts["candidate_id"], "scale": similarity["scale"], "translation_m": similarity["translation"]}
+    return schemas.Placement.model_validate(shown)
+
+
+def override_shape(data: dict[str, Any]) -> schemas.OverrideData:
+    return schemas.OverrideData.model_validate(data)
+
+
+def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:
+    """The candidates as JSON, without their meshes."""
+    path = files.work / "nouns" / "generate" / f"{name}.noun"
+    return _candidates_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
+
+
+@lru_cache(maxsize=128)
+def _candidates_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
+    found = Workspace(work).load_latest("generate", name)
+    if found is None:
+        return None
+    kept = ("candidate_id", "generator", "seed", "watertight", "frames", "metrics", "parameters", "warnings")
+    candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
+    about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
+    return {**about, "candidates": candidates}
+
+
+def _placement_facts(files: ProjectFiles, name: str) -> dict[str, Any] | None:
+    path = files.work / "nouns" / "align" / f"{name}.noun"
+    return _placement_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
+
+
+@lru_cache(maxsize=256)
+def _placement_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
+    found = Workspace(work).load_latest("align", name)
+    return plain(found) if found is not None else None
+
+
+def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
+    """One candidate's noun; NotFound when the object has no such candidate."""
+    found = Workspace(files.work).load_latest("generate", name)
+    for asset in found.candidates if found else ():
+        if asset.candidate_id == candidate:
+            return asset
+    raise NotFound(f"{name} has no candidate {candidate}", hint="the candidates may have been made anew")
+
+
+def generate_key(files: ProjectFiles, name: str) -> str:
+    """Changes whenever the object's candidates do."""
+    path = files.work / "nouns" / "generate" / f"{name}.noun"
+    return f"{path.stat().st_mtime_ns:x}" if path.is_file() else "0"
