@@ -50,6 +50,7 @@ else:
 settings = Settings(data_dir=data, launch_token="key", min_free_bytes=0, job_memory_bytes=0, import_roots=(data.parent,))
 uvicorn.run(create_app(settings, commands=commands), host="127.0.0.1", port=port, log_level="critical")
 """
+MOST_ACTS = 16
 HITS = ("server", "server and workers", "a job's process", "the live segmenter")
 
 
@@ -128,20 +129,20 @@ def kill_often(data: Path, *, kills: int, seed: int, real: Path | None = None) -
     """The figures of one seeded session of kills."""
     rng = random.Random(seed)
     server = Server(data, real is not None)
-    began, restarts, latest = time.monotonic(), [], 40.0 if real else 1.2
+    began, restarts = time.monotonic(), []
+    latest, pause = (40.0, 0.5) if real else (1.2, 0.02)
     server.start()
     journey = Journey(server.address, data, random.Random(seed + 1), real)
     stages = FinishedStages(journey)
     try:
         journey.sign_in()
-        for _ in range(kills):
-            timer = threading.Timer(rng.uniform(0.05, latest), server.kill, (rng.choice(HITS),))
+        for kill in range(kills):
+            for _ in range(rng.randrange(MOST_ACTS)):  # moments are counted in what was done: a slow machine gets as far
+                _live(journey, stages, pause)
+            timer = threading.Timer(rng.uniform(0.0, latest), server.kill, (rng.choice(HITS),))
             timer.start()
             while timer.is_alive():
-                with contextlib.suppress(httpx.HTTPError):
-                    journey.act()
-                    stages.look()
-                time.sleep(0.5 if real else 0.02)
+                _live(journey, stages, pause)
             timer.join()
             if not server.runs:
                 started = time.monotonic()
@@ -149,6 +150,7 @@ def kill_often(data: Path, *, kills: int, seed: int, real: Path | None = None) -
                 restarts.append(time.monotonic() - started)
             journey.send_again()
             journey.compare()
+            sys.stderr.write(f"{kill + 1} of {kills} {dict(server.hits)} {dict(journey.acknowledged)}\n")
         settled = journey.settles(900 if real else 300)
         journey.compare()
         stages.compare()
@@ -168,6 +170,14 @@ def kill_often(data: Path, *, kills: int, seed: int, real: Path | None = None) -
         "seconds": round(time.monotonic() - began, 1),
         "stages": "real" if real else "stand-ins",
     }
+
+
+def _live(journey: Journey, stages: FinishedStages, pause: float) -> None:
+    """One thing this person does; the server may vanish meanwhile."""
+    with contextlib.suppress(httpx.HTTPError):
+        journey.act()
+        stages.look()
+    time.sleep(pause)
 
 
 def _words(process: psutil.Process) -> list[str]:
