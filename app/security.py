@@ -143,4 +143,4 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, kind:
 
 
 def _is_page(scope: Scope) -> bool:
-    return scope["path"] == "/" or scope["path"].startswith("/p/")
+    return scope["path"] in ("/", "/people") or scope["path"].startswith("/p/")

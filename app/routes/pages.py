@@ -12,6 +12,7 @@ REVALIDATED = {"cache-control": "no-cache"}
 
 
 @router.get("/")
+@router.get("/people")
 @router.get("/p/{rest:path}")
 def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None) -> Response:
     """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address."""

@@ -14,6 +14,7 @@ from r2c2r_core.model.scene import SceneObject
 _REACH_M = 0.08  # an axis sticks out of its box by this much
 _AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
 _LONGEST_TEXT = 60
+_LINE_M = 0.07  # between two findings of one object, so that neither hides the other
 
 
 def marks(
@@ -27,7 +28,8 @@ def marks(
     for finding in findings:
         item = next((i for i in items if finding["where"] == i.name or finding["where"].startswith(f"{i.name}_")), None)
         if item is not None and (name is not None or finding["severity"] == "error"):
-            found.append(_word(item.world_from_object.translation, finding["message"], _FINDING))
+            above = _LINE_M * sum(mark["colour"] == list(_FINDING) for mark in found)  # one object may have several
+            found.append(_word(item.world_from_object.translation + np.array([0, 0, above]), finding["message"], _FINDING))
     said = select(Comment).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
     found += [_word(np.asarray(c.point_world), f"{c.who}: {c.text}", _COMMENT) for c in session.exec(said) if c.point_world]
     return found, items[0].world_from_object.translation.tolist() if name is not None and items else None

@@ -1,4 +1,4 @@
-/** The two large pages, fetched with their elements when they are first opened: the list of projects does not wait for them. */
+/** Pages that are large or seldom opened, fetched with their elements when they are first opened: the list of projects does not wait for them. */
 
 /** @typedef {Record<string, CustomElementConstructor>} Elements */
 
@@ -26,6 +26,7 @@ const LATER = {
       "r2c2r-annotate": page.AnnotatePage,
     };
   },
+  people: async () => ({ "r2c2r-people": (await import("./pages/people.js")).PeoplePage }),
   review: async () => {
     const [page, photos, comments] = await Promise.all([
       import("./pages/review.js"),

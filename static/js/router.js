@@ -11,6 +11,7 @@ const PAGES = ["annotate", "run", "review", "download"];
 export function routeOf(address) {
   const [first, project, page] = address.pathname.split("/").filter(Boolean);
   const query = new URLSearchParams(address.search);
+  if (first === "people") return { page: "people", project: null, query };
   if (first !== "p" || !project) return { page: "projects", project: null, query };
   return { page: page && PAGES.includes(page) ? page : "overview", project, query };
 }
@@ -25,7 +26,8 @@ export function startRouter(show) {
     if (!(link instanceof HTMLAnchorElement) || event.defaultPrevented || event.button !== 0) return;
     if (event.ctrlKey || event.metaKey || event.shiftKey || link.target || link.hasAttribute("download")) return;
     const url = new URL(link.href);
-    if (url.origin !== location.origin || !(url.pathname === "/" || url.pathname.startsWith("/p/"))) return;
+    if (url.origin !== location.origin || !(["/", "/people"].includes(url.pathname) || url.pathname.startsWith("/p/")))
+      return;
     event.preventDefault();
     go(url.pathname + url.search);
   });

@@ -54,6 +54,9 @@ def test_no_page_has_a_serious_finding(browser: Browser, finished: tuple[str, st
     page.goto(address)
     base = address.split("/?")[0]
     found = serious(page, "projects")
+    page.goto(f"{base}/people")
+    page.get_by_role("heading", name="Add somebody").wait_for()
+    found += serious(page, "people")
     for name in PAGES:
         page.goto(f"{base}/p/{project}{name}")
         page.locator("h1, h2").first.wait_for()

@@ -172,6 +172,7 @@ export class AppShell extends LiveElement {
     }));
     const everywhere = [
       { text: "Go to Projects", run: () => go("/") },
+      { text: "Go to People", run: () => go("/people") },
       { text: "Dark or light", run: switchTheme },
       { text: "Keyboard and mouse help", keys: "?", run: () => this.#help.toggle() },
     ];

@@ -14,9 +14,9 @@ import { sayError } from "./toasts.js";
 /** @typedef {"ghost" | "outline" | "residual"} Look */
 
 /** @type {Record<Of, string>} */
-const OF = { placed: "Candidate as placed", primitive: "Plain boxes", fitted: "Fitted" };
+const OF = { placed: "As placed", primitive: "Boxes", fitted: "Fitted" };
 /** @type {Record<Look, string>} */
-const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance to the scan" };
+const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance" };
 
 export class PhotoCheck extends LiveElement {
   project = "";
@@ -141,7 +141,7 @@ export class PhotoCheck extends LiveElement {
       h("span", { class: "spring" }),
       ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look))),
       h("label", { class: "row" }, "Opacity", this.#opacity),
-      ...(this.#under.hidden ? [] : [h("label", { class: "row" }, OF[before], this.#split, OF[this.#of])]),
+      ...(this.#under.hidden ? [] : [h("label", { class: "row" }, `${OF[before]} ↔ ${OF[this.#of]}`, this.#split)]),
     );
   }
 

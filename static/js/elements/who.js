@@ -18,7 +18,7 @@ export class WhoIsIn extends LiveElement {
       outbox.begin(user);
       if (!account) return;
       const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave() }, "Sign out");
-      this.replaceChildren(h("span", { class: "muted", title: role }, user), leave);
+      this.replaceChildren(h("a", { href: "/people", title: `${role}: accounts and your password` }, user), leave);
     } catch (error) {
       sayError(error);
     }

@@ -40,6 +40,7 @@ export class ProjectsPage extends LiveElement {
           "header",
           {},
           h("h1", {}, "Projects"),
+          h("a", { class: "button quiet", href: "/people" }, "People"),
           h("button", { type: "button", onClick: () => this.#sample() }, "Sample kitchen"),
           this.#browse,
           h(
@@ -119,12 +120,8 @@ export class ProjectsPage extends LiveElement {
     const thumb = project.thumbnail
       ? h("img", { class: "thumb", src: project.thumbnail, alt: "", loading: "lazy" })
       : h("div", { class: "thumb" });
-    const line = [
-      facts,
-      counted(counts.objects, "object"),
-      bytes(project.size_bytes),
-      ago(project.updated, Date.now() / 1000),
-    ];
+    const what = [facts, counted(counts.objects, "object")];
+    const line = [bytes(project.size_bytes), ago(project.updated, Date.now() / 1000)];
     return h(
       "li",
       { class: "card" },
@@ -135,7 +132,7 @@ export class ProjectsPage extends LiveElement {
         h("h2", {}, h("a", { href: `/p/${project.id}` }, project.name)),
         h("div", { class: "row" }, stateChip(project), reviewChip(project)),
         busy ? h("progress", { value: busy.progress, max: 1, "aria-label": `${busy.kind} ${project.name}` }) : null,
-        h("div", { class: "muted" }, line.filter(Boolean).join(" · ")),
+        h("div", { class: "muted" }, what.filter(Boolean).join(" · "), h("br"), line.filter(Boolean).join(" · ")),
         h(
           "div",
           { class: "row" },

@@ -115,7 +115,7 @@ export class JointPanel {
       { class: `chip ${check ? "warn" : ""}`, title: sources.map(([what, s]) => `${what} ${s}`).join(", ") },
       worst,
     );
-    const name = h("span", {}, joint.name, " ", badge);
-    return { joint, object: known?.item.name ?? "", set, check, element: h("label", {}, name, input, value) };
+    const name = h("span", { class: "name", title: joint.name }, joint.name);
+    return { joint, object: known?.item.name ?? "", set, check, element: h("label", {}, name, badge, input, value) };
   }
 }
