@@ -12,6 +12,7 @@ import { sayError } from "./toasts.js";
 /** @typedef {import("../api-types").ViewerShow} ViewerShow */
 /** @typedef {import("../api-types").ViewerShown} ViewerShown */
 
+const CAMERA_KEYS = new Set(["w", "a", "s", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown", "tab"]);
 const LAST_MS = 250; // where a drag ended is told a moment after it did
 
 export class ViewerFrame extends LiveElement {
@@ -78,13 +79,15 @@ export class ViewerFrame extends LiveElement {
     this.replaceChildren(frame);
   }
 
-  /** Drags inside the frame, which is of our own origin. @param {HTMLIFrameElement} frame */
+  /** Drags and keys inside the frame, which is of our own origin. @param {HTMLIFrameElement} frame */
   #listen(frame) {
     const inside = frame.contentWindow;
     const dragging = (/** @type {PointerEvent} */ event) => event.buttons && this.emit("dragging");
     inside?.addEventListener("pointermove", dragging, { signal: this.signal });
     const ended = () => setTimeout(() => this.emit("dragging"), LAST_MS);
     inside?.addEventListener("pointerup", ended, { signal: this.signal, capture: true });
+    for (const type of /** @type {const} */ (["keydown", "keyup"]))
+      inside?.addEventListener(type, passOn, { signal: this.signal, capture: true });
   }
 
   /**
@@ -108,6 +111,19 @@ export class ViewerFrame extends LiveElement {
     const picture = image ? h("img", { src: image, alt: "The scene, closed and open" }) : null;
     this.replaceChildren(h("div", { class: "fallback" }, picture, said, retry));
   }
+}
+
+/** A key pressed in the frame is one of the page's, but for those that move viser's camera. @param {KeyboardEvent} event */
+function passOn(event) {
+  if (CAMERA_KEYS.has(event.key.toLowerCase()) && !event.ctrlKey && !event.metaKey) return;
+  event.stopPropagation(); // viser has a palette of its own
+  event.preventDefault();
+  document.body.dispatchEvent(new KeyboardEvent(event.type, { ...keyOf(event), bubbles: true, cancelable: true }));
+}
+
+/** @param {KeyboardEvent} event */
+function keyOf({ key, code, ctrlKey, metaKey, shiftKey, altKey, repeat }) {
+  return { key, code, ctrlKey, metaKey, shiftKey, altKey, repeat };
 }
 
 function isDark() {
