@@ -9,6 +9,7 @@ from r2c2r_core.arrays import Mask, Points
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import ThingBox
+from r2c2r_core.segment.back_edges import depth_at_back_edge
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.fronts import Front, front_corners, side_corners, side_faces
 from r2c2r_core.segment.lines import Evidence
@@ -112,7 +113,8 @@ def measure_depth(front: Front, scene: Scene, usual_m: float, wall_m: float | No
     while reach < len(filled) and filled[reach : reach + 2].any():  # a hole of 2 cm is no end
         reach += 1
     if reach >= 6:
-        return min((reach + 2) * 0.02, limit), True
+        about = min((reach + 2) * 0.02, limit)
+        return depth_at_back_edge(front, scene, about, wall_m or 1.0) or about, True
     return min(usual_m, limit), False
 
 
