@@ -99,7 +99,12 @@ def sample(options: argparse.Namespace) -> int:
 
     with show_progress() as progress, explained_io(options.out):
         paths = write_sample(
-            options.out, seed=options.seed, frames=options.frames, size=options.size, progress=progress.for_stage("sample")
+            options.out,
+            seed=options.seed,
+            frames=options.frames,
+            size=options.size,
+            opened=options.opened,
+            progress=progress.for_stage("sample"),
         )
     print(f"{paths.scan}  {paths.truth}  {paths.prompts}")
     return 0
@@ -285,6 +290,7 @@ def _parser() -> argparse.ArgumentParser:
     sampled = add("sample", sample)
     sampled.add_argument("out", type=Path)
     sampled.add_argument("--seed", type=int, default=0)
+    sampled.add_argument("--opened", action="store_true", help="a drawer and a door stand open in the later frames")
     _add_size(sampled)
     examined = add("info", info)
     examined.add_argument("capture", type=Path)

@@ -105,7 +105,7 @@ def depth_noise(depth_m: np.ndarray) -> np.ndarray:
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:
     """Up to `count` frames with large, whole, sharp masks, spread over the directions the object is seen from."""
     known = [f for f in capture.frames if f.index in track.masks]
-    known = [f for f in known if f.index not in track.opened_m] or known  # drawn out, it stands elsewhere
+    known = [f for f in known if f.index not in track.opened_frames] or known  # opened, its front stands elsewhere
     largest = max((track.masks[f.index].area_px for f in known), default=0)
     known = [f for f in known if track.masks[f.index].area_px >= max(48.0, 0.08 * largest)]
     if not known:

@@ -51,6 +51,14 @@ class ThingBox:
     support_z_m: float  # world height of what it stands on
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Swing:
+    """A door seen open in one frame."""
+
+    hinge: Literal["left", "right"]  # as a person facing the closed front sees it
+    angle_rad: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaskTrack:
     """An object's masks at RGB resolution, and what the segmenter measured while finding them."""
@@ -66,3 +74,9 @@ class MaskTrack:
     prompt_count: int
     warnings: tuple[str, ...]
     opened_m: dict[int, float] = field(default_factory=dict)  # frames in which its front is drawn out, and how far
+    swung: dict[int, Swing] = field(default_factory=dict)  # frames in which its door stands open
+
+    @property
+    def opened_frames(self) -> frozenset[int]:
+        """Frames in which its front is not in its place."""
+        return frozenset((*self.opened_m, *self.swung))

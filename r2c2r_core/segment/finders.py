@@ -9,7 +9,7 @@ from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt
-from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.model.track import FrontPanel, Swing, ThingBox
 from r2c2r_core.segment.appliance_clicks import appliance_front
 from r2c2r_core.segment.appliances import appliance_box, appliance_mask
 from r2c2r_core.segment.categories import CategoryHint, Kind
@@ -26,7 +26,7 @@ from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import small_mask
 from r2c2r_core.segment.small import find_small, glimpse_small
-from r2c2r_core.segment.states import drawn_out
+from r2c2r_core.segment.states import drawn_out, swung, swung_corners
 from r2c2r_core.segment.thing_boxes import box_of
 from r2c2r_core.segment.things import Thing, ThingConfig, find_thing, thing_mask
 from r2c2r_core.segment.trust import expected_iou
@@ -45,18 +45,32 @@ class FoundFront:
 
     front: Front
     scene: Scene
+    swings: bool = True  # a single door; drawers slide, and of a pair each leaf would have to be told apart
     kind: Kind = "front"
     warnings: tuple[str, ...] = ()
 
     def mask(self, frame: Frame) -> tuple[Mask, float]:
         """Visible pixels and how far to trust them."""
-        mask, share = front_mask(self.front, self.scene, frame, self.opened_m(frame))
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
-        return mask, expected_iou(mask, share, frame, corners, _BORDERS_M["front"])
+        opened = self._opened(frame, corners)
+        mask, share = front_mask(self.front, self.scene, frame, opened)
+        return mask, expected_iou(mask, share, frame, corners if opened is None else opened, _BORDERS_M["front"])
 
     def opened_m(self, frame: Frame) -> float:
         """How far it is drawn out in a frame."""
         return drawn_out(self.front, self.scene, frame)
+
+    def swung(self, frame: Frame) -> Swing | None:
+        """How its door stands open in a frame; None for drawers."""
+        return swung(self.front, self.scene, frame) if self.swings else None
+
+    def _opened(self, frame: Frame, corners: Points) -> Points | None:
+        """Its corners where it stands open in a frame."""
+        out_m = self.opened_m(frame)
+        if out_m > 0:
+            return corners + self.front.run.grid.outward * out_m
+        swing = self.swung(frame)
+        return swung_corners(self.front, swing) if swing is not None else None
 
     def panel(self) -> FrontPanel | None:
         """The rectangle and its handle."""
@@ -85,6 +99,10 @@ class FoundAppliance:
     def opened_m(self, frame: Frame) -> float:
         """Appliances do not move; their doors are not told open."""
         return 0.0
+
+    def swung(self, frame: Frame) -> Swing | None:
+        """None, as above."""
+        return None
 
     def panel(self) -> FrontPanel | None:
         """The rectangle of its front and its handle."""
@@ -115,6 +133,10 @@ class FoundThing:
     def opened_m(self, frame: Frame) -> float:
         """Things do not open."""
         return 0.0
+
+    def swung(self, frame: Frame) -> Swing | None:
+        """None, as above."""
+        return None
 
     def panel(self) -> FrontPanel | None:
         """None: things have no front panel."""
@@ -170,7 +192,7 @@ def _front(bench: Workbench, hint: CategoryHint, positives: Points, negatives: P
     if front is None:
         return None
     front = replace(front, depth_m=wall_behind(run, front.cell, bench.scene.capture.room, hint.depth_m) or hint.depth_m)
-    return FoundFront(replace(front, sides=seen_sides(front, bench.scene)), bench.scene)
+    return FoundFront(replace(front, sides=seen_sides(front, bench.scene)), bench.scene, swings=not (hint.pair or hint.stacked))
 
 
 def _appliance(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points) -> FoundAppliance | None:

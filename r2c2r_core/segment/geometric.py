@@ -16,7 +16,7 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
+from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliance_clicks import appliance_margins
 from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
@@ -49,6 +49,9 @@ class Found(Protocol):
 
     def opened_m(self, frame: Frame) -> float:
         """How far its front is drawn out in a frame; 0 where closed or not to be told."""
+
+    def swung(self, frame: Frame) -> Swing | None:
+        """How its door stands open in a frame; None where closed or not to be told."""
 
     def panel(self) -> FrontPanel | None:
         """Its flat front, measured."""
@@ -134,6 +137,7 @@ class GeometricSession:
             prompt_count=len(prompt.points),
             warnings=found.warnings,
             opened_m={index: out for index in sorted(masks) if (out := found.opened_m(self.scene.frame(index))) > 0},
+            swung={index: swing for index in sorted(masks) if (swing := found.swung(self.scene.frame(index))) is not None},
         )
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:

@@ -20,7 +20,7 @@ from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import Source
-from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack
+from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
 from r2c2r_core.synthesize.fixtures.spec import FixtureSpec
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
@@ -32,6 +32,8 @@ BoxSearch = Literal["upright", "hull", "powell"]
 """How a mesh's own axes are found: calipers in plan, where gravity is known; the hull's faces, where it was only assumed; or
 the paper's Powell search (eq. 8-9), for comparison."""
 _SURE_SHARE, _SURE_M = 0.08, 0.004  # a depth known this well, of itself or in metres, was measured
+_LEAST_SWINGS, _AGREED = 3, 0.75  # frames that show a door open, and the share of them that must agree on its side
+_SAME_STOP_RAD = np.deg2rad(4.0)
 _TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
 
 
@@ -48,6 +50,7 @@ class MeasuredObject:
     handle: FrontHandle | None
     handles: tuple[FrontHandle, ...] = ()  # all of them, where several fronts may be one object
     opened_m: float | None = None  # how far its front was drawn out while filming; None: never seen open
+    swung: Swing | None = None  # how far its door was swung open, and on which side; None: never seen open
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
@@ -113,6 +116,7 @@ def measure_object(
         handle=handle,
         handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
         opened_m=_drawn_out(track),
+        swung=_swung_open(track),
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
@@ -126,6 +130,20 @@ def measure_object(
 def _drawn_out(track: MaskTrack) -> float | None:
     """The furthest its front was seen drawn out, in metres; one frame's error does not count where there are many."""
     return float(np.quantile(list(track.opened_m.values()), 0.95)) if track.opened_m else None
+
+
+def _swung_open(track: MaskTrack) -> Swing | None:
+    """The furthest its door was seen open, on the side that most frames say; one frame alone may be mistaken."""
+    if len(track.swung) < _LEAST_SWINGS:
+        return None
+    left = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "left"]
+    right = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "right"]
+    hinge: Literal["left", "right"] = "left" if len(left) >= len(right) else "right"
+    angles = max(left, right, key=len)
+    agreed = len(angles) >= _LEAST_SWINGS and len(angles) > _AGREED * len(track.swung)
+    # Where it stood at its widest, by the middle of the frames near it: one frame's angle is a degree or two off
+    widest = [angle for angle in angles if angle > np.quantile(angles, 0.9) - _SAME_STOP_RAD]
+    return Swing(hinge=hinge, angle_rad=float(np.median(widest))) if agreed else None
 
 
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:

@@ -15,6 +15,7 @@ _OFF_CENTRE = (
 _ADJACENT_M = 0.06
 _TRUSTED = 0.25
 _CERTAIN_OFF_CENTRE = 0.6  # of half the width: a handle this far out is at the door's edge
+_SEEN_OPEN = 0.98  # of a door that several frames show open
 _IN_PAIRS = 0.75  # of doors without a telling handle, how many open as pairs do: a guess, stated as one
 
 
@@ -26,7 +27,7 @@ class Hinge:
     source: Source
     reason: str
     confidence: float | None  # 0..1; None where the category leaves no choice
-    by_handle: bool = False  # its handle was seen, on the other side
+    by_handle: bool = False  # its handle was seen on the other side, or the door open: no neighbour says otherwise
 
 
 def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> dict[str, Hinge]:
@@ -40,6 +41,11 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         seen = handle_hinge(item) if item.spec.opening == "side" else None
         if asked is not None:
             hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person", confidence=1.0)
+        elif item.swung is not None and item.spec.opening == "side":
+            reason = f"seen open on its {item.swung.hinge} edge"
+            hinges[item.name] = Hinge(
+                side=item.swung.hinge, source="measured", reason=reason, confidence=_SEEN_OPEN, by_handle=True
+            )
         elif seen is not None:
             hinges[item.name] = seen
         elif item.spec.opening == "bottom":

@@ -1,20 +1,24 @@
 """Kitchen → surfaces: fronts, carcasses, handles, appliances, bottles and the room."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Furniture, Handle, Kitchen, Leaf, Paint
+from r2c2r_core.synthetic.opening import holds_opened, hollow, opened_front
 from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, tube, turned
 from r2c2r_core.synthetic.props import prop_patches, sink_bounds, window_frame
 
 _SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
 
 
-def build_kitchen(kitchen: Kitchen) -> list[Patch]:
-    """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background)."""
+def build_kitchen(kitchen: Kitchen, opened: Mapping[str, float] = MappingProxyType({})) -> list[Patch]:
+    """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background); `opened` as in opening.py."""
     ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
-    patches = [*_room(kitchen), *_base_body(kitchen), *_upper_body(kitchen)]
+    patches = [*_room(kitchen), *_base_body(kitchen, opened), *_upper_body(kitchen)]
     for furniture in kitchen.base:
-        patches += _furniture(kitchen, furniture, kitchen.style.base_front, ids[furniture.name])
+        patches += _furniture(kitchen, furniture, kitchen.style.base_front, ids[furniture.name], opened.get(furniture.name))
     for furniture in kitchen.upper:
         patches += _furniture(kitchen, furniture, kitchen.style.wall_front, ids[furniture.name])
     patches += _fridge(kitchen, ids[kitchen.fridge.name])
@@ -75,13 +79,16 @@ def _lights(kitchen: Kitchen) -> list[Patch]:
     return [lamp_quad, window, *window_frame(window)]
 
 
-def _base_body(kitchen: Kitchen) -> list[Patch]:
+def _base_body(kitchen: Kitchen, opened: Mapping[str, float]) -> list[Patch]:
     style, left, right = kitchen.style, *kitchen.run
     patches: list[Patch] = []
     for carcass in kitchen.base_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
-        patches += box(low, high, style.carcass, faces="front left right")
+        if holds_opened(carcass.x, carcass.width_m, kitchen, opened):
+            patches += box(low, high, style.carcass, faces="left right") + hollow(low, high, style.carcass)
+        else:
+            patches += box(low, high, style.carcass, faces="front left right")
     front = -kitchen.base_depth_m
     overhang = 0.018
     top, bottom = kitchen.worktop_top_m, kitchen.worktop_top_m - kitchen.worktop_thickness_m
@@ -120,13 +127,17 @@ def _upper_body(kitchen: Kitchen) -> list[Patch]:
     return patches
 
 
-def _furniture(kitchen: Kitchen, furniture: Furniture, paint: Paint, object_id: int) -> list[Patch]:
+def _furniture(
+    kitchen: Kitchen, furniture: Furniture, paint: Paint, object_id: int, opening: float | None = None
+) -> list[Patch]:
     style = kitchen.style
     face = -furniture.depth_m
     patches: list[Patch] = []
     for leaf in furniture.leaves:
         patches += _front_panel(leaf, face, style.front_thickness_m, paint, style.shaker, object_id)
         patches += handle_patches(leaf.handle, np.array([leaf.x, face, leaf.z]), style.handle, object_id)
+    if opening is not None:
+        patches = opened_front(furniture, patches, opening, style.front_thickness_m, style.carcass, object_id)
     first, last = furniture.leaves[0], furniture.leaves[-1]
     back = face + style.front_thickness_m
     edge = style.gap_m / 2 + 0.0005  # the carcass is as wide as the unit, the front a gap narrower

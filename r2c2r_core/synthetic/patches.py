@@ -1,6 +1,6 @@
 """Surfaces as grids of quads, each with its own piece of texture: what the kitchen is built from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -124,17 +124,12 @@ def turned(patches: list[Patch], yaw_rad: float, centre: tuple[float, float]) ->
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pivot = np.array([*centre, 0.0])
-    return [
-        Patch(
-            grid=(p.grid - pivot) @ rotation.T + pivot,
-            size_m=p.size_m,
-            paint=p.paint,
-            object_id=p.object_id,
-            is_handle=p.is_handle,
-            lumel_m=p.lumel_m,
-        )
-        for p in patches
-    ]
+    return [replace(p, grid=(p.grid - pivot) @ rotation.T + pivot) for p in patches]
+
+
+def shifted(patches: list[Patch], by: np.ndarray) -> list[Patch]:
+    """The patches moved by a vector."""
+    return [replace(p, grid=p.grid + by) for p in patches]
 
 
 def _any_other(direction: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.synthetic.atlas import LitScene, light_scene
 from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.layout import plan_kitchen
+from r2c2r_core.synthetic.opening import OPENED_FROM, opened_units
 from r2c2r_core.synthetic.path import SECONDS, Shot, walk
 from r2c2r_core.synthetic.record3d import Record3DWriter
 from r2c2r_core.synthetic.render import photograph, render_view
@@ -43,9 +44,18 @@ class SamplePaths:
 
 
 def write_sample(
-    out: Path, *, seed: int = 0, frames: int = 180, size: tuple[int, int] = (960, 720), progress: Progress = SILENT
+    out: Path,
+    *,
+    seed: int = 0,
+    frames: int = 180,
+    size: tuple[int, int] = (960, 720),
+    opened: bool = False,
+    progress: Progress = SILENT,
 ) -> SamplePaths:
-    """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames."""
+    """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
+
+    With `opened`, a drawer and a door stand open in the later part of the recording.
+    """
     paths = SamplePaths(
         scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
     )
@@ -53,11 +63,14 @@ def write_sample(
     shutil.rmtree(paths.masks, ignore_errors=True)
     progress.at(0.0, "building the kitchen")
     kitchen = plan_kitchen(seed)
-    scene = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
+    openings = opened_units(kitchen) if opened else {}
+    opened_from = round(OPENED_FROM * frames) if openings else frames
+    closed = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
+    later = light_scene(build_kitchen(kitchen, openings), np.random.default_rng([seed, 2])) if openings else closed
     shots = walk(kitchen, frames, np.random.default_rng([seed, 3]))
     objects = true_objects(kitchen)
     to_capture = capture_from_kitchen(kitchen, shots[0].kitchen_from_camera.translation)
-    sightings = Sightings(objects)
+    sightings = Sightings(objects, moved={name: opened_from for name in openings})
     folders = [paths.masks / thing.name for thing in objects]
     for folder in folders:
         folder.mkdir(parents=True)
@@ -67,8 +80,9 @@ def write_sample(
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
         for number in progress.part(0.1, 1.0).each(range(frames), "frame"):
             rng = np.random.default_rng([seed, 7, number])
+            scene = closed if number < opened_from else later
             _add_frame(writer, scene, shots[number], cameras[number], poses[number], white, rng, number, sightings, folders)
-    _write_json(paths.truth, truth_document(objects, to_capture, sightings))
+    _write_json(paths.truth, truth_document(objects, to_capture, sightings, openings, opened_from))
     _write_json(paths.prompts, prompts_document(objects, sightings, np.random.default_rng([seed, 8])))
     return paths
 

@@ -1,6 +1,8 @@
 """What is true of a sample: boxes, joints, clicks, and which axes the camera could see. Written in the capture frame."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -66,10 +68,14 @@ def capture_from_kitchen(kitchen: Kitchen, first_eye: np.ndarray) -> Rigid3:
 
 
 class Sightings:
-    """What the frames showed of every object: seen extents and possible clicks, gathered frame by frame."""
+    """What the frames showed of every object: seen extents and possible clicks, gathered frame by frame.
 
-    def __init__(self, objects: tuple[TrueObject, ...]) -> None:
+    `moved` says from which frame on an object's front stands elsewhere: those frames show nothing of its place.
+    """
+
+    def __init__(self, objects: tuple[TrueObject, ...], moved: Mapping[str, int] = MappingProxyType({})) -> None:
         self._objects = objects
+        self._moved = moved
         self._bins = np.zeros((len(objects), 3, _BINS), np.int64)
         self._clicks: list[list[tuple[float, int, float, float]]] = [[] for _ in objects]
 
@@ -87,6 +93,8 @@ class Sightings:
         v, u = np.mgrid[_SAMPLE_STEP // 2 : camera.height : _SAMPLE_STEP, _SAMPLE_STEP // 2 : camera.width : _SAMPLE_STEP]
         seen, body = ids[v, u], ~is_handle[v, u]
         for index, thing in enumerate(self._objects):
+            if frame >= self._moved.get(thing.name, frame + 1):
+                continue
             chosen = (seen == index + 1) & body
             if np.count_nonzero(chosen) < 12:
                 continue
@@ -128,8 +136,14 @@ class Sightings:
         self._clicks[index].append((score, frame, left + float(columns[pick]) + 0.5, top + float(rows[pick]) + 0.5))
 
 
-def truth_document(objects: tuple[TrueObject, ...], capture_from_kitchen: Rigid3, sightings: Sightings) -> dict[str, object]:
-    """truth.json."""
+def truth_document(
+    objects: tuple[TrueObject, ...],
+    capture_from_kitchen: Rigid3,
+    sightings: Sightings,
+    openings: Mapping[str, float] = MappingProxyType({}),
+    opened_from: int = 0,
+) -> dict[str, object]:
+    """truth.json; what stands open by `openings` (joint values) does so from frame `opened_from` on."""
     entries = []
     for index, thing in enumerate(objects):
         joints = [_joint_entry(joint, capture_from_kitchen) for joint in thing.joints]
@@ -145,6 +159,7 @@ def truth_document(objects: tuple[TrueObject, ...], capture_from_kitchen: Rigid3
                 "hinge": hinges.pop() if len(hinges) == 1 else None,
                 "symmetry": "axial" if thing.is_round else None,
                 "observed_axes": sightings.observed_axes(index),
+                "opened": {"from_frame": opened_from, "value": openings[thing.name]} if thing.name in openings else None,
             }
         )
     return {"version": 1, "objects": entries}

@@ -51,8 +51,13 @@ class Shapes:
     ids: np.ndarray  # a vertex: 0 none
 
 
-def kitchen(drawn_out_m: float = 0.0, from_step: int = 0) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
-    """The capture, and the true mask of each named thing in each frame; from a step on, the middle drawer stands out."""
+def kitchen(
+    drawn_out_m: float = 0.0, from_step: int = 0, swung_rad: float = 0.0
+) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """The capture, and the true mask of each named thing in each frame; from a step on, the middle drawer stands out.
+
+    Or door_c is swung open on its left edge; the carcass then begins further back.
+    """
     colours: dict[int, np.ndarray] = {}
     depths: dict[int, np.ndarray] = {}
     truth: dict[str, dict[int, np.ndarray]] = {name: {} for name in (*DOORS, *DRAWERS, "carton")}
@@ -62,7 +67,7 @@ def kitchen(drawn_out_m: float = 0.0, from_step: int = 0) -> tuple[Capture, dict
     rng = np.random.default_rng(5)
     for index, (x, y, z, target) in enumerate(_path()):
         pose = look_at(np.array([x, y, z]), np.array(target))
-        shapes, names = _shapes(drawn_out_m if index >= from_step else 0.0)
+        shapes, names = _shapes(*((drawn_out_m, swung_rad) if index >= from_step else (0.0, 0.0)), bool(swung_rad))
         fine = rgb_camera.resized(2 * WIDTH, 2 * HEIGHT)
         picture = rasterize(shapes.vertices, shapes.faces, shapes.colours, fine, pose.inverse)
         small = cv2.resize(picture.attributes, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
@@ -128,11 +133,11 @@ def _path() -> list[tuple[float, float, float, tuple[float, float, float]]]:
     return path
 
 
-def _shapes(drawn_out_m: float) -> tuple[Shapes, list[str]]:
+def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes, list[str]]:
     boxes: list[tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]] = [
         ((-1.5, 0.0, 0.0), (3.5, 0.02, 2.4), (200, 202, 198), None),  # wall
         ((-1.5, -3.5, -0.02), (3.5, 0.0, 0.0), (120, 100, 80), None),  # floor
-        ((0.0, FRONT_Y + 0.02, 0.12), (1.859, 0.0, 0.86), (25, 24, 22), None),  # carcass, dark in the gaps
+        ((0.0, FRONT_Y + (0.3 if hollow else 0.02), 0.12), (1.859, 0.0, 0.86), (25, 24, 22), None),  # carcass, dark in the gaps
         ((0.0, FRONT_Y + 0.07, 0.0), (1.859, 0.0, 0.12), (60, 60, 64), None),  # plinth
         ((-0.02, FRONT_Y - 0.02, 0.865), (1.88, 0.0, 0.90), (70, 74, 80), None),  # worktop
         ((POST[0], FRONT_Y - 0.25, 0.0), (POST[1], FRONT_Y - 0.20, 0.70), (40, 120, 60), None),
@@ -159,6 +164,8 @@ def _shapes(drawn_out_m: float) -> tuple[Shapes, list[str]]:
     count = 0
     for low, high, colour, name in boxes:
         v, f = _box(np.array(low), np.array(high))
+        if name == "door_c" and swung_rad:
+            v = _swung(v, swung_rad)
         shade = np.array(colour) * np.repeat([0.8, 0.9, 0.9, 0.95, 0.85, 1.0], 4)[:, None]
         number = names.index(name) + 1 if name else 0
         v, f, a = subdivide_long_edges(v, f, np.column_stack([shade, np.full(len(v), number)]), 0.3)
@@ -168,6 +175,13 @@ def _shapes(drawn_out_m: float) -> tuple[Shapes, list[str]]:
         count += len(v)
     packed = np.concatenate(attributes)
     return Shapes(np.concatenate(vertices), np.concatenate(faces), packed[:, :3], packed[:, 3]), names
+
+
+def _swung(vertices: np.ndarray, angle_rad: float) -> np.ndarray:
+    """door_c's vertices, turned out about the left edge of its face."""
+    hinge = np.array([DOORS["door_c"][0], FRONT_Y, 0.0])
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.asarray((vertices - hinge) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) + hinge)
 
 
 def _box(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

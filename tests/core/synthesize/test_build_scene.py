@@ -6,6 +6,7 @@ import pytest
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import ObjectOverride, Overrides
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.model.track import Swing
 from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
@@ -137,6 +138,23 @@ def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(seen_m: flo
     if source == "measured":
         assert joint.upper == pytest.approx(seen_m, abs=0.02)
     assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source == "default")
+
+
+@pytest.mark.parametrize(("degrees", "source"), [(102.0, "measured"), (30.0, "default")])
+def test_a_door_that_stood_open_while_filming_tells_its_hinge_and_where_it_stops(degrees: float, source: str) -> None:
+    """Whatever its handle says; one frame that says otherwise does not count, and a crack open is no stop."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    angle = np.deg2rad(degrees)
+    swung = {frame: Swing(hinge="right", angle_rad=angle + 0.01 * (frame - 6)) for frame in (4, 5, 6, 7, 8)}
+    track = replace(track, swung={**swung, 9: Swing(hinge="left", angle_rad=0.5)})
+    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+    joint = item.joints[0]
+    assert joint.axis_object[2] == 1.0  # hinged on the right
+    assert (joint.sources["axis"], joint.sources["limits"]) == ("measured", source)
+    if source == "measured":
+        assert joint.upper == pytest.approx(angle, abs=0.02)
+    assert any("seen open" in w for w in item.warnings) == (source == "default")
 
 
 def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
