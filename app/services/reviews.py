@@ -84,7 +84,7 @@ def set_override(context: Context, project_id: str, object_id: int, body: schema
         before = history.override_data(session, item)
         merged = {key: value for key, value in {**before, **wanted}.items() if value is not None}
         _check_override(context, project, item, merged)
-        said = ", ".join(f"{key} {'computed again' if value is None else value}" for key, value in wanted.items())
+        said = ", ".join(_in_words(key, value) for key, value in wanted.items())
         text = f"{item.name}: {said or 'nothing'}"
         with history.change(session, item, "review", "correct", text, who=context.who):
             history.set_override(session, item, merged)
@@ -208,6 +208,20 @@ def _rerun(context: Context, session: Session, project: Project) -> int | None:
         return jobs.queue_run(context, session, project, schemas.RunRequest()).id
     except PromptError:
         return None
+
+
+def _in_words(key: str, value: Any) -> str:
+    """One correction, for the history and for who made it."""
+    name = {"pose": "place", "dimensions_m": "size", "joint_lower": "opens from", "joint_upper": "opens to"}.get(key, key)
+    if value is None:
+        return f"{name} computed again"
+    if key == "pose":
+        return f"{name} ({', '.join(f'{row[3]:.3f}' for row in value[:3])}) m"
+    if key == "dimensions_m":
+        return f"{name} {' × '.join(f'{100 * side:.1f}' for side in value)} cm"
+    if key.startswith("joint_"):
+        return f"{name} {value:.3f}"  # radians or metres
+    return f"{name} {value}"
 
 
 def _reviewed(context: Context, project_id: str, object_id: int, job_id: int | None, text: str) -> schemas.Reviewed:

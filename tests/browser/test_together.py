@@ -225,6 +225,12 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     move(ann, "Send to review again", "one drawer")
     move(bea, "Start the review")
     bea.get_by_role("button", name="drawer_1").first.click()
+    bea.keyboard.press("l")
+    expect(bea.get_by_label("Right (mm)")).to_have_value("5")  # by a key, shown over the photo and not stored yet
+    bea.keyboard.press("Enter")
+    expect(bea.locator(".toast", has_text="drawer_1: place (0.005, 0.000, 0.000) m")).to_be_visible()
+    bea.keyboard.press("Control+z")
+    expect(bea.locator(".toast", has_text="Undone: drawer_1: place")).to_be_visible()
     bea.keyboard.press("y")
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     bea.keyboard.press("Control+z")
