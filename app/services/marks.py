@@ -13,7 +13,7 @@ from r2c2r_core.model.scene import SceneObject
 
 _REACH_M = 0.08  # an axis sticks out of its box by this much
 _AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
-_LONGEST_TEXT = 60
+_LONGEST_TEXT = 44
 _LINE_M = 0.07  # between two findings of one object, so that neither hides the other
 
 

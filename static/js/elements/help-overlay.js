@@ -41,7 +41,7 @@ function content(close) {
     "p",
     {},
     "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
-      "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans. Hold Ctrl to place several clicks before the mask is computed.",
+      "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans; two fingers do both, and Take away makes a tap do what the right button does. Hold Ctrl to place several clicks before the mask is computed.",
   );
   const plain = h("input", { type: "checkbox", checked: plainKeys() });
   plain.addEventListener("change", () => setPlainKeys(plain.checked));

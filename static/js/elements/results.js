@@ -52,7 +52,11 @@ function row(item) {
     {},
     h("th", { scope: "row" }, item.name),
     h("td", {}, item.category),
-    h("td", { title: `sources: ${item.dimension_sources.join(", ")}` }, `${width} × ${depth} × ${height}`),
+    h(
+      "td",
+      { class: "whole", title: `sources: ${item.dimension_sources.join(", ")}` },
+      `${width} × ${depth} × ${height}`,
+    ),
     h("td", {}, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
     h("td", { class: "number" }, String(item.mask_frames)),
     h("td", { class: "number" }, rms),

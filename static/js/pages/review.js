@@ -60,6 +60,7 @@ export class ReviewPage extends LiveElement {
   #certificate = null;
   #object = -1;
   #candidate = "";
+  #handles = false; // whether the 3D view has them
 
   connected() {
     for (const element of [this.#state, this.#comments, this.#photos]) element.project = this.project;
@@ -79,7 +80,7 @@ export class ReviewPage extends LiveElement {
     this.#mover.addEventListener("shown", () => this.#drawMover(), { signal });
     this.#mover.addEventListener("moved", () => this.#follow(), { signal });
     this.#mover.addEventListener("store", (event) => this.#correct(detailOf(event)), { signal });
-    this.#viewer.addEventListener("dragging", () => this.#bar.moving && this.#place.add({}), { signal });
+    this.#viewer.addEventListener("dragging", () => this.#handles && this.#place.add({}), { signal });
     this.#viewer.addEventListener("shown", (event) => this.#shown(detailOf(event)), { signal });
     this.#viewer.addEventListener(
       "not-ready",
@@ -163,6 +164,7 @@ export class ReviewPage extends LiveElement {
     this.#photos.hidden = !photo;
     this.#drawMover();
     if (this.#bar.mode !== "scene") this.#joints.element.hidden = true;
+    this.#handles = false;
     if (!photo) this.#viewer.show(this.#wanted());
     if (this.#object < 0) return;
     await this.#photos.show(this.#object);
@@ -172,6 +174,7 @@ export class ReviewPage extends LiveElement {
   /** @param {ViewerShown} shown */
   #shown(shown) {
     this.#bar.told(shown.reduced);
+    this.#handles = this.#bar.moving && shown.mode === "aligned";
     this.#joints.show(shown.joints, this.#items);
     this.#joints.element.hidden = this.#bar.mode !== "scene" || !shown.joints.length;
     this.#follow();
@@ -323,7 +326,7 @@ export class ReviewPage extends LiveElement {
   /** The handles in the 3D view go where a number or a key moved the object. */
   #follow() {
     const { box, wanted } = this.#mover;
-    if (this.#bar.moving && box) this.#place.add({ pose: (wanted ?? box).pose });
+    if (this.#handles && box) this.#place.add({ pose: (wanted ?? box).pose });
   }
 
   /** Put the handles somewhere, or learn where they were dragged. @param {number[][] | null} pose */
