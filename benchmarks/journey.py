@@ -4,8 +4,8 @@
 
 SAMPLE is what `r2c2r sample` writes (180 frames, 14-15 objects). The person knows the room as well as its truth does: after all
 proposals from 80 % up are confirmed with one key, what is still missing gets a click where a person would click (prompts.json),
-what is no object is deleted, a wrong category is
-written anew. Then run, accept every object, send to review, approve, download.
+what is no object is deleted, a wrong category is written anew. Then run, accept every object, send to review, approve,
+download.
 
 The app's own figures count the clicks (GET …/figures): each point, each proposal confirmed (also when one key confirms them
 all), dismissed or deleted, each new name or category, each undo is one. Key presses and mouse presses on the whole way are

@@ -14,6 +14,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: bool = False) -> int:
     """Print the figures, replace that part of the file, and say by the exit status whether a bar was missed."""
+    figures = {**figures, "load_average": round(os.getloadavg()[1], 1)}  # times mean little on a busy machine
     print(json.dumps(figures, indent=1))
     if file is not None:
         parts = json.loads(file.read_text()) if file.exists() else {}

@@ -150,18 +150,21 @@ class Journey:
 
     def _choices(self) -> list[Callable[[], None]]:
         """What makes sense now; what is more frequent in life is there more often."""
-        known = [number for number, item in self.objects.items() if not item["deleted"]]
+        there = [number for number, item in self.objects.items() if not item["deleted"]]
         review = [self._comment, self._resolve, self._step, self._download, self._run]
-        number = self.rng.choice(known) if known else 0
-        if number in self.reviews:
-            review += [lambda: self._judge(number)] * 3 + [lambda: self._correct(number)] * (1 if self.real else 3)
-        if self.real or not known:  # a click anywhere would be an object more to reconstruct
-            return review if self.real else [self._add]
-        edits = [self._add, self._add, self._change_side_upload]
-        edits += [lambda: self._edit(number, "POST", "/points", self._click())] * 4
-        edits += [lambda: self._edit(number, "PATCH", "", {"category": self.rng.choice(["drawer", "oven", "mug"])})]
-        edits += [lambda: self._edit(number, "DELETE", "", None)]
+        judged = [number for number in self.reviews if number in there]
+        if judged:
+            of = self.rng.choice(judged)
+            review += [lambda: self._judge(of)] * 3 + [lambda: self._correct(of)] * (1 if self.real else 2)
+        if self.real:  # a click anywhere would be an object more to reconstruct
+            return review
+        number = self.rng.choice([n for n in self.objects if n not in self.reviews] or [0])  # a deleted one may be undone
+        edits = [self._change_side_upload] + [self._add] * (2 if len(there) < 9 else 0)
         edits += [lambda: self.change("undo", "POST", f"{self.at}/undo", {"object": number}, self._took_undone)] * 2
+        if number in there:
+            edits += [lambda: self._edit(number, "POST", "/points", self._click())] * 4
+            edits += [lambda: self._edit(number, "PATCH", "", {"category": self.rng.choice(["drawer", "oven", "mug"])})]
+            edits += [lambda: self._edit(number, "DELETE", "", None)]
         return review + edits
 
     def _import(self) -> None:
@@ -217,9 +220,8 @@ class Journey:
         (self.folder / "behave.json").write_text(json.dumps(dict.fromkeys(stages, "slow")))
 
     def _add(self) -> None:
-        if len(self.objects) < 12:
-            body = {"category": self.rng.choice(["drawer", "cabinet", "mug"]), "points": [self._click()]}
-            self.change("object", "POST", f"{self.at}/objects", body, self._took_object)
+        body = {"category": self.rng.choice(["drawer", "cabinet", "mug"]), "points": [self._click()]}
+        self.change("object", "POST", f"{self.at}/objects", body, self._took_object)
 
     def _edit(self, number: int, method: str, path: str, body: Any) -> None:
         self.change("click or edit", method, f"{self.at}/objects/{number}{path}", body, self._took_object)

@@ -3,7 +3,8 @@
     python benchmarks/scrubbing.py [--people 10] [--steps 200] [--json benchmarks/app.json]
 
 A project of full-size frames (960x720 of a 1920x1440 recording would be shown) is scrubbed back and forth without any cache;
-each step asks for the next frame when the one before has come. The first pass makes the previews; both are reported.
+each step asks for the next frame when the one before has come. The first pass makes the previews; both are reported, and how
+long the annotate page takes to its first frame in a Chromium that has never been there.
 """
 
 import argparse
@@ -19,15 +20,26 @@ from typing import Any
 import cv2
 import httpx2 as httpx
 import numpy as np
+from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(1, str(Path(__file__).resolve().parent.parent))
 
 from kept import add_options, report
 from kill_journey import Journey, until
 from kills import Server
 
+from tests.browser.conftest import CHROMIUM, QUIET
+
 FRAMES = 60
 SIZE = (1440, 1920)  # rows, columns
+VISITS = 5
+FRAME_IS_DRAWN = """() => {
+  const canvas = document.querySelector("r2c2r-frame-canvas canvas");
+  if (!canvas?.width) return 0;
+  const pixel = canvas.getContext("2d").getImageData(canvas.width / 2, canvas.height / 2, 1, 1).data;
+  return pixel[3] ? performance.now() : 0;
+}"""
 
 
 def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
@@ -44,10 +56,11 @@ def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
         cookies = dict(journey.client.cookies)
         first = _together(address, cookies, people=1, steps=FRAMES, stride=1)
         later = _together(address, cookies, people=people, steps=steps, stride=None)
+        shown = _page_to_first_frame(f"{server.address}/?token=key", f"{server.address}/p/{project}/annotate")
     finally:
         journey.client.close()
         server.stop()
-    return {"people": people, "steps_each": steps, "first_pass": first, "all_at_once": later}
+    return {"people": people, "steps_each": steps, "first_pass": first, "all_at_once": later, "page_to_first_frame": shown}
 
 
 def _full_size_frames(project: Path) -> None:
@@ -75,6 +88,22 @@ def _together(address: str, cookies: dict[str, str], *, people: int, steps: int,
     wall = time.monotonic() - began
     figures = {f"p{q}_ms": round(float(np.percentile(taken, q)) * 1000, 1) for q in (50, 95, 99)}
     return {**figures, "frames_per_s": round(len(taken) / wall, 1)}
+
+
+def _page_to_first_frame(sign_in: str, address: str) -> dict[str, float]:
+    """Milliseconds from asking for the annotate page to its first frame on the canvas, in browsers that know nothing yet."""
+    taken = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        for _ in range(VISITS):
+            context = browser.new_context(viewport={"width": 1280, "height": 720})
+            context.request.get(sign_in)
+            page = context.new_page()
+            page.goto(address, wait_until="commit")
+            taken.append(page.wait_for_function(FRAME_IS_DRAWN, polling="raf", timeout=120_000).json_value())
+            context.close()
+        browser.close()
+    return {"p50_ms": round(float(np.median(taken))), "worst_ms": round(max(taken))}
 
 
 def _person(address: str, cookies: dict[str, str], number: int, steps: int, stride: int | None, taken: list[float]) -> None:

@@ -42,13 +42,13 @@ def everyone(engine: Engine) -> list[Person]:
 def remove(engine: Engine, name: str) -> None:
     """Delete the account and end its sessions; what the person did keeps the name."""
     with writing(engine) as session:
-        session.delete(_row(session, name))
+        session.delete(row(session, name))
 
 
 def set_role(engine: Engine, name: str, role: str) -> None:
     """What the person may do from now on."""
     with writing(engine) as session:
-        account = _row(session, name)
+        account = row(session, name)
         account.role = _role(role)
         session.add(account)
 
@@ -57,7 +57,7 @@ def set_password(engine: Engine, name: str, password: str) -> None:
     """A new password; the account's sessions end."""
     digest = _hashed(password)
     with writing(engine) as session:
-        account = _row(session, name)
+        account = row(session, name)
         account.password = digest
         session.add(account)
         session.exec(delete(SignIn).where(col(SignIn.account_id) == account.id))
@@ -83,7 +83,8 @@ def person(account: Account) -> Person:
     return Person(account.name, role, account=True)
 
 
-def _row(session: Session, name: str) -> Account:
+def row(session: Session, name: str) -> Account:
+    """The account of that name; raises NotFound."""
     found = session.exec(select(Account).where(Account.name == name.lower())).first()
     if found is None:
         raise NotFound(f"no account {name}", hint="r2c2r user list")

@@ -51,7 +51,7 @@ def _refuse_last_admin(context: Context, name: str) -> None:
 
 def _one(context: Context, name: str) -> schemas.AccountInfo:
     with reading(context.engine) as session:
-        return _shape(context, session, session.exec(select(Account).where(Account.name == name.lower())).one())
+        return _shape(context, session, accounts.row(session, name))
 
 
 def _shape(context: Context, session: Session, account: Account) -> schemas.AccountInfo:

@@ -234,6 +234,13 @@ def test_what_the_command_line_changes_reaches_open_connections(shared: Running)
         assert closed_with(socket) == 4401
 
 
+def test_who_has_no_account_is_not_found(shared: Running) -> None:
+    with signed_in(shared, "the-admin") as admin:
+        for body in ({}, {"role": "reviewer"}, {"password": PASSWORD}):
+            assert admin.patch("/api/accounts/nobody", json=body).status_code == 404
+        assert admin.delete("/api/accounts/nobody").status_code == 404
+
+
 def test_the_last_admin_stays(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         assert admin.delete("/api/accounts/the-admin").status_code == 409
