@@ -10,7 +10,7 @@ from tests.app.conftest import FAKE_COMMANDS
 
 
 def main() -> None:
-    serve.create_app = partial(create_app, commands=FAKE_COMMANDS)
+    vars(serve)["create_app"] = partial(create_app, commands=FAKE_COMMANDS)
     data, port, names = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
     serve.serve(host="127.0.0.1", port=port, data_dir=data, names=names)
 

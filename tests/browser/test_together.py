@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
@@ -96,12 +97,22 @@ def sample(page: Page) -> str:
 
 
 def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
-    canvas = page.locator("r2c2r-frame-canvas canvas")
-    box = canvas.bounding_box()
+    at: Any = on_canvas(page, x, y)
+    page.locator("r2c2r-frame-canvas canvas").click(position=at, button=button)  # type: ignore[arg-type]
+
+
+def tap_frame(page: Page, x: float, y: float) -> None:
+    at: Any = on_canvas(page, x, y)
+    page.locator("r2c2r-frame-canvas canvas").tap(position=at)
+
+
+def on_canvas(page: Page, x: float, y: float) -> dict[str, float]:
+    """Where a pixel of the stored frame is drawn."""
+    box = page.locator("r2c2r-frame-canvas canvas").bounding_box()
     assert box
     scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
     left, top = (box["width"] - FRAME[0] * scale) / 2, (box["height"] - FRAME[1] * scale) / 2
-    canvas.click(position={"x": left + x * scale, "y": top + y * scale}, button=button)  # type: ignore[arg-type]
+    return {"x": left + x * scale, "y": top + y * scale}
 
 
 def rows(page: Page) -> Locator:
@@ -241,6 +252,31 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     for page in people:
         expect(page.locator("r2c2r-review-state")).to_contain_text("approved")
     picture(bea, "18-approved")
+
+
+def test_a_tablet_reaches_everything_by_touch(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+    ann = signed_in(context, server, "ann")
+    ann.goto(f"{sample(ann)}/annotate?frame=3")
+    ready(ann)
+    tap_frame(ann, 60, 60)
+    expect(rows(ann)).to_have_count(3)
+    ann.get_by_role("button", name="Take away").tap()
+    tap_frame(ann, 30, 90)
+    expect(rows(ann).last).to_contain_text("2 clicks")
+    drawer = ann.get_by_role("complementary", name="Depth, shape and comments")
+    expect(drawer).to_be_hidden()
+    ann.get_by_role("button", name="Depth, shape, comments").tap()
+    expect(drawer).to_be_visible()
+    expect(drawer.get_by_role("img", name=re.compile("^Depth of this frame"))).to_be_visible()
+    picture(ann, "19-tablet")
+    drawer.get_by_role("button", name="Close").tap()
+    expect(drawer).to_be_hidden()
+    lane = ann.get_by_role("img", name=re.compile("^drawer_2: seen")).bounding_box()
+    assert lane
+    ann.touchscreen.tap(lane["x"] + lane["width"] - 3, lane["y"] + lane["height"] / 2)
+    expect(ann.locator("r2c2r-film-strip output")).to_contain_text("frame 7 ")
+    context.close()
 
 
 def say(page: Page, button: str, text: str) -> None:

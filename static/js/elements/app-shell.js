@@ -50,7 +50,7 @@ export class AppShell extends LiveElement {
     help.addEventListener("click", () => this.#help.toggle());
     const palette = h(
       "button",
-      { class: "quiet palette-button", type: "button", "aria-label": "Commands" },
+      { class: "quiet palette-button", type: "button", "aria-label": "Commands Ctrl K" },
       h("span", {}, "Commands "),
       h("kbd", {}, "Ctrl K"),
     );
