@@ -65,6 +65,8 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
     pose = entry.get("pose")
     if pose is not None and np.shape(pose) != (4, 4):
         raise OverrideError(f"{where}: {name}.pose has shape {np.shape(pose)}", hint="expected a 4x4 world_from_object")
+    if pose is not None and not _is_rigid(np.asarray(pose, dtype=np.float64)):
+        raise OverrideError(f"{where}: {name}.pose moves nothing rigidly", hint="expected a rotation and a translation")
     limits = entry.get("joint_limits")
     if limits is not None and (np.shape(limits) != (2,) or limits[0] > limits[1]):
         raise OverrideError(f"{where}: {name}.joint_limits is {limits!r}", hint="expected [lower, upper]")
@@ -88,6 +90,14 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
         rejected=tuple(entry.get("rejected", ())),
         regenerate=regenerate,
     )
+
+
+def _is_rigid(pose: np.ndarray) -> bool:
+    """Whether a 4x4 is a rotation (within what rounding to two decimals does to it) and a translation."""
+    rotation = pose[:3, :3]
+    if not np.isfinite(pose).all() or not np.allclose(pose[3], (0.0, 0.0, 0.0, 1.0)):
+        return False
+    return bool(np.allclose(rotation.T @ rotation, np.eye(3), atol=0.03) and np.linalg.det(rotation) > 0)
 
 
 def _refuse_unknown(where: str, what: str, entry: Any, known: tuple[str, ...]) -> None:

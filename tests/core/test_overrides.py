@@ -41,6 +41,8 @@ def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
         ({"objects": {"door": {"dimensions_m": [1, 2, -1]}}}, "positive"),
         ({"objects": {"door": {"joint_limits": [2, 1]}}}, "lower, upper"),
         ({"objects": {"door": {"pose": [[1]]}}}, "4x4"),
+        ({"objects": {"door": {"pose": [[0] * 4] * 4}}}, "rigidly"),
+        ({"objects": {"door": {"pose": [[float("nan")] * 4] * 4}}}, "rigidly"),
         ({"scene": {"gravity": 1}}, "unknown key 'gravity'"),
         ({"scene": {"walls": [[0, 1]]}}, "scene.walls"),
     ],

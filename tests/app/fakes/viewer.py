@@ -47,5 +47,7 @@ for line in sys.stdin:
     if command["cmd"] == "joints":
         joints = [{"name": name, "lower": 0.0, "upper": 1.0, "value": value} for name, value in command["values"].items()]
         answer = {"mode": "scene", "text": "moved", "joints": joints}
+    if command["cmd"] == "place":
+        answer = {"pose": command["pose"]}
     sys.stdout.write(json.dumps({"id": command["id"], "ok": answer}) + "\n")
     sys.stdout.flush()
