@@ -73,3 +73,11 @@ test("what disagrees with somebody else's change is merged, and sent as another 
   assert.deepEqual(asked.map(({ body }) => body.version), [7, 8]);
   assert.notEqual(asked[0].key, asked[1].key);
 });
+
+test("of two corrections of different things both stay; the second is sent again over the first", async () => {
+  globalThis.HTMLElement ??= class {};
+  const { merged } = await import("../../static/js/conflict.js");
+  const mine = { ...change("/override", { hinge: "left", rerun: true, version: 3 }), seen: { hinge: null, pose: null } };
+  const stored = { version: 5, override: { hinge: null, pose: [[1]] }, group: { name: "door", candidates: [] } };
+  assert.deepEqual((await merged(mine, stored)).json, { hinge: "left", rerun: true, version: 5 });
+});

@@ -167,7 +167,7 @@ export class AnnotatePage extends LiveElement {
     on(live, "mask", (mask) => this.#receive(mask));
     on(live, "segment", (message) => this.#segment(message));
     on(live, "live", ({ status }) => this.#stage.segmenter.show(status));
-    on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#reload());
+    on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#begunAnew());
     on(outbox, "caught-up", () => this.#player.frame && this.#reload());
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
     document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
@@ -190,11 +190,17 @@ export class AnnotatePage extends LiveElement {
       this.#player.seekFrame(Number(this.query.get("frame") ?? -1));
       await this.#reload();
       this.#select(this.query.has("object") ? Number(this.query.get("object")) : null);
-      this.#stage.segmenter.show(await api.openLive(this.project));
+      await this.#stage.segmenter.open(api.openLive(this.project));
     } catch (error) {
       this.#tip.textContent = error instanceof Error ? error.message : String(error);
       sayError(error);
     }
+  }
+
+  /** The server was started again: its segmenter is to be opened anew. */
+  #begunAnew() {
+    this.#reload();
+    this.#stage.segmenter.open(api.openLive(this.project)).catch(sayError);
   }
 
   async #reload() {
