@@ -30,7 +30,7 @@ class Obstacles:
 
 def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> list[SceneObject]:
     """The objects, each joint's upper limit lowered to where its free sweep ends; joints in `kept` are a person's."""
-    obstacles = _gather(objects)
+    obstacles = gathered(objects)
     result = []
     for index, item in enumerate(objects):
         joints, warnings = [], []
@@ -62,7 +62,7 @@ def free_travel(
     child_index = next(i for i, link in enumerate(item.links) if link.name == joint.child)
     child = item.links[child_index]
     others = ~((obstacles.owner == index) & (obstacles.link == child_index))
-    moving = _link_boxes(item, child)
+    moving = link_boxes(item, child)
     near = others & _within_reach(obstacles.boxes, item, joint, moving)
     corners = _corners(moving)
     near_walls = [wall for wall, depth in zip(walls, _wall_depths(corners, walls), strict=True) if depth < _BEHIND_M]
@@ -131,7 +131,7 @@ def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) 
     return np.asarray(np.linalg.norm(boxes.centres - centre, axis=1) - np.linalg.norm(boxes.halves, axis=1) < reach)
 
 
-def _gather(objects: Sequence[SceneObject]) -> Obstacles:
+def gathered(objects: Sequence[SceneObject]) -> Obstacles:
     """Boxes of everything that stands still; things that can be pushed aside do not limit a hinge."""
     parts: list[Boxes] = []
     owner: list[int] = []
@@ -140,7 +140,7 @@ def _gather(objects: Sequence[SceneObject]) -> Obstacles:
         for link_index, link in enumerate(item.links):
             if item.movable or not link.boxes:
                 continue
-            boxes = _link_boxes(item, link)
+            boxes = link_boxes(item, link)
             parts.append(boxes)
             owner += [index] * len(boxes.centres)
             number += [link_index] * len(boxes.centres)
@@ -152,7 +152,8 @@ def _gather(objects: Sequence[SceneObject]) -> Obstacles:
     return Obstacles(boxes=joined, owner=np.array(owner), link=np.array(number))
 
 
-def _link_boxes(item: SceneObject, link: Link) -> Boxes:
+def link_boxes(item: SceneObject, link: Link) -> Boxes:
+    """A link's boxes in the world, closed."""
     world_from_link = item.world_from_object @ link.object_from_link
     return _stacked([_in_world(box, world_from_link) for box in link.boxes])
 

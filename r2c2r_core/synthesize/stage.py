@@ -22,6 +22,8 @@ from r2c2r_core.synthesize.joints import Hinge, choose_hinges
 from r2c2r_core.synthesize.layout import arrange
 from r2c2r_core.synthesize.opening import open_all
 from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
+from r2c2r_core.synthesize.slabs import Slab
+from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 
 _WOOD = (0.80, 0.76, 0.70)
@@ -35,6 +37,7 @@ class SynthesizeConfig:
     version: int = 2  # of the stage's code, so that a changed method re-runs
     seed: int = 0
     box: BoxSearch = "upright"  # "powell" is the paper's, for comparison (benchmarks/boxes.json)
+    surroundings: bool = True  # worktops and plinths that the scan shows and nobody clicked
 
 
 def build_scene(
@@ -74,9 +77,12 @@ def build_scene(
         return _fixture(item, hinge, overrides.of(item.name))
 
     kept = frozenset(j.name for o in built for j in o.joints if overrides.of(o.name).joint_upper is not None)
+    opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
+    made = surroundings_of(capture, layout.objects) if config.surroundings else []
+    opened += standing_clear(opened, made, _painted, capture.room.walls, kept)
     return ArticulatedScene(
         name=capture.name,
-        objects=tuple(open_all(built, hinges, rebuild, capture.room.walls, kept)),
+        objects=tuple(opened),
         layout_moves_m=layout.moves_m,
         warnings=layout.warnings,
     )
@@ -112,6 +118,12 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         warnings=tuple(warnings),
         final_from_placed=item.world_from_object @ item.placed_pose.inverse,
     )
+
+
+def _painted(item: MeasuredObject, slab: Slab) -> SceneObject:
+    """A fixture of one board, in its colour in the scan: no mesh will dress it."""
+    board = _fixture(item, None, ObjectOverride())
+    return replace(board, links=tuple(replace(link, colour=slab.colour) for link in board.links))
 
 
 def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: int) -> SceneObject:

@@ -1,0 +1,102 @@
+"""What closes a kitchen and nobody clicks: worktops and plinths, from the scan, in the way of nothing."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+
+from r2c2r_core.geometry.boxes import Boxes, box_penetration
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture, Wall
+from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.synthesize.clearance import gathered, link_boxes, open_freely
+from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.fixtures.table import fixture_for
+from r2c2r_core.synthesize.plinths import plinth_runs, plinths
+from r2c2r_core.synthesize.slabs import Slab, facets_of
+from r2c2r_core.synthesize.worktops import runs_of, worktop
+
+MADE = "made from the scan: nobody clicked it"
+_APART_M = 0.0004  # from all that stands still, and from every closed front
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surrounding:
+    """A counter or a plinth that is to be built."""
+
+    name: str
+    category: str
+    slab: Slab
+
+    def measured(self, slab: Slab) -> MeasuredObject:
+        """It as if it had been clicked, with its slab or a smaller one."""
+        pose = Rigid3(slab.rotation, slab.rotation @ ((slab.low + slab.high) / 2))
+        return MeasuredObject(
+            name=self.name,
+            category=self.category,
+            spec=fixture_for(self.category)[0],
+            world_from_object=pose,
+            dimensions_m=slab.high - slab.low,
+            sources=slab.sources,
+            handle=None,
+            support_z_m=None,
+            front_measured=False,
+            confidence=1.0,
+            fixed_by_person=False,
+            placed_pose=pose,
+            warnings=(MADE, *slab.notes),
+        )
+
+
+def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject]) -> list[Surrounding]:
+    """Counters over the runs of base units and plinths below them; none where a person clicked one.
+
+    None without a floor either: by their height above it base units are known.
+    """
+    if not capture.room.floor_found:
+        return []
+    facets, counters, boards = facets_of(capture.surface), list[Slab](), list[Slab]()
+    for run in runs_of(objects):
+        counters += worktop(capture, facets, run, objects, counters)
+    for run in plinth_runs(objects):
+        boards += plinths(facets, run, objects, boards)
+    names = {item.name for item in objects}
+    return [*_named("counter", counters, names), *_named("plinth", boards, names)]
+
+
+def standing_clear(
+    opened: Sequence[SceneObject],
+    made: Sequence[Surrounding],
+    build: Callable[[MeasuredObject, Slab], SceneObject],
+    walls: Sequence[Wall],
+    kept: frozenset[str],
+) -> list[SceneObject]:
+    """The surroundings, built, that touch nothing and shorten no joint; a counter that would tries it without overhang."""
+    standing = [build(item.measured(item.slab), item.slab) for item in made]
+    if _clear(opened, standing, walls, kept):  # nearly always: one look at every joint instead of one a piece
+        return standing
+    standing = []
+    for item in made:
+        slabs = (item.slab,) if item.slab.flush_m is None else (item.slab, item.slab.flush)
+        pieces = (build(item.measured(slab), slab) for slab in slabs)
+        standing += [piece for piece in pieces if _clear(opened, [piece], walls, kept)][:1]
+    return standing
+
+
+def _clear(opened: Sequence[SceneObject], pieces: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> bool:
+    """Whether the pieces touch nothing of the scene, and every joint opens as far beside them as without them."""
+    boxes = gathered(opened).boxes
+    for own in (link_boxes(piece, link) for piece in pieces for link in piece.links):
+        repeated = Boxes(*(np.repeat(part, len(boxes.centres), axis=0) for part in own))
+        if (box_penetration(repeated, boxes) > -_APART_M).any():
+            return False
+    beside = open_freely([*opened, *pieces], walls, kept)[: len(opened)]
+    uppers, before = ([joint.upper for item in items for joint in item.joints] for items in (beside, opened))
+    return all(upper >= free - 1e-9 for upper, free in zip(uppers, before, strict=True))
+
+
+def _named(category: str, slabs: Sequence[Slab], taken: set[str]) -> list[Surrounding]:
+    """The slabs with the first numbers that no object has."""
+    free = (name for number in count(1) if (name := f"{category}_{number}") not in taken)
+    return [Surrounding(name=name, category=category, slab=slab) for name, slab in zip(free, slabs, strict=False)]

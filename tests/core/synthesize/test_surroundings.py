@@ -1,0 +1,167 @@
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.support import supported
+from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.model.capture import Capture, SceneSurface, Wall
+from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
+from r2c2r_core.warp.stage import WarpConfig, fit_meshes
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
+from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, sweep
+
+Corner = tuple[float, float, float]
+
+CAB_L = Unit("cab_l", "cabinet", (0.0, 0.0, 0.48), (0.6, 0.56, 0.74), handle=Handle(0.24, 0.2))
+CAB_R = Unit("cab_r", "cabinet", (0.603, 0.0, 0.48), (0.6, 0.56, 0.74), handle=Handle(-0.24, 0.2))
+UPPER = Unit("upper_drawer", "drawer", (1.206, 0.0, 0.7485), (0.6, 0.56, 0.203), handle=Handle(0, 0, vertical=False))
+LOWER = Unit("lower_drawer", "drawer", (1.206, 0.0, 0.377), (0.6, 0.56, 0.534), handle=Handle(0, 0.1, vertical=False))
+FRIDGE = Unit("fridge", "fridge", (-0.61, -0.02, 0.9), (0.6, 0.6, 1.8), handle=Handle(-0.24, 0.2, length=0.4), kind="appliance")
+WALL_UNIT = Unit("wall_unit", "wall_cabinet", (0.0, 0.1, 1.7), (0.6, 0.35, 0.7), handle=Handle(0.24, -0.2))
+BOTTLE = Unit("bottle", "bottle", (0.9, 0.0, 1.012), (0.08, 0.08, 0.23), kind="thing")
+RUN = (CAB_L, CAB_R, UPPER, LOWER, FRIDGE, WALL_UNIT)
+WORKTOP = ((-0.3, -0.295, 0.86), (1.506, 0.28, 0.892))  # 15 mm over the fronts
+PLINTH = ((-0.3, -0.22, 0.0), (1.506, -0.2, 0.1))
+BEHIND = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-0.30, area_m2=5.0)
+BROWN = (150, 90, 30)
+
+
+def scanned(*solids: tuple[Corner, Corner]) -> Capture:
+    """A capture whose surface is these boxes, cut into faces of centimetres as a fused scan is."""
+    from trimesh import Trimesh
+    from trimesh.util import concatenate
+
+    parts = [Trimesh(*box_mesh(np.array(low), np.array(high))).subdivide_to_size(0.04, max_iter=20) for low, high in solids]
+    joined = concatenate(parts) if parts else Trimesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
+    count = len(joined.vertices)
+    surface = SceneSurface(
+        vertices_world=np.asarray(joined.vertices, dtype=np.float64),
+        faces=np.asarray(joined.faces, dtype=np.int64),
+        colours=np.tile(np.array(BROWN, np.uint8), (count, 1)),
+        voxel_m=0.01,
+    )
+    return replace(capture((BEHIND,)), surface=surface)
+
+
+def built(units: Sequence[Unit], scan: Capture, *, on: bool = True) -> ArticulatedScene:
+    rng = np.random.default_rng(0)
+    tracks, placements, assets = zip(*[placed_unit(u, rng) for u in units], strict=True)
+    config = SynthesizeConfig(surroundings=on)
+    return build_scene(scan, tracks, placements, assets, Overrides(objects={}), config)
+
+
+@cache
+def kitchen() -> ArticulatedScene:
+    return built((*RUN, BOTTLE), scanned(WORKTOP, PLINTH))
+
+
+def of(scene: ArticulatedScene, category: str) -> list[SceneObject]:
+    return [item for item in scene.objects if item.category == category]
+
+
+def bounds(item: SceneObject) -> tuple[np.ndarray, np.ndarray]:
+    centre, reach = item.world_from_object.translation, np.abs(item.world_from_object.rotation) @ item.dimensions_m / 2
+    return centre - reach, centre + reach
+
+
+def test_a_worktop_that_nobody_clicked_lies_on_the_units_at_the_scanned_height() -> None:
+    (counter,) = of(kitchen(), "counter")
+    low, high = bounds(counter)
+    np.testing.assert_allclose(high[2], 0.892, atol=1e-3)
+    np.testing.assert_allclose(low[2], 0.852, atol=1e-3)  # the units' tops, and what keeps them apart
+    np.testing.assert_allclose(low[1], -0.295, atol=0.006)  # hangs over the fronts as the scan shows
+    np.testing.assert_allclose(high[1], 0.30, atol=0.002)  # the wall
+    np.testing.assert_allclose([low[0], high[0]], [-0.3, 1.506], atol=0.02)  # not over the refrigerator
+    np.testing.assert_allclose(counter.links[0].colour, np.array(BROWN) / 255, atol=0.01)
+    assert any("nobody clicked it" in line for line in counter.warnings)
+    assert counter.name == "counter_1"
+
+
+def test_a_plinth_closes_the_run_where_the_scan_shows_it() -> None:
+    (plinth,) = of(kitchen(), "plinth")
+    low, high = bounds(plinth)
+    np.testing.assert_allclose(low[1], -0.22, atol=0.003)
+    assert 0 < low[2] < 0.002
+    np.testing.assert_allclose(high[2], 0.108, atol=2e-3)
+    assert plinth.fixture == "fixed_panel"
+
+
+def test_neither_touches_anything_nor_shortens_a_joint() -> None:
+    model = compile_scene(kitchen())
+    assert deepest_contact(model) < 5e-4
+    assert max(sweep(kitchen(), model).values()) < 1e-3
+    without = {j.name: j.upper for o in built(RUN, scanned(WORKTOP, PLINTH), on=False).objects for j in o.joints}
+    assert {j.name: j.upper for o in kitchen().objects for j in o.joints} == without
+
+
+def test_the_layout_is_what_it_is_without_them() -> None:
+    alone = built((*RUN, BOTTLE), scanned(WORKTOP, PLINTH), on=False)
+    assert kitchen().layout_moves_m == alone.layout_moves_m
+    assert [o.name for o in kitchen().objects][: len(alone.objects)] == [o.name for o in alone.objects]
+
+
+def test_a_bottle_stands_on_the_counter_and_needs_no_plate() -> None:
+    assert not any(body.is_support for body in supported(plan_bundle(kitchen())).bodies)
+
+
+def test_the_fit_leaves_them_as_they_are() -> None:
+    rng = np.random.default_rng(0)
+    tracks, placements, assets = zip(*[placed_unit(u, rng) for u in (*RUN, BOTTLE)], strict=True)
+    fitted = fit_meshes(kitchen(), tracks, placements, assets, WarpConfig())
+    assert of(fitted, "counter") == of(kitchen(), "counter")
+
+
+@pytest.mark.parametrize(
+    "solids",
+    [
+        (),
+        (((0.2, -0.1, 0.86), (0.45, 0.15, 0.9)),),  # a tray: level, but no worktop
+        (((-0.3, -0.28, 1.1), (1.5, 0.28, 1.12)),),  # a shelf
+    ],
+)
+def test_without_evidence_there_is_no_counter(solids: tuple[tuple[Corner, Corner], ...]) -> None:
+    assert not of(built(RUN, scanned(*solids)), "counter")
+
+
+def test_a_plinth_that_no_camera_saw_is_set_back_as_usual() -> None:
+    (plinth,) = of(built(RUN, scanned(WORKTOP)), "plinth")
+    np.testing.assert_allclose(bounds(plinth)[0][1], -0.28 + 0.05, atol=2e-3)
+    assert any("inferred" in line for line in plinth.warnings)
+
+
+def test_a_clicked_counter_is_the_only_one_and_names_stay_unique() -> None:
+    clicked = Unit("worktop", "counter", (0.603, 0.0, 0.876), (1.806, 0.59, 0.032), kind="thing")
+    assert [o.name for o in of(built((*RUN, clicked), scanned(WORKTOP, PLINTH)), "counter")] == ["worktop"]
+    bottle = replace(BOTTLE, name="counter_1")
+    scene = built((*RUN, bottle), scanned(WORKTOP, PLINTH))
+    assert [o.name for o in of(scene, "counter")] == ["counter_2"]
+
+
+def test_a_cooker_in_the_run_parts_the_counter() -> None:
+    cooker = Unit("cooker", "oven", (0.603, 0.0, 0.448), (0.6, 0.6, 0.895), handle=Handle(0, 0.3, length=0.4, vertical=False))
+    scene = built((CAB_L, cooker, UPPER, LOWER), scanned(WORKTOP, PLINTH))
+    ends = sorted(tuple(float(edge[0]) for edge in bounds(o)) for o in of(scene, "counter"))
+    assert len(ends) == 2
+    assert ends[0][1] < 0.303 < 0.903 < ends[1][0]
+    assert deepest_contact(compile_scene(scene)) < 5e-4
+
+
+def test_counters_of_two_runs_meet_at_the_corner_without_overlap() -> None:
+    side = [
+        replace(CAB_L, name="side_1", centre=(1.836, -0.66, 0.48), yaw=-np.pi / 2),
+        replace(CAB_R, name="side_2", centre=(1.836, -1.263, 0.48), yaw=-np.pi / 2),
+    ]
+    top_2 = ((1.541, -1.57, 0.86), (2.13, 0.28, 0.892))
+    along = ((-0.3, -0.295, 0.86), (1.6, 0.28, 0.892))
+    scene = built((CAB_L, CAB_R, UPPER, LOWER, *side), scanned(along, top_2))
+    first, second = (bounds(o) for o in of(scene, "counter"))
+    assert first[1][0] > 2.09  # the longer run takes the corner
+    gap = first[0][1] - second[1][1]
+    assert 0 < gap < 0.01
+    assert deepest_contact(compile_scene(scene)) < 5e-4
