@@ -26,6 +26,7 @@ _INDEPENDENT = 12.0  # outline pixels, and depth points, of one frame that err o
 _ROBUST = 2.5  # of the noise: further off is something else
 _SHIFT_M = 0.006  # a frame's pose error, across the view
 _WALL_M = 0.003  # how far a box may stand in a wall
+_YAW_RAD = np.pi  # the local frame's own yaw says next to nothing
 _USUAL_DEPTH, _DEPTH_SPREAD = 0.5, 0.35  # of the width: all that is known of a box seen squarely
 _STARTS = (0.25, 0.5, 1.0)  # depths to start from, of the width
 _SAME_YAW = np.radians(2.0)
@@ -33,6 +34,7 @@ _NO_BOX_M = 0.012  # depth points lie this far from anything that is no box
 _ROUGH_ROUNDS, _ROUNDS = 8, 12
 _ALONG_PX = 2.5  # depth pixels to either side of an outline, where it is judged whose outline it is
 _BEFORE_M = 0.03
+_WALL_ROW, _USUAL_ROW = -3, -1  # of the residuals: what no frame shows of the depth
 
 
 class Cuboid(NamedTuple):
@@ -40,7 +42,8 @@ class Cuboid(NamedTuple):
 
     world_from_cuboid: Rigid3  # origin at its centre, +Z up, -Y towards the cameras
     size_m: Vector3
-    sigma_m: Vector3  # standard deviation of each size
+    sigma_m: Vector3  # standard deviation of each size by what the frames show
+    depth_spread_m: float  # of the depth by all that is known: walls and what is usual too
     cost: float
 
 
@@ -59,14 +62,11 @@ def fit_cuboid(
     views: Sequence[View],
     world_from_local: Rigid3,
     walls: Sequence[Wall],
-    *,
-    yaw_sigma_rad: float = np.pi,
 ) -> Cuboid | None:
     """The box nearest to points and outlines, from the box `low`..`high` of the local frame; None without three outlines,
     or where the points lie on no box.
 
-    The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame. `yaw_sigma_rad` is how
-    well the local frame's own yaw is known.
+    The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame.
     """
     outlines = [found for view in views if (found := _own_outline(view)) is not None]
     if len(outlines) < 3:
@@ -74,9 +74,9 @@ def fit_cuboid(
     chosen = points_local[:: max(len(points_local) // _POINTS, 1)]
     bottom = float(low[2])
     coarse = [o._replace(uv_px=o.uv_px[::4]) for o in outlines]
-    rough = _Problem(chosen[::4], coarse, world_from_local, walls, bottom, yaw_sigma_rad)
+    rough = _Problem(chosen[::4], coarse, world_from_local, walls, bottom)
     tried = [rough.fitted(start, _ROUGH_ROUNDS) for start in _starts(chosen, float(high[2]))]
-    problem = _Problem(chosen, outlines, world_from_local, walls, bottom, yaw_sigma_rad)
+    problem = _Problem(chosen, outlines, world_from_local, walls, bottom)
     start = min(tried, key=lambda found: found[1])[0]
     if rough.median_distance(start) > _NO_BOX_M:
         return None
@@ -86,7 +86,8 @@ def fit_cuboid(
         return None
     rotation = rotation_about_z(float(best[0]))
     middle = np.array([best[1] + best[2], best[3] + best[4], best[5] + low[2]]) / 2
-    return Cuboid(world_from_local @ Rigid3(rotation, rotation @ middle), sizes, problem.size_sigma(best), cost)
+    seen, known = problem.size_sigma(best, (_WALL_ROW, _USUAL_ROW)), problem.size_sigma(best, ())
+    return Cuboid(world_from_local @ Rigid3(rotation, rotation @ middle), sizes, seen, float(known[1]), cost)
 
 
 def _starts(points: Points, top_m: float) -> list[np.ndarray]:
@@ -106,6 +107,18 @@ def surface_distance(cuboid: Cuboid, points_world: Points) -> np.ndarray:
     return _box_distance(cuboid.world_from_cuboid.inverse.apply(points_world), np.asarray(cuboid.size_m) / 2)
 
 
+def room_behind(cuboid: Cuboid, walls: Sequence[Wall]) -> float:
+    """How much deeper the box may be before its back stands in a wall, metres; infinite where none is behind it."""
+    corners = cuboid.world_from_cuboid.apply(box_corners(cuboid.size_m))
+    into = cuboid.world_from_cuboid.rotation[:, 1]
+    free = [
+        (float((corners @ wall.normal).min() - wall.offset_m) + _WALL_M) / float(-wall.normal @ into)
+        for wall in walls
+        if wall.normal @ into < -0.1
+    ]
+    return max(min(free, default=np.inf), 0.0)
+
+
 class _Problem:
     """Residuals of a box (yaw, left, right, front, back, top; local frame) and their weights."""
 
@@ -116,7 +129,6 @@ class _Problem:
         world_from_local: Rigid3,
         walls: Sequence[Wall],
         bottom_m: float,
-        yaw_sigma_rad: float,
     ) -> None:
         self._points, self._outlines, self._bottom_m = points, outlines, bottom_m
         self._cameras = [o.view.world_from_camera.inverse @ world_from_local for o in outlines]
@@ -128,7 +140,7 @@ class _Problem:
         counts = [len(o.uv_px) for o in outlines]
         depth = np.full(len(points), _INDEPENDENT * len(outlines) / max(len(points), 1) / _DEPTH_M**2)
         outline = [np.full(n, _INDEPENDENT / n / _OUTLINE_M**2) for n in counts]
-        self._weights = np.concatenate([depth, *outline, [1.0 / _WALL_M**2, 1.0 / yaw_sigma_rad**2, 1.0]])
+        self._weights = np.concatenate([depth, *outline, [1.0 / _WALL_M**2, 1.0 / _YAW_RAD**2, 1.0]])
         scales = np.repeat([_ROBUST * _DEPTH_M, _ROBUST * _OUTLINE_M, np.inf], [len(points), sum(counts), 3])
         self._scales: np.ndarray = scales
 
@@ -160,11 +172,12 @@ class _Problem:
         """Of the depth points from the box's surface, metres."""
         return float(np.median(np.abs(self._residuals(parameters)[: len(self._points)])))
 
-    def size_sigma(self, parameters: np.ndarray) -> Vector3:
-        """Standard deviation of width, depth and height by the curvature at the fit, the depth's prior left out."""
+    def size_sigma(self, parameters: np.ndarray, left_out: tuple[int, ...]) -> Vector3:
+        """Standard deviation of width, depth and height by the curvature at the fit, some rows left out."""
         residual = self._residuals(parameters)
-        slope = self._slope(parameters, residual)[:-1]
-        weight = (self._weights / (1.0 + (residual / self._scales) ** 2))[:-1]
+        slope = self._slope(parameters, residual)
+        weight = self._weights / (1.0 + (residual / self._scales) ** 2)
+        weight[list(left_out)] = 0.0
         covariance = np.linalg.pinv(slope.T @ (slope * weight[:, None]) + 1e-3 * np.eye(6))
         difference = np.array([[0, -1, 1, 0, 0, 0], [0, 0, 0, -1, 1, 0], [0, 0, 0, 0, 0, 1]], dtype=np.float64)
         return np.asarray(np.sqrt(np.diag(difference @ covariance @ difference.T)))

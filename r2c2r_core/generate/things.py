@@ -7,7 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.generate.carved import Seen, carved_shape, observe_thing
 from r2c2r_core.generate.consistency import self_consistency
-from r2c2r_core.generate.cuboid import Cuboid, fit_cuboid, surface_distance
+from r2c2r_core.generate.cuboid import Cuboid, fit_cuboid, room_behind, surface_distance
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.lathe import fit_lathe, is_round, lathe_mesh
 from r2c2r_core.generate.shape import Shape
@@ -17,7 +17,7 @@ from r2c2r_core.generate.vessel import find_handle, is_open_vessel, vessel_mesh
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 
-_LATHE_FIT, _CUBOID_FIT = 0.75, 0.8  # a model below it is compared with what carving gives
+_LATHE_FIT, _CUBOID_FIT = 0.75, 0.8  # below it carving is tried: a lathe is compared with it, a box given up
 _SIMPLER = 0.05  # carving copies the masks' errors: it has to agree with them better than a clean shape
 _BOX_M, _FAR_SHARE = 0.006, 0.1  # median distance of a box's points from it, and the share that may be far from it
 _FAR_M = 0.015
@@ -53,13 +53,14 @@ def _lathe_shape(evidence: Evidence, variation: Variation, revolution: Revolutio
 
 
 def _cuboid_shape(evidence: Evidence, variation: Variation) -> Shape | None:
-    """A flat-sided box, where the points lie on one, as deep as the draw has it within what the scan leaves open."""
+    """A flat-sided box, where the points lie on one, as deep as the draw has it within what is known of the depth."""
     found = _cuboid(evidence)
     if found is None:
         return None
     size, sigma = np.array(found.size_m), float(found.sigma_m[1])
     low = -size / 2  # the front, which was seen, stays
-    size[1] = max(size[1] + sigma * variation.depth_draw, 0.3 * size[1])
+    deeper = min(found.depth_spread_m * variation.depth_draw, room_behind(found, evidence.capture.room.walls))
+    size[1] = max(size[1] + deeper, 0.3 * size[1])
     parameters = {"boxed": 1.0, "depth_sigma_m": sigma}
     return _model(*box_mesh(low, low + size), found.world_from_cuboid, parameters)
 

@@ -111,8 +111,8 @@ def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
     """An upright ring whose outer edge is where the handle ends; its inner part is cut off by the hollow."""
     bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
     middle = 0.55 * top + 0.45 * bottom
-    outer = _TALLEST * (top - bottom)
     radius = float(np.interp(middle, revolution.heights_m, revolution.radii_m))
+    outer = min(_TALLEST * (top - bottom), radius)  # of a tall jug, a larger ring would come out on the other side
     centre = radius + max(handle.reach_m - outer, -0.4 * outer)
     disc, hole = (
         lathe_mesh(Revolution(np.zeros(2), np.array([-half, half]), np.full(2, size)))

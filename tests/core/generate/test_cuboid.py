@@ -1,5 +1,7 @@
 """The depth of a small carton, by how much of it the cameras went round."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,3 +48,18 @@ def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
     depths = [np.ptp(shape.vertices_local[:, 1]) for shape in shapes]
     assert np.std(depths) > 0.2 * shapes[0].parameters["depth_sigma_m"]
     assert all(is_watertight(s.vertices_local, s.faces) and is_manifold(s.vertices_local, s.faces) for s in shapes)
+
+
+def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
+    scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0)
+    evidence = gather_evidence(*scene, 12)
+    for draw in (-1.5, 0.5, 1.5):
+        shape = thing_shape(evidence, replace(whole_pool(evidence), depth_draw=draw))
+        assert shape.parameters["boxed"] == 1.0
+        assert np.ptp(shape.vertices_local[:, 1]) < SIZE[0]
+        assert shape.vertices_world[:, 1].max() < SIZE[1] + 0.05 + 0.01  # the wall is 5 cm behind, found within 1 cm
+
+
+def test_a_depth_that_only_the_wall_ends_is_not_called_seen():
+    shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0, wall_gap_m=0.01))
+    assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])

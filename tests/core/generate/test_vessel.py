@@ -45,3 +45,13 @@ def test_vessels_are_closed_manifold_and_outward(handle):
 def test_names_say_what_opens_upwards():
     assert all(is_open_vessel(name) for name in ("mug", "coffee_mug", "bowls", "plant pot"))
     assert not any(is_open_vessel(name) for name in ("bottle", "cupboard", "teapot", "panel", "potato", "jar"))
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 2.0])
+def test_the_handle_of_a_tall_jug_stays_on_its_side(azimuth):
+    jug = Revolution(np.zeros(2), np.array([0.0, 0.15, 0.3]), np.full(3, 0.05))
+    vertices, faces = vessel_mesh(jug, VesselHandle(azimuth, 0.05))
+    out = np.array([np.cos(azimuth), np.sin(azimuth)])
+    assert (vertices[:, :2] @ -out).max() == pytest.approx(0.05, abs=0.001)
+    assert (vertices[:, :2] @ out).max() == pytest.approx(0.10, abs=0.001)
+    assert is_watertight(vertices, faces)
