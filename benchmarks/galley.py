@@ -154,6 +154,7 @@ def _moved_track(track: MaskTrack, new_from_old: Rigid3) -> MaskTrack:
         masks={index + _SECOND: mask for index, mask in track.masks.items()},
         confidence={index + _SECOND: value for index, value in track.confidence.items()},
         opened_m={index + _SECOND: value for index, value in track.opened_m.items()},
+        swung={index + _SECOND: swing for index, swing in track.swung.items()},
         front=None if front is None else replace(front, world_from_front=new_from_old @ front.world_from_front),
         box=None if box is None else replace(box, world_from_object=new_from_old @ box.world_from_object),
     )

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.geometry.camera import project
+from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.fronts import Front, side_corners, side_faces
 from r2c2r_core.segment.scene import Scene
@@ -94,8 +94,8 @@ def _profile(scene: Scene, frame: Frame, points: Points) -> np.ndarray | None:
     if inside.sum() < _LEAST_ROWS:
         return None
     uv, z = uv[inside], z[inside]
-    at = (uv * [sensor.width / camera.width, sensor.height / camera.height]).astype(int)
-    depth = scene.depth(frame.index)[at[..., 1], at[..., 0]]
+    read, known = sample_nearest(scene.depth(frame.index), project(local, sensor))
+    depth = np.where(known, read, 0.0).reshape(points.shape[:2])[inside]
     near_end = np.abs(depth - z)[:, : round(_OWN_M / _STEP_M)] < _ON_SIDE_M
     hidden = (depth > 0) & (depth < z - _ON_SIDE_M)
     shown = (near_end.mean(axis=1) > 0.6) & ~hidden.any(axis=1)

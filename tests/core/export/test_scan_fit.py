@@ -6,10 +6,11 @@ import pytest
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.preview import scene_soup, soup_faces
 from r2c2r_core.export.scan_fit import f_score, scan_fits
-from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.geometry.masks import pack_mask, unpack_mask
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Depth
 from r2c2r_core.model.reconstruction import Reconstruction
+from r2c2r_core.model.track import Swing
 from tests.core.export.kitchen import GreyImages, kitchen, reconstruction
 
 
@@ -63,6 +64,27 @@ def test_surface_that_something_unnamed_hides_is_not_judged() -> None:
     covered = filmed(0.0, hidden_columns=left + width // 2)
     assert covered.tracks[0].masks[0].area_px < 0.7 * item.tracks[0].masks[0].area_px
     assert scan_fits(covered, plan_bundle(item.scene))[name].f_score_1cm == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
+    """The widest front of the kitchen: so many points of it that only some are kept, and not the same of mesh and scan."""
+    item = filmed(0.0)
+    masks = {index: unpack_mask(mask) for index, mask in item.tracks[2].masks.items()}
+    assert sum(int(mask.sum()) for mask in masks.values()) > 20_000
+    for mask in masks.values():
+        mask[np.flatnonzero(mask.any(axis=1))[0]] = False
+    shorter = replace(item.tracks[2], masks={index: pack_mask(mask) for index, mask in masks.items()})
+    fits = scan_fits(replace(item, tracks=(shorter,)), plan_bundle(item.scene))
+    assert fits["double_1"].f_score_1cm > 0.995
+
+
+def test_frames_in_which_a_door_stands_open_are_not_asked() -> None:
+    item = filmed(0.0)
+    opened = {index: Swing(hinge="left", angle_rad=1.0) for index in item.tracks[0].masks}
+    tracks = (replace(item.tracks[0], swung=opened), *item.tracks[1:])
+    found = scan_fits(replace(item, tracks=tracks), plan_bundle(item.scene))
+    assert item.tracks[0].name not in found
+    assert item.tracks[1].name in found
 
 
 def test_objects_without_depth_points_have_no_fit() -> None:
