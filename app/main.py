@@ -5,6 +5,7 @@ import errno
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 
 import anyio
 from fastapi import FastAPI, Request
@@ -138,9 +139,11 @@ async def _tidy(context: Context) -> None:
     """Close what nobody looks at any more."""
     while True:
         await asyncio.sleep(TIDY_S)
-        await anyio.to_thread.run_sync(context.viewer.close_idle)
-        await anyio.to_thread.run_sync(tidy_uploads, context)
-        await anyio.to_thread.run_sync(sending.tidy, context)
+        for tidy in (context.viewer.close_idle, partial(tidy_uploads, context), partial(sending.tidy, context)):
+            try:
+                await anyio.to_thread.run_sync(tidy)
+            except Exception:  # a full disk or a locked database now must not end tidying for good
+                _log.exception("tidying")
 
 
 def _tell(context: Context, project: str, number: int) -> None:

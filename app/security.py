@@ -137,7 +137,9 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, kind:
     headers = [(b"content-type", b"application/json"), (b"content-length", str(len(content)).encode())]
     if status == 401 and _is_page(scope):
         status = 303
-        headers.append((b"location", f"/login?next={quote(scope['path'])}".encode()))
+        query = scope["query_string"].decode("latin-1")
+        wanted = f"{scope['path']}?{query}" if query else scope["path"]
+        headers.append((b"location", f"/login?next={quote(wanted)}".encode()))
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": content})
 

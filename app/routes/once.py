@@ -3,6 +3,7 @@
 import asyncio
 import re
 from collections.abc import Callable
+from weakref import WeakValueDictionary
 
 import anyio
 from fastapi.responses import JSONResponse, Response
@@ -25,7 +26,7 @@ class Once:
 
     def __init__(self, app: ASGIApp, context_of: Callable[[], Context]) -> None:
         self.app, self.context_of = app, context_of
-        self._under_way: dict[str, asyncio.Lock] = {}
+        self._under_way: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()  # while somebody holds or awaits it
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Make a marked change, or answer it as it was answered before."""
@@ -40,9 +41,6 @@ class Once:
                 await self._answer(change, scope, receive, send)
         except R2C2RError as error:
             await JSONResponse(error_body(error), kind_of(error)[1])(scope, receive, send)
-            return
-        if not lock.locked():
-            self._under_way.pop(change.digest, None)
 
     async def _answer(self, change: Sending, scope: Scope, receive: Receive, send: Send) -> None:
         context = self.context_of()

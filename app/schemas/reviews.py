@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from app.schemas.base import Shape
 from app.schemas.jobs import Job
@@ -103,10 +103,10 @@ class OverridePatch(Shape):
 
     candidate: str | None = None
     hinge: Literal["left", "right", "top", "bottom"] | None = None
-    dimensions_m: tuple[float, float, float] | None = None
-    pose: list[list[float]] | None = None
-    joint_lower: float | None = Field(default=None, allow_inf_nan=False)
-    joint_upper: float | None = Field(default=None, allow_inf_nan=False)
+    dimensions_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+    pose: list[list[FiniteFloat]] | None = None
+    joint_lower: FiniteFloat | None = None
+    joint_upper: FiniteFloat | None = None
     regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES)  # times further candidates were asked for
     rerun: bool = True
     version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from app.schemas.base import Shape
 
@@ -75,4 +75,4 @@ class ViewerShown(Shape):
 class JointValues(Shape):
     """Joint positions; they are clamped to the limits."""
 
-    values: dict[str, float]
+    values: dict[str, FiniteFloat]

@@ -1,5 +1,7 @@
 """Who may sign in at this server: what an admin sees of the accounts and changes about them."""
 
+import threading
+
 from sqlalchemy import func
 from sqlmodel import Session, col, select
 
@@ -9,6 +11,8 @@ from app.db.tables import Account, SignIn
 from app.errors import Conflict
 from app.services import accounts
 from app.services.context import Context
+
+_changing = threading.Lock()  # two admins at once do not both pass as not the last one
 
 
 def everyone(context: Context) -> list[schemas.AccountInfo]:
@@ -25,20 +29,22 @@ def add(context: Context, body: schemas.AccountIn) -> schemas.AccountInfo:
 
 def change(context: Context, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
     """Another role, another password; both hold at once, on open connections too."""
-    if body.role is not None and body.role != "admin":
-        _refuse_last_admin(context, name)
-    if body.password is not None:
-        accounts.set_password(context.engine, name, body.password)
-    if body.role is not None:
-        accounts.set_role(context.engine, name, body.role)
+    with _changing:
+        if body.role is not None and body.role != "admin":
+            _refuse_last_admin(context, name)
+        if body.password is not None:
+            accounts.set_password(context.engine, name, body.password)
+        if body.role is not None:
+            accounts.set_role(context.engine, name, body.role)
     context.people.look_again()
     return _one(context, name)
 
 
 def remove(context: Context, name: str) -> None:
     """Delete the account: its sessions and open connections end; what the person did keeps the name."""
-    _refuse_last_admin(context, name)
-    accounts.remove(context.engine, name)
+    with _changing:
+        _refuse_last_admin(context, name)
+        accounts.remove(context.engine, name)
     context.people.look_again()
 
 

@@ -90,7 +90,7 @@ class Viewer:
 
     def close(self, project: str) -> None:
         """Close everybody's views of a project; their tokens are worth nothing any more."""
-        for view in [view for view in self._views.values() if view.project == project]:
+        for view in [view for view in tuple(self._views.values()) if view.project == project]:
             self._views.pop((view.project, view.session), None)
             self._end(view)
 
@@ -159,7 +159,7 @@ class Viewer:
             return
 
     def _make_room(self) -> None:
-        running = [view for view in self._views.values() if view.port is not None]
+        running = [view for view in tuple(self._views.values()) if view.port is not None]
         if len(running) < MOST_VIEWS:
             return
         idle = sorted((view for view in running if not view.watching), key=lambda view: view.used)
@@ -207,7 +207,7 @@ class Viewer:
         worker.kill()
         worker.close()
         self._worker = None
-        for view in self._views.values():
+        for view in tuple(self._views.values()):
             view.port = None
 
     def _running(self) -> Worker:

@@ -63,7 +63,8 @@ class Live extends EventTarget {
     });
     socket.addEventListener("message", (event) => this.#receive(JSON.parse(String(event.data))));
     socket.addEventListener("close", ({ code }) => {
-      if (code === SESSION_ENDED) return location.assign(`/login?${new URLSearchParams({ next: location.pathname })}`);
+      if (code === SESSION_ENDED)
+        return location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
       this.dispatchEvent(new Event("offline"));
       setTimeout(() => this.#open(), this.#wait);
       this.#wait = Math.min(this.#wait * 1.8, 8000);

@@ -1,6 +1,7 @@
 /** The sign-in page: a password becomes a session, and the page that was asked for opens. */
 
 import { ApiError, signIn } from "./api.js";
+import { nextPage } from "./lib/next-page.js";
 
 const form = /** @type {HTMLFormElement} */ (document.querySelector("form"));
 const alertLine = /** @type {HTMLElement} */ (form.querySelector("[role=alert]"));
@@ -13,14 +14,8 @@ form.addEventListener("submit", async (event) => {
   alertLine.textContent = "";
   try {
     await signIn(String(said.get("name")), String(said.get("password")));
-    location.assign(nextPage());
+    location.assign(nextPage(new URLSearchParams(location.search).get("next"), location.origin));
   } catch (error) {
     alertLine.textContent = error instanceof ApiError ? `${error.message}: ${error.hint}` : String(error);
   }
 });
-
-/** The page that was asked for, when it is one of ours. */
-function nextPage() {
-  const wanted = new URL(new URLSearchParams(location.search).get("next") ?? "/", location.origin);
-  return wanted.origin === location.origin ? wanted.pathname + wanted.search : "/";
-}

@@ -242,3 +242,13 @@ def test_a_new_name_is_no_change_of_the_review(reviewed: Reviewed) -> None:
     seen = web.get(f"{at}/candidates")["version"]
     web.patch(at, {"category": "oven"})
     web.patch(f"{at}/override", {"hinge": "left", "rerun": False, "version": seen})
+
+
+@pytest.mark.parametrize("what", ["dimensions_m", "pose"])
+def test_a_correction_that_is_no_number_is_refused(reviewed: Reviewed, what: str) -> None:
+    web, project, number = reviewed
+    at = f"/api/projects/{project}/objects/{number}/override"
+    value = {"dimensions_m": [1, 1, "nan"], "pose": [[1, 0, 0, "nan"], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}[what]
+    body = json.dumps({what: value, "rerun": False}).replace('"nan"', "NaN")
+    refused = web.client.patch(at, content=body, headers={"content-type": "application/json"})
+    assert (refused.status_code, web.get(at)[what]) == (422, None)

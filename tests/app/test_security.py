@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from starlette.testclient import TestClient
@@ -31,6 +32,8 @@ def test_without_a_session_nothing_is_shown(web: Running) -> None:
     for page in ("/", "/p/x/annotate"):
         answer = other.get(page, follow_redirects=False)
         assert (answer.status_code, answer.headers["location"]) == (303, f"/login?next={page}")
+    shared = other.get("/p/x/review?object=3&frame=7", follow_redirects=False)
+    assert parse_qs(urlsplit(shared.headers["location"]).query) == {"next": ["/p/x/review?object=3&frame=7"]}
     assert other.post("/api/projects/sample", json={}).status_code == 401
     assert other.get("/api/health").json() == {"state": "ok"}
 

@@ -123,6 +123,8 @@ def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
     assert shown["mode"] == "cloud"
     moved = seen.post(f"/api/projects/{project}/viewer/joints", {"values": {"door": 0.5}})
     assert moved["joints"] == [{"name": "door", "lower": 0.0, "upper": 1.0, "value": 0.5}]
+    nowhere = {"content": '{"values": {"door": NaN}}', "headers": {"content-type": "application/json"}}
+    assert seen.client.post(f"/api/projects/{project}/viewer/joints", **nowhere).status_code == 422
     assert seen.post(f"/api/projects/{project}/viewer/show", {"mode": "dance"}, 422)["kind"] == "invalid"
 
 

@@ -12,6 +12,7 @@ import { disagreements } from "../../static/js/lib/merge.js";
 import { project } from "../../static/js/lib/points.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
 import { forget, keep, keptBy, named } from "../../static/js/lib/kept.js";
+import { nextPage } from "../../static/js/lib/next-page.js";
 import { moved, shiftBetween } from "../../static/js/lib/moved.js";
 import { together } from "../../static/js/lib/together.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
@@ -255,4 +256,12 @@ test("two fingers keep what is between them, and spread it as they spread", () =
   assert.equal(pinched.scale, 4);
   const [there, still] = [toImage(view, { x: 5, y: 10 }), toImage(pinched, { x: 50, y: 60 })];
   assert.ok(Math.abs(there.x - still.x) < 1e-9 && Math.abs(there.y - still.y) < 1e-9);
+});
+
+test("after signing in only a page of this server opens, with its query", () => {
+  const here = "http://localhost:8000";
+  assert.equal(nextPage("/p/a/review?object=3", here), `${here}/p/a/review?object=3`);
+  assert.equal(new URL(nextPage("/.//evil.example/x", here), here).host, "localhost:8000");
+  for (const other of [null, "", "//evil.example", "https://evil.example", "javascript:alert(1)", "http://["])
+    assert.equal(nextPage(other, here), `${here}/`);
 });
