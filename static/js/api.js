@@ -9,6 +9,8 @@
 
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
 
+const OFFLINE = { kind: "offline", message: "the server cannot be reached", hint: "is r2c2r serve running?" };
+
 export class ApiError extends Error {
   /**
    * @param {number} status 0 when the server could not be reached
@@ -43,11 +45,7 @@ async function call(path, { method = "GET", json, body, signal, headers: more = 
     response = await fetch(path, { method, headers, body: json === undefined ? body : JSON.stringify(json), signal });
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new ApiError(0, {
-      kind: "offline",
-      message: "the server cannot be reached",
-      hint: "is r2c2r serve running?",
-    });
+    throw new ApiError(0, OFFLINE);
   }
   if (response.status === 401 && path !== "/api/login")
     location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
@@ -89,8 +87,12 @@ const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
  * @param {string} key
  * @returns {Promise<unknown>}
  */
-export const perform = async (method, path, json, key) =>
-  (await call(path, { method, json, headers: { "Idempotency-Key": key } })).json();
+export const perform = async (method, path, json, key) => {
+  const response = await call(path, { method, json, headers: { "Idempotency-Key": key } });
+  return response.json().catch(() => {
+    throw new ApiError(0, OFFLINE); // cut off while it was said: to be asked again
+  });
+};
 
 /** @param {string} name @param {string} password */
 export const signIn = (name, password) => call("/api/login", { method: "POST", json: { name, password } });

@@ -110,6 +110,19 @@ export function isTyping(event) {
   return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
 }
 
+const SLIDER_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End"];
+
+/**
+ * Whether a key press is for the control that was reached by keyboard: Enter on a button, an arrow on a slider.
+ * @param {KeyboardEvent} event
+ */
+export function isOperating(event) {
+  const target = event.composedPath()[0];
+  if (!(target instanceof Element) || !target.matches(":focus-visible")) return false;
+  if (target.matches("input[type=range]")) return SLIDER_KEYS.includes(event.key);
+  return target.matches("button, a[href], summary, input") && ["Enter", " "].includes(event.key);
+}
+
 const PLAIN_KEYS = "plain-keys";
 
 /** Whether a letter alone is a command (WCAG 2.1.4 asks for a way to turn that off). */

@@ -16,6 +16,7 @@ import { live } from "./live.js";
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5000;
+const NOT_MADE = { kind: "not-made", message: "the object of this click could not be made", hint: "click it again" };
 
 class Outbox extends EventTarget {
   #chain = Promise.resolve();
@@ -44,6 +45,7 @@ class Outbox extends EventTarget {
    */
   begin(user) {
     this.#user = user;
+    this.#waiting = this.#waiting.map((one) => (one.user ? one : this.#keep({ ...one, user })));
     const here = new Set(this.#waiting.map(({ key }) => key));
     for (const change of keptBy(localStorage, user).filter(({ key }) => !here.has(key))) {
       this.#enqueue(change).then(
@@ -62,8 +64,16 @@ class Outbox extends EventTarget {
    */
   send(change, key = newKey()) {
     const kept = { ...change, key, user: this.#user, at: now() };
-    this.safe = keep(localStorage, kept) && this.safe;
-    return /** @type {Promise<T>} */ (this.#enqueue(kept));
+    return /** @type {Promise<T>} */ (this.#enqueue(this.#keep(kept)));
+  }
+
+  /**
+   * @param {Kept} change
+   * @returns {Kept} the same
+   */
+  #keep(change) {
+    this.safe = keep(localStorage, change) && this.safe;
+    return change;
   }
 
   /** @param {Kept} change */
@@ -81,6 +91,7 @@ class Outbox extends EventTarget {
     const change = this.#waiting.find((one) => one.key === key);
     if (!change) throw new Error(`no change ${key} waits`);
     try {
+      if (this.#isOrphan(change)) throw new ApiError(409, NOT_MADE);
       const answer = await this.#answered(change);
       this.#settle(change, answer);
       return answer;
@@ -88,6 +99,12 @@ class Outbox extends EventTarget {
       if (!(error instanceof ApiError && error.status === 401)) this.#settle(change, null); // after signing in it is sent
       throw error;
     }
+  }
+
+  /** Whether it is about an object whose making was refused. @param {Kept} change */
+  #isOrphan({ path }) {
+    const maker = path.match(/\{(\w+)\}/)?.[1];
+    return maker !== undefined && !this.#waiting.some(({ key }) => key === maker);
   }
 
   /**
@@ -170,8 +187,13 @@ function now() {
  */
 function online(wait) {
   return new Promise((resolve) => {
-    const timer = setTimeout(resolve, wait);
-    live.addEventListener("online", () => (clearTimeout(timer), resolve()), { once: true });
+    const done = () => {
+      clearTimeout(timer);
+      live.removeEventListener("online", done);
+      resolve();
+    };
+    const timer = setTimeout(done, wait);
+    live.addEventListener("online", done);
   });
 }
 

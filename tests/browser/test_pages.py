@@ -106,3 +106,22 @@ def test_a_change_made_without_a_connection_is_stored_when_it_is_back(browser: B
     expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
     expect(page.locator(".banner")).to_be_hidden()
     context.close()
+
+
+def test_a_control_reached_by_keyboard_is_used_by_it(browser: Browser, finished: tuple[str, str]) -> None:
+    address, project = finished
+    context = browser.new_context()
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+    for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
+        page.get_by_role("button", name=name).focus()
+        page.keyboard.press(key)
+        expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Mask opacity").focus()
+    page.keyboard.press("ArrowRight")  # not: the next frame
+    expect(page.get_by_label("Mask opacity")).to_have_value("43")
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+    context.close()

@@ -81,3 +81,33 @@ test("of two corrections of different things both stay; the second is sent again
   const stored = { version: 5, override: { hinge: null, pose: [[1]] }, group: { name: "door", candidates: [] } };
   assert.deepEqual((await merged(mine, stored)).json, { hinge: "left", rerun: true, version: 5 });
 });
+
+test("clicks on an object whose making was refused are refused here, in words, and not sent", async () => {
+  const asked = serve({ status: 422, body: { kind: "prompt", message: "no such frame", hint: "" } });
+  const made = outbox.send(change("/objects"), "k2");
+  const clicked = outbox.send(change("/objects/{k2}/points"));
+  await assert.rejects(made, { message: "no such frame" });
+  await assert.rejects(clicked, { kind: "not-made" });
+  assert.deepEqual(asked.map(({ path }) => path), ["/objects"]);
+  assert.equal(kept.size, 0);
+});
+
+test("an answer that is cut off is asked for again under the same key", async () => {
+  const asked = [];
+  globalThis.fetch = async (_, { headers }) => {
+    asked.push(headers["Idempotency-Key"]);
+    setTimeout(() => live.dispatchEvent(new Event("online")));
+    return new Response(asked.length === 1 ? '{"id": ' : '{"id": 3}');
+  };
+  assert.deepEqual(await outbox.send(change("/a"), "cut"), { id: 3 });
+  assert.deepEqual(asked, ["cut", "cut"]);
+});
+
+test("what was done before it is known who does it is that person's", async () => {
+  outbox.begin("");
+  serve(undefined, { body: {} });
+  const sent = outbox.send(change("/early"));
+  outbox.begin("ann");
+  assert.deepEqual([...kept.values()].map((text) => JSON.parse(text).user), ["ann"]);
+  await sent;
+});

@@ -65,11 +65,14 @@ export class Edits extends EventTarget {
    */
   async #make(key, points, category, infer) {
     this.#coming = `{${key}}`;
-    const object = await this.save(changes.addObject(this.project, { category, points }, infer), key);
-    const mine = this.#coming === `{${key}}`;
-    if (mine) this.#coming = null;
-    if (mine) this.#say("made", { object });
-    return object;
+    const isMine = () => this.#coming === `{${key}}`;
+    try {
+      const object = await this.save(changes.addObject(this.project, { category, points }, infer), key);
+      if (isMine()) this.#say("made", { object });
+      return object;
+    } finally {
+      if (isMine()) this.#coming = null; // also where it was refused: the next click tries anew
+    }
   }
 
   /**

@@ -15,6 +15,7 @@ export class SceneObjects {
   /** @param {SceneObject[]} objects */
   fill(objects) {
     this.#all = new Map(objects.map((object) => [object.id, object]));
+    this.choose(this.current);
   }
 
   get size() {

@@ -20,6 +20,7 @@ export class WhoIsIn extends LiveElement {
       const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave() }, "Sign out");
       this.replaceChildren(h("a", { href: "/people", title: `${role}: accounts and your password` }, user), leave);
     } catch (error) {
+      live.addEventListener("online", () => this.#draw(), { signal: this.signal, once: true });
       sayError(error);
     }
   }

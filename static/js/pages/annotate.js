@@ -8,7 +8,7 @@ import { Masks } from "../annotate/masks.js";
 import { Player } from "../annotate/player.js";
 import { SceneObjects } from "../annotate/scene-objects.js";
 import { StageTools } from "../annotate/stage-tools.js";
-import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { detailOf, h, icon, isOperating, isTyping, LiveElement, plainKeys } from "../dom.js";
 import { CommentList } from "../elements/comment-list.js";
 import { FilmStrip } from "../elements/film-strip.js";
 import { FrameCanvas } from "../elements/frame-canvas.js";
@@ -168,7 +168,7 @@ export class AnnotatePage extends LiveElement {
     on(live, "segment", (message) => this.#segment(message));
     on(live, "live", ({ status }) => this.#stage.segmenter.show(status));
     on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#begunAnew());
-    on(outbox, "caught-up", () => this.#player.frame && this.#reload());
+    on(outbox, "caught-up", () => this.#player.frame && this.#reload().catch(sayError));
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
     document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
     signal.addEventListener("abort", () => this.#stop());
@@ -199,7 +199,7 @@ export class AnnotatePage extends LiveElement {
 
   /** The server was started again: its segmenter is to be opened anew. */
   #begunAnew() {
-    this.#reload();
+    this.#reload().catch(sayError);
     this.#stage.segmenter.open(api.openLive(this.project)).catch(sayError);
   }
 
@@ -401,7 +401,7 @@ export class AnnotatePage extends LiveElement {
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (isTyping(event) || document.querySelector("dialog[open]")) return;
+    if (isTyping(event) || isOperating(event) || document.querySelector("dialog[open]")) return;
     if (event.key === "Escape" && this.#pinning) return this.#pinWanted(false);
     const click = (/** @type {0 | 1} */ label) =>
       this.#canvas.crosshair && this.#click({ ...this.#canvas.crosshair, label, hold: false });

@@ -2,7 +2,7 @@
 
 import { getCertificate, getScene, listCandidates, moveJoints, placeInViewer, uploadCandidate } from "../api.js";
 import { changeOverride, giveVerdict, undoRedo } from "../changes.js";
-import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { detailOf, h, icon, isOperating, isTyping, LiveElement, plainKeys } from "../dom.js";
 import { askForText } from "../elements/ask-dialog.js";
 import { CommentList } from "../elements/comment-list.js";
 import { PhotoCheck } from "../elements/photo-check.js";
@@ -261,8 +261,8 @@ export class ReviewPage extends LiveElement {
     if (reason === null) return;
     const verdict = again ? /** @type {const} */ ("cleared") : said;
     const change = giveVerdict(this.project, group, { candidate: candidate.id, verdict, reason, rerun: true });
-    await this.#review(outbox.send(change));
-    if (verdict === "accepted" && this.#object === group.object) this.#nextToReview();
+    const stored = await this.#review(outbox.send(change));
+    if (stored && verdict === "accepted" && this.#object === group.object) this.#nextToReview();
   }
 
   /** @param {Partial<OverridePatch>} patch */
@@ -271,16 +271,21 @@ export class ReviewPage extends LiveElement {
     if (group) this.#review(outbox.send(changeOverride(this.project, group, patch)));
   }
 
-  /** @param {Promise<Reviewed>} answer */
+  /**
+   * @param {Promise<Reviewed>} answer
+   * @returns {Promise<boolean>} whether it was stored; not where somebody else's is left as it is
+   */
   async #review(answer) {
     try {
-      const { text, job } = await answer;
-      say(text, { kind: "good" });
+      const { text, job, group } = await answer;
+      say(text ?? "What is stored stays as it is", { kind: text ? "good" : "" });
       if (job) this.#hear(job);
-      this.#mover.drop();
+      if (group?.object === this.#object) this.#mover.drop();
       await this.#load();
+      return Boolean(text);
     } catch (error) {
       sayError(error);
+      return false;
     }
   }
 
@@ -331,15 +336,16 @@ export class ReviewPage extends LiveElement {
 
   /** Put the handles somewhere, or learn where they were dragged. @param {number[][] | null} pose */
   async #drag(pose) {
+    const object = this.#object;
     const placed = await placeInViewer(this.project, pose);
-    if (!pose && placed.pose) this.#mover.dragged(placed.pose);
+    if (!pose && placed.pose && this.#handles && object === this.#object) this.#mover.dragged(placed.pose);
   }
 
   // Keys and commands
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (isTyping(event) || document.querySelector("dialog[open]")) return;
+    if (isTyping(event) || isOperating(event) || document.querySelector("dialog[open]")) return;
     const action = actionOf(event, "review", plainKeys());
     if (!action || !this.#actions[action]) return;
     event.preventDefault();
@@ -380,8 +386,8 @@ export class ReviewPage extends LiveElement {
     "view-photo": () => this.#bar.set("photo"),
     "move-object": () => this.#bar.move(!this.#bar.moving),
     nudge: (key, fine) => (this.#bar.moving || this.#bar.move(true), this.#mover.nudge(key, fine)),
-    "store-move": () => this.#mover.store(),
-    "drop-move": () => this.#mover.drop(),
+    "store-move": () => this.#bar.moving && this.#mover.store(),
+    "drop-move": () => this.#bar.moving && this.#mover.drop(),
     undo: () => this.#undo("undo"),
     redo: () => this.#undo("redo"),
   };
