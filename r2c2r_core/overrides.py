@@ -45,15 +45,16 @@ def overrides_from(document: Any, path: Path) -> Overrides:
         raise OverrideError(f"{where}: objects is {type(listed).__name__}", hint="expected a table of names")
     scene = document.get("scene", {})
     _refuse_unknown(where, "scene", scene, _SCENE_KEYS)
-    yaw, floor, walls = scene.get("manhattan_yaw"), scene.get("floor"), scene.get("walls")
-    if walls is not None and (not isinstance(walls, list) or any(np.shape(wall) != (3,) for wall in walls)):
+    walls = scene.get("walls")
+    if walls is not None and not isinstance(walls, list):
         raise OverrideError(f"{where}: scene.walls is {walls!r}", hint="expected a list of [x, y, offset]")
+    floor, yaw = (_numbers(where, f"scene.{key}", scene.get(key), (), "a number") for key in ("floor", "manhattan_yaw"))
     return Overrides(
         objects={name: _object_override(where, name, entry, path.parent) for name, entry in listed.items()},
         up_capture=_vector(where, "scene.up", scene.get("up")),
         floor_m=None if floor is None else float(floor),
         manhattan_yaw_rad=None if yaw is None else float(yaw),
-        walls=None if walls is None else tuple(np.asarray(wall, dtype=np.float64) for wall in walls),
+        walls=None if walls is None else tuple(_wall(where, wall) for wall in walls),
     )
 
 
@@ -62,14 +63,12 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
     hinge = entry.get("hinge")
     if hinge is not None and hinge not in get_args(HingeSide):
         raise OverrideError(f"{where}: {name}.hinge is {hinge!r}", hint="expected left, right, top or bottom")
-    pose = entry.get("pose")
-    if pose is not None and np.shape(pose) != (4, 4):
-        raise OverrideError(f"{where}: {name}.pose has shape {np.shape(pose)}", hint="expected a 4x4 world_from_object")
-    if pose is not None and not _is_rigid(np.asarray(pose, dtype=np.float64)):
+    pose = _numbers(where, f"{name}.pose", entry.get("pose"), (4, 4), "a 4x4 world_from_object")
+    if pose is not None and not _is_rigid(pose):
         raise OverrideError(f"{where}: {name}.pose moves nothing rigidly", hint="expected a rotation and a translation")
-    limits = entry.get("joint_limits")
-    if limits is not None and (np.shape(limits) != (2,) or limits[0] > limits[1]):
-        raise OverrideError(f"{where}: {name}.joint_limits is {limits!r}", hint="expected [lower, upper]")
+    limits = _numbers(where, f"{name}.joint_limits", entry.get("joint_limits"), (2,), "[lower, upper]")
+    if limits is not None and limits[0] > limits[1]:
+        raise OverrideError(f"{where}: {name}.joint_limits is {limits.tolist()}", hint="expected [lower, upper]")
     dimensions = _vector(where, f"{name}.dimensions_m", entry.get("dimensions_m"))
     if dimensions is not None and (dimensions <= 0).any():
         raise OverrideError(f"{where}: {name}.dimensions_m is {dimensions.tolist()}", hint="expected three positive metres")
@@ -83,7 +82,7 @@ def _object_override(where: str, name: str, entry: Any, folder: Path) -> ObjectO
         candidate=candidate,
         hinge=hinge,
         dimensions_m=dimensions,
-        pose=None if pose is None else np.asarray(pose, dtype=np.float64),
+        pose=pose,
         joint_lower=None if limits is None else float(limits[0]),
         joint_upper=None if limits is None else float(limits[1]),
         front_world=_vector(where, f"{name}.front", entry.get("front")),
@@ -109,8 +108,24 @@ def _refuse_unknown(where: str, what: str, entry: Any, known: tuple[str, ...]) -
 
 
 def _vector(where: str, what: str, value: Any) -> np.ndarray | None:
+    return _numbers(where, what, value, (3,), "three numbers")
+
+
+def _wall(where: str, value: Any) -> np.ndarray:
+    wall = _vector(where, "a wall of scene.walls", value)
+    if wall is None:
+        raise OverrideError(f"{where}: a wall of scene.walls is null", hint="expected a list of [x, y, offset]")
+    return wall
+
+
+def _numbers(where: str, what: str, value: Any, shape: tuple[int, ...], expected: str) -> np.ndarray | None:
+    """Finite numbers of that shape, or None where nothing is said; a text or a ragged list is an OverrideError."""
     if value is None:
         return None
-    if np.shape(value) != (3,):
-        raise OverrideError(f"{where}: {what} is {value!r}", hint="expected three numbers")
-    return np.asarray(value, dtype=np.float64)
+    try:
+        numbers = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.full(1, np.nan)
+    if numbers.shape != shape or not np.isfinite(numbers).all() or isinstance(value, bool | str):
+        raise OverrideError(f"{where}: {what} is {str(value)[:80]!r}", hint=f"expected {expected}")
+    return numbers

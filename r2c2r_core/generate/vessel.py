@@ -89,7 +89,7 @@ def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_
     held = []
     for view in views:
         eye = world_from_local.inverse.apply(view.eye_world[None])[0]
-        towards = (revolution.centre - eye[:2]) / np.linalg.norm(revolution.centre - eye[:2])
+        towards = (revolution.centre - eye[:2]) / max(float(np.linalg.norm(revolution.centre - eye[:2])), 1e-9)
         if abs(out @ [towards[1], -towards[0]]) * (radius + _REACHES_M[2]) < _BESIDE * radius:
             continue
         camera_from_local = view.world_from_camera.inverse @ world_from_local
