@@ -35,7 +35,9 @@ class Once:
             await self.app(scope, receive, send)
             return
         try:
-            change = sending.sending(scope["state"]["person"], key, scope["method"], scope["path"])
+            person = scope["state"]["person"]
+            sending.check_person(person, Headers(scope=scope).get("x-r2c2r-person"))
+            change = sending.sending(person, key, scope["method"], scope["path"])
             lock = self._under_way.setdefault(change.digest, asyncio.Lock())
             async with lock:  # sent again while the first one is still at work
                 await self._answer(change, scope, receive, send)

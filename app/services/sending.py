@@ -3,11 +3,12 @@
 import hashlib
 import time
 from dataclasses import dataclass
+from urllib.parse import unquote
 
 from app.db import once
 from app.db.engine import reading, writing
 from app.db.once import Sending, marked
-from app.errors import Conflict
+from app.errors import Conflict, Unauthorised
 from app.security import Person
 from app.services.context import Context
 from r2c2r_core.errors import InputError
@@ -32,6 +33,15 @@ def sending(person: Person, key: str, method: str, path: str) -> Sending:
     parts = path.split("/")  # /api/projects/PROJECT/…
     project = parts[3] if parts[2] == "projects" and len(parts) > 4 else None
     return Sending(hashlib.sha256(f"{person.name}\0{key}".encode()).hexdigest(), f"{method} {path}", project)
+
+
+def check_person(person: Person, named: str | None) -> None:
+    """Refuse what a page kept for one person once another has signed in beside it; `named` is percent-encoded."""
+    if named is not None and unquote(named) != person.name:
+        raise Unauthorised(
+            f"this change was made by {unquote(named)!r}, and {person.name!r} is signed in now",
+            hint="sign in as the one who made it: it waits until then",
+        )
 
 
 def answer_of(context: Context, change: Sending) -> Answer | None:

@@ -28,6 +28,11 @@ export class ApiError extends Error {
   get unreachable() {
     return this.status === 0 || (this.kind === "internal" && [502, 503, 504].includes(this.status));
   }
+
+  /** Whether the same change may go through a little later: the machine is busy or full, or the same was tried too often. */
+  get later() {
+    return this.unreachable || [429, 507].includes(this.status) || (this.kind === "environment" && this.status === 503);
+  }
 }
 
 /**
@@ -80,15 +85,17 @@ const send = async (method, path, json = {}) => (await call(path, { method, json
 const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
 
 /**
- * Send a change; the server does it once however often it comes with the same key.
+ * Send a change; the server does it once however often it comes with the same key, and only for the person who made it.
  * @param {string} method
  * @param {string} path
  * @param {Record<string, unknown>} json
  * @param {string} key
+ * @param {string} person
  * @returns {Promise<unknown>}
  */
-export const perform = async (method, path, json, key) => {
-  const response = await call(path, { method, json, headers: { "Idempotency-Key": key } });
+export const perform = async (method, path, json, key, person) => {
+  const whose = { "Idempotency-Key": key, ...(person && { "X-R2C2R-Person": encodeURIComponent(person) }) };
+  const response = await call(path, { method, json, headers: whose });
   return response.json().catch(() => {
     throw new ApiError(0, OFFLINE); // cut off while it was said: to be asked again
   });

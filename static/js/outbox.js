@@ -124,16 +124,16 @@ class Outbox extends EventTarget {
   }
 
   /** Until the server answers. @param {Kept} change */
-  async #persist({ key, method, path, json }) {
+  async #persist({ key, method, path, json, user }) {
     for (let wait = FIRST_WAIT_MS; ; wait = Math.min(2 * wait, LONGEST_WAIT_MS)) {
       try {
-        const answer = await perform(method, path, json, key);
+        const answer = await perform(method, path, json, key, user);
         this.#stick(false);
         return answer;
       } catch (error) {
-        const unreachable = error instanceof ApiError && error.unreachable;
-        this.#stick(unreachable);
-        if (!unreachable) throw error;
+        const later = error instanceof ApiError && error.later;
+        this.#stick(later);
+        if (!later) throw error;
         await online(wait);
       }
     }

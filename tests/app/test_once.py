@@ -45,6 +45,17 @@ def test_two_keys_and_no_key_are_changes_of_their_own(web: Running, at: str) -> 
     assert len(web.get(f"{at}/objects")[0]["points"]) == before + 4
 
 
+def test_a_change_kept_for_one_person_is_not_made_by_another(web: Running, at: str) -> None:
+    before = web.get(f"{at}/objects")[0]["points"]
+    headers = {"Idempotency-Key": "whose", "X-R2C2R-Person": "J%C3%BCrgen"}
+    refused = web.client.post(f"{at}/objects/1/points", json=CLICK, headers=headers)
+    assert refused.status_code == 401
+    assert "Jürgen" in refused.json()["message"]
+    assert web.get(f"{at}/objects")[0]["points"] == before
+    own = {**headers, "X-R2C2R-Person": web.get("/api/system")["user"]}
+    assert web.client.post(f"{at}/objects/1/points", json=CLICK, headers=own).status_code == 201
+
+
 def test_the_answer_is_lost_on_the_way_and_the_undo_is_still_one(web: Running, at: str) -> None:
     for _ in range(3):
         web.post(f"{at}/objects/1/points", CLICK)

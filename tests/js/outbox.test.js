@@ -43,6 +43,16 @@ test("a change whose answer is lost is sent again under its own key, the next un
   assert.equal(kept.size, 0);
 });
 
+test("a server that is busy or full is asked again; a change is never sent for somebody else", async () => {
+  const busy = { status: 503, body: { kind: "environment", message: "the database does not answer", hint: "" } };
+  const full = { status: 507, body: { kind: "no-space", message: "the disk is full", hint: "" } };
+  const asked = serve(busy, full, { body: { id: 3 } });
+  const wake = setInterval(() => live.dispatchEvent(new Event("online")));
+  assert.deepEqual(await outbox.send(change("/a")), { id: 3 });
+  clearInterval(wake);
+  assert.equal(new Set(asked.map(({ key }) => key)).size, 1);
+});
+
 test("a click on an object that is still being made goes to the number it gets, whatever else waits", async () => {
   const asked = serve({ body: { id: 41 } }, { body: {} });
   const made = outbox.send(change("/objects"), "k1");
