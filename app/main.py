@@ -13,9 +13,6 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
-from starlette.middleware.gzip import GZipMiddleware
-from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
 
 from app import errors, schemas
 from app.db.engine import open_engine
@@ -41,6 +38,7 @@ from app.routes import (
     viewer,
 )
 from app.routes.once import Once
+from app.routes.static import PageFiles
 from app.security import Guard, Person
 from app.services import masks, sending
 from app.services.context import Context
@@ -84,28 +82,12 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
     )
     for module in ROUTERS:
         app.include_router(module.router)
-    app.mount("/static", GZipMiddleware(RevalidatedFiles(directory=static)), name="static")
+    app.mount("/static", PageFiles(directory=static), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     app.add_middleware(Once, context_of=lambda: app.state.context)
     app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)
     return app
-
-
-class RevalidatedFiles(StaticFiles):
-    """Static files that a browser asks about each time, so that an update is seen at once."""
-
-    def file_response(self, *arguments: object, **options: object) -> object:  # type: ignore[override]
-        """The file, to be revalidated."""
-        answer = super().file_response(*arguments, **options)  # type: ignore[arg-type]
-        answer.headers["cache-control"] = "no-cache"
-        return answer
-
-    async def get_response(self, path: str, scope: Scope) -> object:  # type: ignore[override]
-        """Development files beside the pages are not served."""
-        if path.split("/", 1)[0] not in ("index.html", "login.html", "css", "js", "icons", "favicon.svg"):
-            raise HTTPException(404)
-        return await super().get_response(path, scope)
 
 
 def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) -> Context:

@@ -82,6 +82,12 @@ class Person:
         target.fill(text)
         target.press("Enter")
 
+    def answer(self, target: Any, text: str) -> None:
+        """Into the field of a question, which has the focus, and Ctrl+Enter."""
+        self.keys += len(text) + 1
+        target.fill(text)
+        target.press("Control+Enter")
+
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Minutes of a part of the way."""
@@ -237,18 +243,20 @@ def _review(person: Person) -> list[str]:
     page = person.page
     person.click(page.get_by_role("link", name="Review").first)
     groups = person.ask(f"{person.project}/candidates")
-    for number in range(len(groups)):
-        person.press("y")
-        expect(page.get_by_text(re.compile(f"^{number + 1} of {len(groups)} object"))).to_be_visible(timeout=LONG_MS)
+    for number in range(len(groups) + 1):
+        expect(page.get_by_text(re.compile(f"^{number} of {len(groups)} object"))).to_be_visible(timeout=LONG_MS)
+        if number < len(groups):
+            person.press("y")
     unmet: list[str] = []
     for text in ("Send to review", "Start the review", "Approve"):
-        person.click(page.get_by_role("button", name=text, exact=True))
-        left = next((m["unmet"] for m in person.ask(f"{person.project}/review")["moves"] if m["text"] == text), [])
+        button = page.get_by_role("button", name=text, exact=True)
+        button.wait_for()
+        left = next(move["unmet"] for move in person.ask(f"{person.project}/review")["moves"] if move["text"] == text)
+        person.click(button)
         if left:
             unmet += left
-            dialog = page.get_by_role("dialog")
-            person.write(dialog.get_by_role("textbox"), "seen, and good enough")
-        page.get_by_role("button", name=text, exact=True).wait_for(state="detached")
+            person.answer(page.get_by_role("dialog").get_by_role("textbox"), "seen, and good enough")
+        button.wait_for(state="detached")
     return unmet
 
 

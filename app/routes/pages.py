@@ -1,10 +1,11 @@
 """The pages of the front end, and the exchange of the printed key for a session."""
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse, RedirectResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 
 from app.deps import OpenCtx
 from app.routes.people import give_cookie
+from app.services import pages
 
 router = APIRouter(include_in_schema=False)
 
@@ -14,13 +15,13 @@ REVALIDATED = {"cache-control": "no-cache"}
 @router.get("/")
 @router.get("/people")
 @router.get("/p/{rest:path}")
-def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None) -> Response:
+def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None, frame: str = "") -> Response:
     """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address."""
     if token is not None:
         answer: Response = RedirectResponse(request.url.remove_query_params("token").path, status_code=303)
         give_cookie(request, answer, context.people.enter_with_key(token))
         return answer
-    return FileResponse(context.static / "index.html", headers=REVALIDATED)
+    return HTMLResponse(pages.html(context, request.url.path, frame), headers=REVALIDATED)
 
 
 @router.get("/login")

@@ -1,44 +1,35 @@
-/** Pages that are large or seldom opened, fetched with their elements when they are first opened: the list of projects does not wait for them. */
+/** The pages and what they are made of, each fetched when a page first needs it; the HTML asks for those of the first page at once. */
 
-/** @typedef {Record<string, CustomElementConstructor>} Elements */
+/** @type {Record<string, () => Promise<CustomElementConstructor>>} */
+const ELEMENTS = {
+  "r2c2r-annotate": async () => (await import("./pages/annotate.js")).AnnotatePage,
+  "r2c2r-backend": async () => (await import("./elements/backend-choice.js")).BackendChoice,
+  "r2c2r-comments": async () => (await import("./elements/comment-list.js")).CommentList,
+  "r2c2r-download": async () => (await import("./pages/download.js")).DownloadPage,
+  "r2c2r-film-strip": async () => (await import("./elements/film-strip.js")).FilmStrip,
+  "r2c2r-folder-dialog": async () => (await import("./elements/folder-dialog.js")).FolderDialog,
+  "r2c2r-frame-canvas": async () => (await import("./elements/frame-canvas.js")).FrameCanvas,
+  "r2c2r-job": async () => (await import("./elements/job-panel.js")).JobPanel,
+  "r2c2r-mosaic": async () => (await import("./elements/frame-mosaic.js")).FrameMosaic,
+  "r2c2r-object-cloud": async () => (await import("./elements/object-cloud.js")).ObjectCloud,
+  "r2c2r-object-list": async () => (await import("./elements/object-list.js")).ObjectList,
+  "r2c2r-overview": async () => (await import("./pages/overview.js")).OverviewPage,
+  "r2c2r-people": async () => (await import("./pages/people.js")).PeoplePage,
+  "r2c2r-photo-check": async () => (await import("./elements/photo-check.js")).PhotoCheck,
+  "r2c2r-projects": async () => (await import("./pages/projects.js")).ProjectsPage,
+  "r2c2r-proposal-list": async () => (await import("./elements/proposal-list.js")).ProposalList,
+  "r2c2r-review": async () => (await import("./pages/review.js")).ReviewPage,
+  "r2c2r-run": async () => (await import("./pages/run.js")).RunPage,
+  "r2c2r-viewer": async () => (await import("./elements/viewer-frame.js")).ViewerFrame,
+};
 
-/** @type {Record<string, () => Promise<Elements>>} */
-const LATER = {
-  annotate: async () => {
-    const [page, strip, canvas, list, proposals, mosaic, cloud, comments] = await Promise.all([
-      import("./pages/annotate.js"),
-      import("./elements/film-strip.js"),
-      import("./elements/frame-canvas.js"),
-      import("./elements/object-list.js"),
-      import("./elements/proposal-list.js"),
-      import("./elements/frame-mosaic.js"),
-      import("./elements/object-cloud.js"),
-      import("./elements/comment-list.js"),
-    ]);
-    return {
-      "r2c2r-film-strip": strip.FilmStrip,
-      "r2c2r-frame-canvas": canvas.FrameCanvas,
-      "r2c2r-object-list": list.ObjectList,
-      "r2c2r-proposal-list": proposals.ProposalList,
-      "r2c2r-mosaic": mosaic.FrameMosaic,
-      "r2c2r-object-cloud": cloud.ObjectCloud,
-      "r2c2r-comments": comments.CommentList,
-      "r2c2r-annotate": page.AnnotatePage,
-    };
-  },
-  people: async () => ({ "r2c2r-people": (await import("./pages/people.js")).PeoplePage }),
-  review: async () => {
-    const [page, photos, comments] = await Promise.all([
-      import("./pages/review.js"),
-      import("./elements/photo-check.js"),
-      import("./elements/comment-list.js"),
-    ]);
-    return {
-      "r2c2r-photo-check": photos.PhotoCheck,
-      "r2c2r-comments": comments.CommentList,
-      "r2c2r-review": page.ReviewPage,
-    };
-  },
+/** What a page is made of beside itself. @type {Record<string, string[]>} */
+const PARTS = {
+  annotate: ["film-strip", "frame-canvas", "object-list", "proposal-list", "mosaic", "object-cloud", "comments"],
+  overview: ["backend", "job", "viewer"],
+  projects: ["folder-dialog"],
+  review: ["photo-check", "comments", "viewer"],
+  run: ["job"],
 };
 
 /**
@@ -47,11 +38,15 @@ const LATER = {
  * @returns {Promise<void> | null}
  */
 export function fetched(page) {
-  const load = LATER[page];
-  if (!load || customElements.get(`r2c2r-${page}`)) return null;
-  return load().then((elements) => {
-    for (const [name, element] of Object.entries(elements)) {
-      if (!customElements.get(name)) customElements.define(name, element);
-    }
-  });
+  if (customElements.get(`r2c2r-${page}`)) return null;
+  return fetchAll([...(PARTS[page] ?? []), page].map((part) => `r2c2r-${part}`));
+}
+
+/** Define them in this order: a page makes its parts. @param {string[]} tags */
+async function fetchAll(tags) {
+  const found = await Promise.all(tags.map((tag) => ELEMENTS[tag]?.()));
+  for (const [k, element] of found.entries()) {
+    const tag = /** @type {string} */ (tags[k]);
+    if (element && !customElements.get(tag)) customElements.define(tag, element);
+  }
 }

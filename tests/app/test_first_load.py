@@ -2,6 +2,7 @@
 
 import posixpath
 import re
+from html import unescape
 
 from tests.app.conftest import Running
 
@@ -27,3 +28,54 @@ def test_the_first_page_is_light_and_asks_no_other_site(web: Running) -> None:
     assert sum(sizes.values()) < MOST_BYTES, sorted(sizes.items(), key=lambda item: -item[1])[:8]
     foreign = re.findall(r'(?:href|src)="(https?:)?//', page)
     assert foreign == []
+
+
+def asked_at_once(page: str, rel: str) -> list[str]:
+    return [unescape(found) for found in re.findall(rf'<link rel="{rel}"[^>]*href="([^"]+)"', page)]
+
+
+def test_the_page_asks_at_once_for_every_module_it_needs(web: Running) -> None:
+    for path in ("/", "/people", "/p/any", "/p/any/annotate", "/p/any/review"):
+        asked = asked_at_once(web.client.get(path).text, "modulepreload")
+        assert len(asked) == len(set(asked)) > 10
+        for module in asked:
+            text = web.client.get(module).text
+            needed = [one or two for one, two in IMPORT.findall(text)]
+            assert {posixpath.normpath(posixpath.join(posixpath.dirname(module), name)) for name in needed} <= set(asked), (
+                module
+            )
+
+
+def test_the_clicking_page_asks_at_once_for_the_frame_it_shows(web: Running) -> None:
+    project = web.sample()
+    frames = f"/api/projects/{project}/frames"
+    indices = [frame["index"] for frame in web.get(frames)]
+    for query, shown in (
+        ("", indices[0]),
+        (f"?frame={indices[2]}", indices[2]),
+        ("?frame=99999", indices[0]),
+        ("?frame=²", indices[0]),
+    ):
+        picture, table = asked_at_once(web.client.get(f"/p/{project}/annotate{query}").text, "preload")
+        assert table == frames
+        assert picture.startswith(f"/media/{project}/frames/{shown}.jpg?w=960&v="), query
+        assert web.client.get(picture).headers["content-type"] == "image/jpeg"
+    for path in (f"/p/{project}/run", "/p/none/annotate", '/p/"><script>/annotate'):
+        page = web.client.get(path)
+        assert page.status_code == 200, path
+        assert asked_at_once(page.text, "preload") == [], path
+        assert page.text.count("<script") == 1, path
+
+
+def test_our_files_are_sent_once_and_packed(web: Running) -> None:
+    first = web.client.get("/static/js/main.js")
+    assert first.headers["content-encoding"] == "gzip"
+    assert first.headers["content-type"].startswith("text/javascript")
+    plain = web.client.get("/static/js/main.js", headers={"accept-encoding": "identity"})
+    assert plain.content == first.content
+    assert "content-encoding" not in plain.headers
+    again = web.client.get("/static/js/main.js", headers={"if-none-match": first.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert web.client.head("/static/js/main.js").status_code == 200
+    assert web.client.get("/static/js").status_code == 404
+    assert web.client.get("/static/js/none.js").status_code == 404

@@ -31,6 +31,20 @@ export class Player extends EventTarget {
     this.#strip = strip;
   }
 
+  /** Show the picture that the HTML asked for, until the table of frames is here. @param {string} project */
+  showFirst(project) {
+    const link = document.head.querySelector('link[rel="preload"][as="image"]');
+    link?.remove(); // a page that is opened later has its own first frame
+    if (!(link instanceof HTMLLinkElement) || !link.href.includes(`/media/${project}/`)) return;
+    const image = new Image();
+    const show = () => {
+      const { naturalWidth: width, naturalHeight: height } = image;
+      if (!this.frame) this.#canvas.setFrame(image, { width, height }, "First frame");
+    };
+    image.addEventListener("load", show, { once: true });
+    image.src = link.href;
+  }
+
   /**
    * @param {string} project
    * @param {string} version

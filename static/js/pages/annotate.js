@@ -87,6 +87,7 @@ export class AnnotatePage extends LiveElement {
     );
     this.#fillEvidence();
     this.#listen();
+    this.#player.showFirst(this.project);
     this.#load();
   }
 
@@ -182,11 +183,15 @@ export class AnnotatePage extends LiveElement {
   async #load() {
     this.#tip.textContent = "Loading the frames…";
     try {
-      const [project, system] = await Promise.all([api.getProject(this.project, this.signal), api.getSystem()]);
+      const [project, frames, system] = await Promise.all([
+        api.getProject(this.project, this.signal),
+        api.listFrames(this.project),
+        api.getSystem(),
+      ]);
       this.#objects.palette = system.palette;
       this.#categories = system.categories.map((category) => category.name);
       this.#list.setCategories(system.categories);
-      this.#player.fill(this.project, project.media_version, await api.listFrames(this.project));
+      this.#player.fill(this.project, project.media_version, frames);
       this.#player.seekFrame(Number(this.query.get("frame") ?? -1));
       await this.#reload();
       this.#select(this.query.has("object") ? Number(this.query.get("object")) : null);

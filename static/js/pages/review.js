@@ -61,6 +61,8 @@ export class ReviewPage extends LiveElement {
   #object = -1;
   #candidate = "";
   #handles = false; // whether the 3D view has them
+  /** Objects that were accepted here and are not stored yet, with the candidate. @type {Map<number, string>} */
+  #accepting = new Map();
 
   connected() {
     for (const element of [this.#state, this.#comments, this.#photos]) element.project = this.project;
@@ -113,7 +115,7 @@ export class ReviewPage extends LiveElement {
         getScene(this.project).catch(orNone),
         getCertificate(this.project).catch(orNone),
       ]);
-      this.#groups = groups;
+      this.#groups = groups.map((group) => this.#asAccepted(group));
       this.#items = scene?.items ?? [];
       this.#certificate = certificate;
       const asked = Number(this.query.get("object") ?? this.#object);
@@ -261,8 +263,31 @@ export class ReviewPage extends LiveElement {
     if (reason === null) return;
     const verdict = again ? /** @type {const} */ ("cleared") : said;
     const change = giveVerdict(this.project, group, { candidate: candidate.id, verdict, reason, rerun: true });
-    const stored = await this.#review(outbox.send(change));
-    if (stored && verdict === "accepted" && this.#object === group.object) this.#nextToReview();
+    const answer = outbox.send(change);
+    if (verdict === "accepted") this.#accepted(group, candidate.id, answer);
+    if ((await this.#review(answer)) || verdict !== "accepted") return;
+    this.#choose(group.object); // it was not stored: back to it
+    await this.#load();
+  }
+
+  /**
+   * Go on to the next object at once: the outbox keeps what was said, and the next key is meant for what comes next.
+   * @param {CandidateGroup} group
+   * @param {string} candidate
+   * @param {Promise<unknown>} answer
+   */
+  #accepted(group, candidate, answer) {
+    const stored = () => this.#accepting.delete(group.object);
+    this.#accepting.set(group.object, candidate);
+    answer.then(stored, stored);
+    this.#groups = this.#groups.map((one) => this.#asAccepted(one));
+    if (this.#object === group.object) this.#nextToReview();
+    this.#draw();
+  }
+
+  /** @param {CandidateGroup} group */
+  #asAccepted(group) {
+    return { ...group, accepted: this.#accepting.get(group.object) ?? group.accepted };
   }
 
   /** @param {Partial<OverridePatch>} patch */
@@ -369,7 +394,7 @@ export class ReviewPage extends LiveElement {
 
   /** @type {Record<string, (key: string, fine: boolean) => void>} */
   #actions = {
-    accept: () => this.#onCandidate("accepted"),
+    accept: () => this.#accept(),
     reject: () => this.#onCandidate("rejected"),
     more: () => this.#more(),
     "next-object": () => this.#step(1),
@@ -397,6 +422,13 @@ export class ReviewPage extends LiveElement {
     const group = this.#group;
     if (!group) return;
     this.#correct({ regenerate: (group.override.regenerate ?? 0) + 1 });
+  }
+
+  /** Never takes an acceptance back, however often the key is pressed: the button does. */
+  #accept() {
+    const group = this.#group;
+    if (group?.accepted && group.accepted === this.#candidate) this.#nextToReview();
+    else this.#onCandidate("accepted");
   }
 
   /** @param {"accepted" | "rejected"} verdict */

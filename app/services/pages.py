@@ -1,0 +1,72 @@
+"""The one HTML page, with what its address will ask for first said in its head: nothing waits for a script to ask.
+
+Without this a browser learns of the modules level by level, of the frames from a module, and of the first picture from
+the frames: a round trip each, which a busy machine makes seconds.
+"""
+
+import re
+from functools import lru_cache
+from html import escape
+from pathlib import Path
+from posixpath import join, normpath
+
+from app.db import queries
+from app.db.engine import reading
+from app.errors import NotFound, NotReady
+from app.services import projects
+from app.services.context import Context
+
+OF_A_PROJECT = ("annotate", "run", "review", "download")
+SHOWN_WIDTH = 960  # of a frame, as static/js/annotate/frames.js asks for it
+_IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
+
+
+def html(context: Context, path: str, frame: str = "") -> str:
+    """The page at a path, asking at once for that page's modules and, where frames are clicked, for the one shown first."""
+    page, project = shown_at(path)
+    head = _first_frame(context, project, frame) if page == "annotate" else []
+    head += [f'<link rel="modulepreload" href="/static/{module}" />' for module in modules(context.static, page)]
+    text = (context.static / "index.html").read_text(encoding="utf-8")
+    return text.replace("</head>", "".join(f"  {line}\n  " for line in head) + "</head>", 1)
+
+
+def shown_at(path: str) -> tuple[str, str]:
+    """Which page a path shows and of which project ("" for none), as static/js/router.js says."""
+    first, project, page = [*(part for part in path.split("/") if part), "", "", ""][:3]
+    if first == "people":
+        return "people", ""
+    if first != "p" or not project:
+        return "projects", ""
+    return page if page in OF_A_PROJECT else "overview", project
+
+
+@lru_cache(maxsize=16)
+def modules(static: Path, page: str) -> list[str]:
+    """The modules that the page needs to show itself, relative to the static folder: the shell's and its own."""
+    waiting, found = ["js/main.js", f"js/pages/{page}.js"], dict[str, None]()
+    while waiting:
+        module = waiting.pop(0)
+        if module in found or not (static / module).is_file():
+            continue
+        found[module] = None
+        text = (static / module).read_text(encoding="utf-8")
+        waiting += [normpath(join(module, "..", name)) for name in _IMPORTED.findall(text)]
+    return list(found)
+
+
+def _first_frame(context: Context, project_id: str, frame: str) -> list[str]:
+    """The picture that is seen first, and the table of frames; nothing for a project that is not there or not read yet."""
+    try:
+        with reading(context.engine) as session:
+            project = queries.project_row(session, project_id)
+        indices = [entry["index"] for entry in projects.frame_table(context.files(project))]
+    except (NotFound, NotReady):
+        return []
+    if not indices:
+        return []
+    first = int(frame) if frame in map(str, indices) else indices[0]
+    picture = escape(f"/media/{project.id}/frames/{first}.jpg?w={SHOWN_WIDTH}&v={project.media_version}")
+    return [
+        f'<link rel="preload" as="image" fetchpriority="high" href="{picture}" />',
+        f'<link rel="preload" as="fetch" crossorigin href="/api/projects/{project.id}/frames" />',
+    ]
