@@ -262,6 +262,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     move(bea, "Approve", "the mug is not part of it")
     for page in people:
         expect(page.locator("r2c2r-review-state")).to_contain_text("approved")
+    expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     picture(bea, "18-approved")
 
 
