@@ -247,6 +247,8 @@ def _review(person: Person) -> list[str]:
         expect(page.get_by_text(re.compile(f"^{number} of {len(groups)} object"))).to_be_visible(timeout=LONG_MS)
         if number < len(groups):
             person.press("y")
+    while not all(group["accepted"] for group in person.ask(f"{person.project}/candidates")):
+        page.wait_for_timeout(300)  # they are shown at once and stored one after the other
     unmet: list[str] = []
     for text in ("Send to review", "Start the review", "Approve"):
         button = page.get_by_role("button", name=text, exact=True)

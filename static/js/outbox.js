@@ -76,6 +76,11 @@ class Outbox extends EventTarget {
     return change;
   }
 
+  /** When everything that was said so far is stored or refused. */
+  get settled() {
+    return this.#chain;
+  }
+
   /** @param {Kept} change */
   #enqueue(change) {
     this.#waiting.push(change);

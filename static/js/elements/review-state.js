@@ -4,6 +4,7 @@ import { ApiError, getFigures, getReview, stepReview } from "../api.js";
 import { h, LiveElement } from "../dom.js";
 import { ago, duration } from "../lib/format.js";
 import { live } from "../live.js";
+import { outbox } from "../outbox.js";
 import { askForText } from "./ask-dialog.js";
 import { say, sayError } from "./toasts.js";
 
@@ -67,10 +68,14 @@ export class ReviewState extends LiveElement {
   }
 
   /**
-   * @param {ReviewStatus} status
-   * @param {ReviewMove} move
+   * Take a step once everything said before it is stored: what is unmet is counted anew then.
+   * @param {ReviewStatus} seen
+   * @param {ReviewMove} wanted
    */
-  async #step(status, move) {
+  async #step(seen, wanted) {
+    await outbox.settled;
+    const status = await getReview(this.project).catch(() => seen); // whether it can be reached is said below
+    const move = (status.state === seen.state && status.moves.find(({ to }) => to === wanted.to)) || wanted;
     let reason = "";
     if (move.unmet.length || move.needs_reason) {
       const label = move.unmet.length ? "Why all the same? The history keeps it." : "What has to change?";
@@ -79,7 +84,7 @@ export class ReviewState extends LiveElement {
       reason = given;
     }
     try {
-      await stepReview(this.project, { from_state: status.state, to: move.to, reason });
+      await stepReview(this.project, { from_state: seen.state, to: move.to, reason });
       say(`The project is ${move.to} now`, { kind: "good" });
     } catch (error) {
       sayError(error);
