@@ -34,6 +34,7 @@ ACCURACY = (
     "yaw",
     "pivot",
     "box_iou",
+    "scan_to_mesh_median",
 )
 
 

@@ -12,9 +12,8 @@ _COLUMNS = (
     ("front_centre", "front centre mm", "{:.0f}"),
     ("yaw", "yaw deg", "{:.2f}"),
     ("scan_to_mesh_median", "scan to mesh mm", "{:.1f}"),
-    ("f_score_1cm", "F at 1 cm", "{:.2f}"),
     ("certificate", "certificate", "{:.2f}"),
-    ("minutes", "minutes", "{:.1f}"),
+    ("cpu_minutes", "CPU minutes", "{:.1f}"),
     ("memory", "GB", "{:.1f}"),
 )
 
