@@ -50,7 +50,8 @@ def main() -> None:
     parser.add_argument("--shares", type=float, nargs="*", default=SHARES)
     options = parser.parse_args()
     result = HERE / "registration.json"
-    rows = [row for row in json.loads(result.read_text())["rows"] if row["wrong"] not in options.shares]
+    before = json.loads(result.read_text())["rows"] if result.exists() else []
+    rows = [row for row in before if row["wrong"] not in options.shares]
     for method in methods().values():
         method(*problem(SHARES[0], 0)[:2])  # what is loaded on first use
     for share in options.shares:

@@ -9,7 +9,7 @@ from r2c2r_core.align.protocol import Features, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.geometry.descriptors import mutual_pairs
 
-_MARGIN_PX = 12  # kept around the mask, so that descriptors at its rim see what they did
+_MARGIN_PX = 12  # kept around the mask: of a small keypoint at its rim, most of what its descriptor looks at
 
 
 class SiftMatcher:
