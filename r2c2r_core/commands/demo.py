@@ -1,0 +1,34 @@
+"""`r2c2r demo`."""
+
+import argparse
+from pathlib import Path
+
+from r2c2r_core.commands.options import Parsers, add_command, add_data, web_module
+from r2c2r_core.commands.run import write_bundle
+from r2c2r_core.commands.sample import add_size, write_recording
+from r2c2r_core.commands.serve import add_address
+
+
+def add(parsers: Parsers) -> None:
+    """The command and its options."""
+    added = add_command(parsers, "demo", demo)
+    add_address(added)
+    add_data(added)
+    added.add_argument("--no-serve", action="store_true", help="stop after the bundle is written")
+    add_size(added)
+
+
+def demo(options: argparse.Namespace) -> int:
+    """Sample kitchen, pipeline, certified bundle, and the app opened on it."""
+    folder: Path = options.data / "demo"
+    scan, work = folder / "sample" / "scan.r3d", folder / "work"
+    if not scan.exists():
+        write_recording(scan.parent, frames=options.frames, size=options.size)
+    prompts = scan.with_name("prompts.json")
+    passed = write_bundle(scan, prompts, folder / "kitchen.zip", workdir=work)
+    if not passed or options.no_serve:
+        return 0 if passed else 1
+    app = web_module("serve")
+    project = app.register_finished(options.data, name="Sample kitchen", source=scan, prompts=prompts, workdir=work)
+    app.serve(host=options.host, port=options.port, data_dir=options.data, open_project=project)
+    return 0

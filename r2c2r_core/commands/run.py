@@ -1,0 +1,131 @@
+"""`r2c2r run`."""
+
+import argparse
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from r2c2r_core.commands.options import Parsers, add_command, existing
+from r2c2r_core.errors import InputError
+from r2c2r_core.terminal import show_progress, table
+
+
+def add(parsers: Parsers) -> None:
+    """The command and its options."""
+    added = add_command(parsers, "run", run)
+    added.add_argument("capture", type=Path)
+    added.add_argument("--prompts", type=Path, required=True)
+    added.add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip")
+    added.add_argument("--workdir", type=Path, help="where stages are kept (default: beside the bundle)")
+    added.add_argument("--overrides", type=Path)
+    added.add_argument("--config", type=Path)
+    for seam in ("segmenter", "generator", "matcher"):
+        added.add_argument(f"--{seam}")
+    added.add_argument("--seed", type=int, default=0)
+    added.add_argument("--masks", type=Path, help="write DIR/<object>/<frame:06d>.png")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Headless reconstruction: recording and prompts in, certified bundle out."""
+    passed = write_bundle(
+        existing(options.capture),
+        options.prompts,
+        options.output,
+        workdir=options.workdir,
+        overrides=options.overrides,
+        config=options.config,
+        tools=_given(options, "segmenter", "generator", "matcher"),
+        seed=options.seed,
+        masks=options.masks,
+    )
+    return 0 if passed else 1
+
+
+def write_bundle(
+    capture: Path,
+    prompts: Path,
+    destination: Path,
+    *,
+    workdir: Path | None = None,
+    overrides: Path | None = None,
+    config: Path | None = None,
+    tools: Mapping[str, str] = MappingProxyType({}),
+    seed: int = 0,
+    masks: Path | None = None,
+) -> bool:
+    """Reconstruct, say what came out, and copy the bundle there; whether it is certified and complete.
+
+    `tools` are names of backends by seam: segmenter, generator, matcher.
+    """
+    from r2c2r_core.config import ReconstructConfig, read_config
+    from r2c2r_core.disk import explained_io
+    from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
+    from r2c2r_core.pipeline import Request, Tools, reconstruct, restricted_licences
+    from r2c2r_core.segment.prompts import read_prompts
+    from r2c2r_core.workspace import Workspace
+
+    if destination.suffix != ".zip":
+        raise InputError(f"{destination}: not a .zip", hint="name the bundle, such as -o kitchen.zip")
+    request = Request(
+        source=capture,
+        prompts=read_prompts(prompts),
+        overrides=read_overrides(overrides) if overrides else NO_OVERRIDES,
+        config=read_config(config) if config else ReconstructConfig(),
+        tools=Tools(**tools),
+        seed=seed,
+    )
+    for line in restricted_licences(request.tools):
+        print(f"r2c2r: {line}", file=sys.stderr)
+    work = Workspace(workdir or destination.with_suffix(".work"))
+    with show_progress() as progress:
+        outcome = reconstruct(request, work, progress=progress)
+    assert outcome.reconstruction is not None
+    assert outcome.certificate is not None
+    with explained_io(destination):
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(work.bundle, destination)
+    if masks:
+        _write_masks(outcome.reconstruction, masks)
+    if not outcome.computed:
+        print("nothing changed: every stage was reused")
+    print(_summary(outcome.reconstruction))
+    for name, reason in outcome.failures.items():
+        print(f"r2c2r: {name} is not in the bundle: {reason}", file=sys.stderr)
+    print(f"{destination}: certificate {'passed' if outcome.certificate.passed else 'FAILED'}")
+    return outcome.certificate.passed and not outcome.failures
+
+
+def _given(options: argparse.Namespace, *names: str) -> dict[str, str]:
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def _write_masks(reconstruction: Any, folder: Path) -> None:
+    import cv2
+    import numpy as np
+
+    from r2c2r_core.geometry.masks import unpack_mask
+    from r2c2r_core.workspace import write_atomically
+
+    for track in reconstruction.tracks:
+        for frame_index, packed in track.masks.items():
+            png = cv2.imencode(".png", unpack_mask(packed).astype(np.uint8) * 255)[1]
+            write_atomically(folder / track.name / f"{frame_index:06d}.png", png.tobytes())
+
+
+def _summary(reconstruction: Any) -> str:
+    """Object, category, dimensions, joint, mask frames, placement rms, warnings."""
+    tracks = {track.name: track for track in reconstruction.tracks}
+    placements = {placement.object_name: placement for placement in reconstruction.placements}
+    rows = []
+    for item in reconstruction.scene.objects:
+        width, depth, height = (f"{100 * size:.1f}" for size in item.dimensions_m)
+        joints = ", ".join(f"{joint.type} {joint.upper:.2f}" for joint in item.joints) or "-"
+        placement = placements.get(item.name)
+        rms = f"{1000 * placement.rms_m:.1f}" if placement else "-"
+        warnings = "; ".join(item.warnings + (placement.warnings if placement else ()))
+        frames = len(tracks[item.name].masks) if item.name in tracks else 0
+        rows.append((item.name, item.category, f"{width} x {depth} x {height}", joints, str(frames), rms, warnings))
+    return table(("object", "category", "w x d x h cm", "joint", "masks", "rms mm", "warnings"), rows)
