@@ -127,7 +127,8 @@ class _Trial:
     def mask(self, prompt: ObjectPrompt, frame: int) -> tuple[Mask, float]:
         """What the session shows; nothing where it does not find the object."""
         try:
-            return self.session.find(prompt).mask(self.session.scene.frame(frame))
+            view = self.session.find(prompt).see(self.session.scene.frame(frame))
+            return view.mask, view.trust
         except R2C2RError as error:
             if frame == self.frames[0]:
                 print(f"seed {self.seed}: {error}", file=sys.stderr)

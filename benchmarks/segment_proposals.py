@@ -142,7 +142,7 @@ def _match(session: Any, proposal: Proposal, masks: Path) -> Match:
             continue
         true_mask: Mask = read_mask(file)
         if np.count_nonzero(true_mask) >= MIN_TRUTH_PX:
-            ious.append(mask_iou(true_mask, found.mask(frame)[0]))
+            ious.append(mask_iou(true_mask, found.see(frame).mask))
     return Match(proposal, name, float(np.mean(ious)) if ious else 0.0)
 
 

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -16,11 +15,12 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing, ThingBox
+from r2c2r_core.model.track import MaskTrack, Swing
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliance_clicks import appliance_margins
-from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
+from r2c2r_core.segment.categories import CategoryHint, hint_for
 from r2c2r_core.segment.finders import find_object, glimpse_object
+from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import kept
 from r2c2r_core.segment.prompts import check_prompt
@@ -31,33 +31,6 @@ from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.segment.surface import in_threads
 from r2c2r_core.sources import source_key
-
-
-class Found(Protocol):
-    """An object found from its clicks: what it is, and its pixels in any frame."""
-
-    @property
-    def kind(self) -> Kind:
-        """What it turned out to be."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """One line each, for a person."""
-
-    def mask(self, frame: Frame) -> tuple[Mask, float]:
-        """Visible pixels, and how far to trust them (0..1)."""
-
-    def opened_m(self, frame: Frame) -> float:
-        """How far its front is drawn out in a frame; 0 where closed or not to be told."""
-
-    def swung(self, frame: Frame) -> Swing | None:
-        """How its door stands open in a frame; None where closed or not to be told."""
-
-    def panel(self) -> FrontPanel | None:
-        """Its flat front, measured."""
-
-    def box(self) -> ThingBox | None:
-        """Its box, measured."""
 
 
 class GeometricSegmenter:
@@ -97,14 +70,14 @@ class GeometricSession:
                 f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
                 hint="choose another",
             )
-        return self.find(prompt).mask(self.scene.frame(frame_index))[0]
+        return self.find(prompt).see(self.scene.frame(frame_index)).mask
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
         """A first mask in the frame clicked last: what `stream` brings there, or for small things, from depth alone."""
         found = self._found.get(prompt) or glimpse_object(self, *self._clicked(prompt)) or self.find(prompt)
         frame = self.scene.frame(prompt.points[-1].frame)
-        mask, trust = found.mask(frame)
-        return (frame.index, pack_mask(mask), trust) if np.count_nonzero(mask) >= self.config.least_area_px else None
+        view = found.see(frame)
+        return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None
 
     def prefetch(self) -> Iterator[None]:
         """Decode images, as many as stay in memory."""
@@ -116,9 +89,15 @@ class GeometricSession:
         found = self.find(prompt)
         masks: dict[int, PackedMask] = {}
         confidence: dict[int, float] = {}
+        opened_m: dict[int, float] = {}
+        swung: dict[int, Swing] = {}
         total = len(self.scene.frames)
-        for position, (index, packed, trust) in enumerate(self.stream(prompt)):
-            masks[index], confidence[index] = packed, trust
+        for position, (index, view) in enumerate(self._views(prompt)):
+            masks[index], confidence[index] = pack_mask(view.mask), view.trust
+            if view.opened_m > 0:
+                opened_m[index] = view.opened_m
+            if view.swing is not None:
+                swung[index] = view.swing
             progress.at(min(0.1 + 0.9 * position / total, 0.99), f"{prompt.name}: seen in {position + 1} frames")
         if not masks:
             raise ObjectNotSeen(
@@ -136,17 +115,14 @@ class GeometricSession:
             backend="geometric",
             prompt_count=len(prompt.points),
             warnings=found.warnings,
-            opened_m={index: out for index in sorted(masks) if (out := found.opened_m(self.scene.frame(index))) > 0},
-            swung={index: swing for index in sorted(masks) if (swing := found.swung(self.scene.frame(index))) is not None},
+            opened_m=dict(sorted(opened_m.items())),
+            swung=dict(sorted(swung.items())),
         )
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:
         """Frame, mask, confidence: the frame clicked last, then outwards both ways."""
-        found = self.find(prompt)
-        for frame in _outwards(self.scene.frames, prompt.points[-1].frame):
-            mask, trust = found.mask(frame)
-            if np.count_nonzero(mask) >= self.config.least_area_px:
-                yield frame.index, pack_mask(mask), trust
+        for index, view in self._views(prompt):
+            yield index, pack_mask(view.mask), view.trust
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Proposals so far, surest first, with the share of the work done; the last step has them all."""
@@ -175,6 +151,17 @@ class GeometricSession:
         tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
         for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
             progress.at(done / len(tasks), f"cutting furniture runs {done}/{len(tasks)}")
+
+    def _views(self, prompt: ObjectPrompt) -> Iterator[tuple[int, View]]:
+        """Frames that show it, the one clicked last first, then outwards both ways."""
+        found = self.find(prompt)
+        for frame in _outwards(self.scene.frames, prompt.points[-1].frame):
+            view = found.see(frame)
+            if self._shows(view):
+                yield frame.index, view
+
+    def _shows(self, view: View) -> bool:
+        return bool(np.count_nonzero(view.mask) >= self.config.least_area_px)
 
     def _clicked(self, prompt: ObjectPrompt) -> tuple[CategoryHint, Points, Points]:
         """What the category says, and the world points clicked on it and off it."""

@@ -16,14 +16,14 @@ from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.segment.categories import hint_for
 from r2c2r_core.segment.clicks import best_views, click_on, clump_clicks, panel_clicks
 from r2c2r_core.segment.clutter import Clump, find_clumps
-from r2c2r_core.segment.finders import FoundAppliance, FoundFront
+from r2c2r_core.segment.found import Found, FoundAppliance, FoundFront
 from r2c2r_core.segment.fronts import front_mask
 from r2c2r_core.segment.naming import name_thing
 from r2c2r_core.segment.panels import Panel, find_panels, is_on_wall, outlined, without_sides
 from r2c2r_core.segment.planes import PlaneRegion
 
 if TYPE_CHECKING:
-    from r2c2r_core.segment.geometric import Found, GeometricSession
+    from r2c2r_core.segment.geometric import GeometricSession
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
 
@@ -165,7 +165,7 @@ def _proposal(
         category=panel.category,
         confidence=round(panel.confidence, 3),
         click=click,
-        outline=pack_mask(found.mask(frame)[0]),
+        outline=pack_mask(found.see(frame).mask),
         size_m=(width, panel.front.depth_m or found.front.depth_m, height),
         centre_world=panel.centre,
         handle_px=_handle_px(panel, frame),
@@ -181,7 +181,7 @@ def _present_clump(session: "GeometricSession", clump: Clump, others: list[Propo
         found = _confirmed(session, category, click)
         if found is None or found.kind != "thing":
             continue
-        mask, box = found.mask(frame)[0], found.box()
+        mask, box = found.see(frame).mask, found.box()
         if box is None or np.count_nonzero(mask) < session.config.least_area_px:
             continue
         if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
@@ -224,7 +224,7 @@ def _inside(mask: Mask, frame: Frame, point: Vector3) -> bool:
     return bool(0 <= u < mask.shape[1] and 0 <= v < mask.shape[0] and mask[int(v), int(u)])
 
 
-def _confirmed(session: "GeometricSession", category: str, click: PromptPoint | None) -> "Found | None":
+def _confirmed(session: "GeometricSession", category: str, click: PromptPoint | None) -> Found | None:
     """What a person would get from this click."""
     if click is None:
         return None

@@ -33,7 +33,7 @@ def test_a_carton_on_the_worktop_is_cut_from_it(session: GeometricSession, boxes
 def test_a_category_that_hints_wrong_falls_back_with_a_warning(session: GeometricSession, boxes: Boxes) -> None:
     found = session.find(prompt("carton", "dishwasher", click_on(boxes[0], (1.06, -0.36, 1.0), 60)))
     assert found.kind in ("front", "thing")
-    assert np.count_nonzero(found.mask(boxes[0].frame(60))[0]) > 300
+    assert np.count_nonzero(found.see(boxes[0].frame(60)).mask) > 300
 
 
 def test_a_click_on_nothing_names_the_click_and_the_next_step(boxes: Boxes, tmp_path_factory: pytest.TempPathFactory) -> None:
