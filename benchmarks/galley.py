@@ -19,23 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene import _cpu_seconds, _placed, _proof, _reconstruction, _timed
+from proof import Placed, certificate_figures, placed_by, prove
 
 from r2c2r_core.arrays import Image
-from r2c2r_core.config import ReconstructConfig
-from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
 from r2c2r_core.model.capture import Capture, Depth, FrameImages, SceneSurface, Wall
-from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.track import MaskTrack
-from r2c2r_core.overrides import NO_OVERRIDES
-from r2c2r_core.synthesize.stage import build_scene
-from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace
 
 _AISLE_M = 2.0
 _SECOND = 1_000_000  # added to the second recording's frame numbers
-Placed = tuple[Capture, list[MaskTrack], list[Placement], list[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--objects", type=int, default=20)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
-    first, second = (_placed(Workspace(options.workdir / name)) for name in options.kitchens.split(","))
+    first, second = (placed_by(Workspace(options.workdir / name)) for name in options.kitchens.split(","))
     figures = timed(galley(first, second, options.objects)) | {"kitchens": options.kitchens}
     print(json.dumps(figures))
     if options.json is not None:
@@ -70,49 +63,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def timed(placed: Placed) -> dict[str, Any]:
     """Seconds of each stage, and what the certificate says of the room."""
-    config, seconds, load = ReconstructConfig(), dict[str, float](), os.getloadavg()[0]
-    capture, tracks, placements, assets = placed
-    started = _cpu_seconds()
-    scene = _timed(
-        seconds, "synthesize", lambda: build_scene(capture, tracks, placements, assets, NO_OVERRIDES, config.synthesize)
-    )
-    fitted = _timed(seconds, "warp", lambda: fit_meshes(scene, tracks, placements, assets, config.warp))
+    load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory(prefix="r2c2r-galley-") as folder:
-        result = _reconstruction(placed, fitted)
-        certificate = _timed(seconds, "export", lambda: write_bundle(result, Path(folder) / "bundle.zip", config.export))
-    return _proof(certificate) | {
-        "objects": len(fitted.objects),
-        "joints": len(certificate.joints),
-        "seconds": {name: round(value, 1) for name, value in seconds.items()},
-        "seconds_in_all": round(sum(seconds.values()), 1),
-        "cpu_seconds": round(_cpu_seconds() - started, 1),
+        proof = prove(placed, Path(folder) / "bundle.zip")
+    return certificate_figures(proof.certificate) | {
+        "objects": len(proof.scene.objects),
+        "joints": len(proof.certificate.joints),
+        "seconds": {name: round(value, 1) for name, value in proof.seconds.items()},
+        "seconds_in_all": round(sum(proof.seconds.values()), 1),
+        "cpu_seconds": round(proof.cpu_seconds, 1),
         "load_before": round(load, 1),
     }
 
 
 def galley(first: Placed, second: Placed, objects: int) -> Placed:
     """One room: all of the first kitchen and as many of the second, opposite, as are needed."""
-    fronts = [track.front.world_from_front for track in first[1] if track.front is not None]
-    moved = _moved(second, _opposite(fronts, [t.front.world_from_front for t in second[1] if t.front is not None]))
+    moved = _moved(second, _opposite(_fronts(first), _fronts(second)))
     joined = Capture(
-        name=f"{first[0].name} and {second[0].name}",
-        sha256=first[0].sha256,
-        format=first[0].format,
-        frames=(*first[0].frames, *moved[0].frames),
-        world_from_capture=first[0].world_from_capture,
-        room=replace(first[0].room, walls=(*first[0].room.walls, *moved[0].room.walls)),
-        surface=_together(first[0].surface, moved[0].surface),
-        images=_BothImages(first[0].images, second[0].images),
+        name=f"{first.capture.name} and {second.capture.name}",
+        sha256=first.capture.sha256,
+        format=first.capture.format,
+        frames=(*first.capture.frames, *moved.capture.frames),
+        world_from_capture=first.capture.world_from_capture,
+        room=replace(first.capture.room, walls=(*first.capture.room.walls, *moved.capture.room.walls)),
+        surface=_together(first.capture.surface, moved.capture.surface),
+        images=_BothImages(first.capture.images, second.capture.images),
         notices=(),
     )
-    _, tracks, placements, assets = first
-    _, more_tracks, more_placements, more_assets = moved
-    return (
+    return Placed(
         joined,
-        [*tracks, *more_tracks][:objects],
-        [*placements, *more_placements][:objects],
-        [*assets, *more_assets][:objects],
+        [*first.tracks, *moved.tracks][:objects],
+        [*first.placements, *moved.placements][:objects],
+        [*first.assets, *moved.assets][:objects],
     )
+
+
+def _fronts(placed: Placed) -> list[Rigid3]:
+    return [track.front.world_from_front for track in placed.tracks if track.front is not None]
 
 
 def _opposite(fronts: list[Rigid3], others: list[Rigid3]) -> Rigid3:
@@ -138,7 +125,7 @@ def _moved(placed: Placed, new_from_old: Rigid3) -> Placed:
     surface = replace(capture.surface, vertices_world=new_from_old.apply(capture.surface.vertices_world))
     walls = tuple(_moved_wall(wall, new_from_old) for wall in capture.room.walls)
     similar = Similarity3(1.0, new_from_old.rotation, new_from_old.translation)
-    return (
+    return Placed(
         replace(capture, frames=frames, surface=surface, room=replace(capture.room, walls=walls), poses=None),
         [_moved_track(track, new_from_old) for track in tracks],
         [replace(p, object_name=f"b_{p.object_name}", world_from_mesh=similar @ p.world_from_mesh) for p in placements],

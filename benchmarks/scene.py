@@ -11,30 +11,24 @@ R2C2R_SAPIEN_PYTHON names its environment.
 
 import argparse
 import json
-import os
 import sys
 import tempfile
-import time
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from proof import certificate_figures, mm, placed_by, prove
 from run import _seeds
 from scene_truth import true_limits, true_meetings
 
 from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.simulate import compiled
-from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.export.together import meetings
-from r2c2r_core.model.inputs import ObjectPrompt, Prompts
-from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.model.scene import ArticulatedScene
-from r2c2r_core.overrides import NO_OVERRIDES
-from r2c2r_core.synthesize.stage import build_scene
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace
 
@@ -97,41 +91,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def measure(workdir: Path, seed: int | None) -> dict[str, Any]:
     """All figures of one kitchen; lists of what stands out under "details"."""
-    placed = _placed(Workspace(workdir))
-    seconds: dict[str, float] = {}
-    started = _cpu_seconds()
-    config = ReconstructConfig()
-    capture, tracks, placements, assets = placed
-    scene = _timed(
-        seconds, "synthesize", lambda: build_scene(capture, tracks, placements, assets, NO_OVERRIDES, config.synthesize)
-    )
-    fitted = _timed(seconds, "warp", lambda: fit_meshes(scene, tracks, placements, assets, config.warp))
+    placed = placed_by(Workspace(workdir))
     with tempfile.TemporaryDirectory(prefix="r2c2r-scene-") as folder:
-        bundle = Path(folder) / "bundle.zip"
-        result = _reconstruction(placed, fitted)
-        certificate = _timed(seconds, "export", lambda: write_bundle(result, bundle, config.export))
-        cpu = _cpu_seconds() - started
-        with zipfile.ZipFile(bundle) as archive:
+        proof = prove(placed, Path(folder) / "bundle.zip")
+        with zipfile.ZipFile(proof.bundle) as archive:
             archive.extract("scene.xml", folder)
             archive.extractall(folder, [name for name in archive.namelist() if "/" in name])
         free_mm, details = _where_truth_is_free(Path(folder) / "scene.xml", seed)
-    paper = fit_meshes(scene, tracks, placements, assets, replace(config.warp, method="paper"))
-    total = sum(seconds.values())
-    figures = _proof(certificate) | {
+    scene, certificate, objects = proof.scene, proof.certificate, len(proof.scene.objects)
+    by_paper = replace(ReconstructConfig().warp, method="paper")
+    paper = fit_meshes(proof.primitives, placed.tracks, placed.placements, placed.assets, by_paper)
+    figures = certificate_figures(certificate) | {
         "together_where_free_mm": free_mm,
-        "corner_residual_mm": _residual_mm(fitted),
+        "corner_residual_mm": _residual_mm(scene),
         "corner_residual_paper_mm": _residual_mm(paper),
         "paper_equation_15_mm": max(
-            (_mm(o.warp_residual_paper_m) for o in fitted.objects if o.warp_residual_paper_m), default=None
+            (mm(o.warp_residual_paper_m) for o in scene.objects if o.warp_residual_paper_m), default=None
         ),
-        "without_mesh": sum("the primitive is shown" in line for item in fitted.objects for line in item.warnings),
-        "objects": len(fitted.objects),
+        "without_mesh": sum("the primitive is shown" in line for item in scene.objects for line in item.warnings),
+        "objects": objects,
         "joints": len(certificate.joints),
-        "seconds": {name: round(value, 2) for name, value in seconds.items()},
-        "seconds_20_objects": round(total * OBJECTS / len(fitted.objects), 1),
-        "cpu_seconds_20_objects": round(cpu * OBJECTS / len(fitted.objects), 1),
+        "seconds": {name: round(value, 2) for name, value in proof.seconds.items()},
+        "seconds_20_objects": round(sum(proof.seconds.values()) * OBJECTS / objects, 1),
+        "cpu_seconds_20_objects": round(proof.cpu_seconds * OBJECTS / objects, 1),
     }
-    table = {name: round(value, 4) for name, value in _ratios(fitted, seed, certificate).items()}
+    table = {name: round(value, 4) for name, value in _ratios(scene, seed, certificate).items()}
     return figures | {"table_3": table, "details": details | {"findings": _findings(certificate)}}
 
 
@@ -146,25 +130,6 @@ def worst(measured: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
-def _proof(certificate: Certificate) -> dict[str, Any]:
-    joints = certificate.joints
-    openings = [thing.opening_free for thing in certificate.things if thing.opening_free is not None]
-    cavities = [joint.cavity_open for joint in joints if joint.cavity_open is not None]
-    return {
-        "passed": certificate.passed,
-        "rest_mm": _mm(certificate.rest_penetration_m),
-        "sweep_mm": _mm(max(joint.deepest_penetration_m for joint in joints)),
-        "together_mm": _mm(certificate.together_penetration_m),
-        "travel_percent": round(100 * min(joint.travel_reached for joint in joints), 1),
-        "drift_mm": _mm(certificate.drift_m),
-        "cavity_percent": round(100 * min(cavities), 1),
-        "opening_percent": round(100 * min(openings), 1) if openings else None,
-        "loaders": sum(loader.state == "passed" for loader in certificate.loaders),
-        "errors": sum(finding.severity == "error" for finding in certificate.findings),
-        "realtime_factor": round(certificate.realtime_factor, 1),
-    }
-
-
 def _where_truth_is_free(mjcf: Path, seed: int | None) -> tuple[float | None, dict[str, Any]]:
     """Deepest overlap of two joints' parts, both open, that the true kitchen does not have; within the true limits."""
     if seed is None:
@@ -174,8 +139,8 @@ def _where_truth_is_free(mjcf: Path, seed: int | None) -> tuple[float | None, di
         if any(model.joint(j).name == name for j in range(model.njnt)):
             model.joint(name).range[1] = min(upper, float(model.joint(name).range[1]))
     found = [one for one in meetings(model) if set(one.joints) <= set(limits) and frozenset(one.joints) not in true]
-    listed = [{"joints": one.joints, "mm": _mm(one.depth_m)} for one in found]
-    return max((_mm(one.depth_m) for one in found), default=0.0), {"true_meetings": len(true), "only_ours": listed}
+    listed = [{"joints": one.joints, "mm": mm(one.depth_m)} for one in found]
+    return max((mm(one.depth_m) for one in found), default=0.0), {"true_meetings": len(true), "only_ours": listed}
 
 
 def _ratios(scene: ArticulatedScene, seed: int | None, certificate: Certificate) -> dict[str, float]:
@@ -199,54 +164,13 @@ def _table_3(measured: dict[str, Any]) -> dict[str, float]:
     return {name: round(sum(values) / len(values), 4) for name, values in columns.items()}
 
 
-def _placed(work: Workspace) -> tuple[Any, list[Any], list[Any], list[Any]]:
-    """Capture, tracks, placements and chosen meshes of a finished run."""
-    names = work.names("align")
-    tracks = [work.load_latest("segment", name) for name in names]
-    placements = [work.load_latest("align", name) for name in names]
-    assets = [work.load_latest("generate", name).chosen for name in names]
-    return work.load_latest("ingest", "scene"), tracks, placements, assets
-
-
-def _reconstruction(placed: tuple[Any, list[Any], list[Any], list[Any]], scene: ArticulatedScene) -> Reconstruction:
-    capture, tracks, placements, _ = placed
-    prompts = tuple(ObjectPrompt(name=track.name, category=track.category, points=()) for track in tracks)
-    return Reconstruction(
-        capture=capture,
-        prompts=Prompts(objects=prompts),
-        overrides=NO_OVERRIDES,
-        tracks=tuple(tracks),
-        candidates=(),
-        placements=tuple(placements),
-        scene=scene,
-        stages=(),
-        failures={},
-    )
-
-
 def _residual_mm(scene: ArticulatedScene) -> float | None:
-    return max((_mm(item.warp_residual_m) for item in scene.objects if item.warp_residual_m is not None), default=None)
+    return max((mm(item.warp_residual_m) for item in scene.objects if item.warp_residual_m is not None), default=None)
 
 
 def _findings(certificate: Certificate) -> list[str]:
     said = certificate_to_json(certificate)["findings"]
     return [f"{f['severity']}: {f['rule']}: {f['where']}: {f['message']}" for f in said]
-
-
-def _timed(seconds: dict[str, float], name: str, compute: Callable[[], Any]) -> Any:
-    started = time.monotonic()
-    value = compute()
-    seconds[name] = time.monotonic() - started
-    return value
-
-
-def _cpu_seconds() -> float:
-    """Of this process and of those it waited for (the loaders)."""
-    return sum(os.times()[:4])
-
-
-def _mm(metres: float) -> float:
-    return round(1000 * metres, 3)
 
 
 def _parser() -> argparse.ArgumentParser:
