@@ -99,7 +99,7 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
     joints = [_joint(item, motion, hinge, override) for motion in build.motions]
     warnings = [*item.warnings, *build.notes]
-    if (seen_open := _seen_open(item)) and all(joint.sources["limits"] == "default" for joint in joints):
+    if (seen_open := _seen_open(item, hinge)) and all(joint.sources["limits"] == "default" for joint in joints):
         warnings.append(f"seen open to {seen_open}, which need not be all it opens")
     if hinge is not None and hinge.source == "default":
         warnings.append(f"hinge on the {hinge.side} by default: {hinge.reason}")
@@ -181,7 +181,7 @@ def _link_origin(motion: Motion) -> Vector3:
 def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> Joint:
     """The joint of one moving part; what a person gave, or the scan showed, replaces the category's limits."""
     axis: Source = hinge.source if hinge is not None else "inferred"
-    lower, upper, limits = _limits(item, motion, override)
+    lower, upper, limits = _limits(item, motion, hinge, override)
     feel = item.spec.feel
     return Joint(
         name=f"{item.name}_{motion.part}_joint",
@@ -201,24 +201,27 @@ def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: 
     )
 
 
-def _limits(item: MeasuredObject, motion: Motion, override: ObjectOverride) -> tuple[float, float, Source]:
+def _limits(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> tuple[float, float, Source]:
     """Lower and upper limit and where they come from: a person, the scan of an opened front, or the category."""
     if override.joint_lower is not None or override.joint_upper is not None:
         upper = motion.upper if override.joint_upper is None else override.joint_upper
         return override.joint_lower or 0.0, upper, "person"
-    seen, most = (item.opened_m, float(item.dimensions_m[1])) if motion.type == "prismatic" else (_swing_rad(item), np.pi)
+    slides = motion.type == "prismatic"
+    seen, most = (item.opened_m, float(item.dimensions_m[1])) if slides else (_swing_rad(item, hinge), np.pi)
     if item.spec.several_fronts or seen is None:  # of which drawer, nobody knows
         return 0.0, motion.upper, "default"
     return (0.0, seen, "measured") if _FULLY_OPEN * motion.upper <= seen <= most else (0.0, motion.upper, "default")
 
 
-def _swing_rad(item: MeasuredObject) -> float | None:
-    return item.swung.angle_rad if item.swung is not None and item.spec.opening == "side" else None
+def _swing_rad(item: MeasuredObject, hinge: Hinge | None) -> float | None:
+    """How far its door was seen open on the edge that it hangs on; a person may have put it on the other one."""
+    on_it = item.swung is not None and hinge is not None and item.swung.hinge == hinge.side
+    return item.swung.angle_rad if item.swung is not None and on_it else None
 
 
-def _seen_open(item: MeasuredObject) -> str:
+def _seen_open(item: MeasuredObject, hinge: Hinge | None) -> str:
     """How far the scan shows it open; empty where it does not."""
     if item.opened_m is not None:
         return f"{item.opened_m:.2f} m"
-    swing = _swing_rad(item)
+    swing = _swing_rad(item, hinge)
     return "" if swing is None else f"{np.degrees(swing):.0f} deg"

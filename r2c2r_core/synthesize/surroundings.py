@@ -12,9 +12,10 @@ from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.clearance import gathered, link_boxes, open_freely
 from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.facets import facets_of
 from r2c2r_core.synthesize.fixtures.table import fixture_for
 from r2c2r_core.synthesize.plinths import plinth_runs, plinths
-from r2c2r_core.synthesize.slabs import Slab, facets_of
+from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.worktops import runs_of, worktop
 
 MADE = "made from the scan: nobody clicked it"

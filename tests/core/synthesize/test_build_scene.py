@@ -157,6 +157,17 @@ def test_a_door_that_stood_open_while_filming_tells_its_hinge_and_where_it_stops
     assert any("seen open" in w for w in item.warnings) == (source == "default")
 
 
+def test_how_far_a_door_was_seen_open_says_nothing_of_the_other_edge() -> None:
+    """A person hung it on the left: the angle that the scan shows was about the right edge."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    track = replace(track, swung={frame: Swing(hinge="right", angle_rad=np.deg2rad(102.0)) for frame in (4, 5, 6)})
+    asked = Overrides(objects={"a": ObjectOverride(hinge="left")})
+    joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
+    assert joint.axis_object[2] == -1.0
+    assert (joint.sources["axis"], joint.sources["limits"]) == ("person", "default")
+
+
 def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
     at_edge, off_centre, without = (
         built(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle)).objects[0].joints[0].confidence or 0.0

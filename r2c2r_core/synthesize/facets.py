@@ -1,0 +1,73 @@
+"""The scan as faces to be counted by area: where surface of a direction lies, how much of it, in what colour."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Matrix3, Points
+from r2c2r_core.geometry.meshes import face_areas, face_normals
+from r2c2r_core.model.capture import SceneSurface
+
+BAND_M = 0.01  # surface this near to where most of it lies is one plane
+
+Colour = tuple[float, float, float]  # 0..1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Facets:
+    """Middles and unit normals (n, 3), areas (n,), colours (n, 3) 0..1, of faces; in one frame."""
+
+    middles: Points
+    normals: Points
+    areas: np.ndarray
+    colours: np.ndarray
+
+    @property
+    def area_m2(self) -> float:
+        """All of it."""
+        return float(self.areas.sum())
+
+    @property
+    def colour(self) -> Colour:
+        """The middle of each channel."""
+        red, green, blue = np.median(self.colours, axis=0)
+        return float(red), float(green), float(blue)
+
+    def where(self, chosen: np.ndarray) -> "Facets":
+        """Those of a mask."""
+        return Facets(self.middles[chosen], self.normals[chosen], self.areas[chosen], self.colours[chosen])
+
+    def turned(self, world_from_new: Matrix3) -> "Facets":
+        """The same faces, of the world, in a frame that is turned against it."""
+        return Facets(self.middles @ world_from_new, self.normals @ world_from_new, self.areas, self.colours)
+
+    def within(self, axis: int, low: float, high: float) -> np.ndarray:
+        """Which of them lie between two values of an axis."""
+        return np.asarray((self.middles[:, axis] > low) & (self.middles[:, axis] < high))
+
+
+def facets_of(surface: SceneSurface) -> Facets:
+    """The scan's faces, in the world."""
+    if len(surface.faces) == 0:
+        return Facets(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+    vertices = np.asarray(surface.vertices_world, dtype=np.float64)
+    return Facets(
+        vertices[surface.faces].mean(axis=1),
+        face_normals(vertices, surface.faces),
+        face_areas(vertices, surface.faces),
+        surface.colours[surface.faces].mean(axis=1) / 255.0,
+    )
+
+
+def most_common(values: np.ndarray, areas: np.ndarray, *, least: float) -> float | None:
+    """The value with most area within BAND_M of it, as the median of that; None where that is too little."""
+    if len(values) == 0:
+        return None
+    edges = np.arange(values.min() - BAND_M, values.max() + BAND_M, 0.002)
+    near = np.array([areas[np.abs(values - edge) < BAND_M].sum() for edge in edges])
+    if near.max() < least:
+        return None
+    chosen = np.abs(values - edges[int(np.argmax(near))]) < BAND_M
+    order = np.argsort(values[chosen])
+    summed = np.cumsum(areas[chosen][order])
+    return float(values[chosen][order][np.searchsorted(summed, summed[-1] / 2)])
