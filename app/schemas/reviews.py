@@ -73,6 +73,7 @@ class CandidateGroup(Shape):
     version: int  # grows with every verdict, correction and undo of them
     can_undo: bool
     can_redo: bool
+    can_regenerate: bool  # whether further candidates may be asked for
 
 
 class VerdictIn(Shape):

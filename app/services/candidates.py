@@ -13,6 +13,7 @@ from app.errors import NotFound
 from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services.context import Context
+from r2c2r_core.overrides import MOST_BATCHES
 from r2c2r_core.workspace import Workspace
 
 
@@ -47,6 +48,7 @@ def group_of(context: Context, session: Session, project: Project, item: SceneOb
         version=history.version_of(session, item, "review"),
         can_undo=bool(stacks.done),
         can_redo=bool(stacks.undone),
+        can_regenerate=(override.get("regenerate") or 0) < MOST_BATCHES,
     )
 
 

@@ -98,6 +98,7 @@ export interface CandidateGroup {
   version: number;
   can_undo: boolean;
   can_redo: boolean;
+  can_regenerate: boolean;
 }
 
 /** What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png. */

@@ -57,6 +57,23 @@ export function numberField(text, value, options) {
   return { input, label: h("label", {}, h("span", { class: "muted" }, text), input) };
 }
 
+/**
+ * New children in the place of the old ones. Who was at one of them by keyboard stays where they were: at the one with the same
+ * `data-at`, "what:which", else at the next of the same "what".
+ * @param {HTMLElement} parent
+ * @param {...(Node | string)} children
+ */
+export function renew(parent, ...children) {
+  const at = parent.querySelector("[data-at]:focus-visible");
+  const old = at instanceof HTMLElement ? (at.dataset.at ?? "") : "";
+  const alike = `[data-at^="${CSS.escape(old.split(":")[0] ?? "")}:"]`;
+  const place = at ? [...parent.querySelectorAll(alike)].indexOf(at) : -1;
+  parent.replaceChildren(...children);
+  if (!at) return;
+  const now = /** @type {HTMLElement[]} */ ([...parent.querySelectorAll(alike)]);
+  (now.find((one) => one.dataset.at === old) ?? now[Math.min(place, now.length - 1)])?.focus({ preventScroll: true });
+}
+
 /** An element whose listeners, fetches and timers end when it leaves the page. */
 export class LiveElement extends HTMLElement {
   #controller = new AbortController();
@@ -96,41 +113,4 @@ export class LiveElement extends HTMLElement {
  */
 export function detailOf(event) {
   return /** @type {CustomEvent<T>} */ (event).detail;
-}
-
-/**
- * Whether a key press belongs to a text field.
- * @param {KeyboardEvent} event
- */
-export function isTyping(event) {
-  const target = event.composedPath()[0];
-  if (!(target instanceof HTMLElement)) return false;
-  if (target instanceof HTMLInputElement)
-    return !["range", "checkbox", "radio", "button", "file"].includes(target.type);
-  return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
-}
-
-const SLIDER_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End"];
-
-/**
- * Whether a key press is for the control that was reached by keyboard: Enter on a button, an arrow on a slider.
- * @param {KeyboardEvent} event
- */
-export function isOperating(event) {
-  const target = event.composedPath()[0];
-  if (!(target instanceof Element) || !target.matches(":focus-visible")) return false;
-  if (target.matches("input[type=range]")) return SLIDER_KEYS.includes(event.key);
-  return target.matches("button, a[href], summary, input") && ["Enter", " "].includes(event.key);
-}
-
-const PLAIN_KEYS = "plain-keys";
-
-/** Whether a letter alone is a command (WCAG 2.1.4 asks for a way to turn that off). */
-export function plainKeys() {
-  return localStorage.getItem(PLAIN_KEYS) !== "off";
-}
-
-/** @param {boolean} on */
-export function setPlainKeys(on) {
-  localStorage.setItem(PLAIN_KEYS, on ? "on" : "off");
 }

@@ -6,6 +6,7 @@ import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { strips } from "../../static/js/lib/strips.js";
 import { fit, pinch, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { clicksOfBox } from "../../static/js/lib/box.js";
+import { Gestures } from "../../static/js/lib/gestures.js";
 import { ranked } from "../../static/js/lib/commands.js";
 import { nextDoubtful, worstFirst } from "../../static/js/lib/lanes.js";
 import { disagreements } from "../../static/js/lib/merge.js";
@@ -264,4 +265,30 @@ test("after signing in only a page of this server opens, with its query", () => 
   assert.equal(new URL(nextPage("/.//evil.example/x", here), here).host, "localhost:8000");
   for (const other of [null, "", "//evil.example", "https://evil.example", "javascript:alert(1)", "http://["])
     assert.equal(nextPage(other, here), `${here}/`);
+});
+
+test("a press that stays is a click, one that wanders a box, a click under it is carried, two fingers only zoom", () => {
+  const at = (x, y) => ({ x, y });
+  const free = { pan: false, held: null };
+  const gestures = new Gestures();
+  gestures.press(1, at(10, 10), free);
+  assert.equal(gestures.move(1, at(12, 11), 3), null);
+  assert.deepEqual(gestures.release(1, at(12, 11)), { kind: "click", at: at(12, 11) });
+  gestures.press(1, at(10, 10), free);
+  assert.deepEqual(gestures.move(1, at(30, 40), 3), { kind: "box", from: at(10, 10), to: at(30, 40) });
+  assert.deepEqual(gestures.box, { from: at(10, 10), to: at(30, 40) });
+  assert.deepEqual(gestures.release(1, at(31, 41)), { kind: "box", from: at(10, 10), to: at(31, 41) });
+  gestures.press(1, at(10, 10), { pan: false, held: "mark" });
+  assert.deepEqual(gestures.move(1, at(20, 10), 3), { kind: "carry", held: "mark", at: at(20, 10) });
+  assert.equal(gestures.box, null);
+  assert.deepEqual(gestures.release(1, at(20, 10)), { kind: "drop", held: "mark", at: at(20, 10) });
+  gestures.press(1, at(10, 10), { pan: true, held: null });
+  gestures.move(1, at(20, 10), 3);
+  assert.deepEqual(gestures.move(1, at(21, 12), 3), { kind: "pan", by: at(1, 2) });
+  assert.equal(gestures.release(1, at(21, 12)), null);
+  gestures.press(1, at(10, 10), free);
+  gestures.press(2, at(20, 10), free);
+  assert.equal(gestures.move(2, at(30, 10), 3).kind, "pinch");
+  assert.equal(gestures.release(2, at(30, 10)), null);
+  assert.equal(gestures.release(1, at(10, 10)), null);
 });

@@ -1,6 +1,6 @@
 /**
  * What a person does to the objects, sent through the outbox. Says "object" {object} for every answer, "made" {object} when a
- * click made a new one, "saved" {text, tone} about how it stands.
+ * click made a new one, "clicks" when those on their way changed, "saved" {text, tone} about how it stands.
  */
 
 import * as changes from "../changes.js";
@@ -47,14 +47,24 @@ export class Edits extends EventTarget {
   place(points, { category, infer }) {
     const key = newKey();
     const target = this.#objects.current ?? this.#coming;
-    this.#clicks.set(key, points);
+    this.#onTheirWay(key, points);
     const sent = target === null ? this.#make(key, points, category, infer) : this.#add(key, target, points, infer);
     sent
-      .finally(() => this.#clicks.delete(key))
       .then(
         (object) => this.#say("object", { object }),
-        () => {},
-      );
+        () => {}, // said where it was refused
+      )
+      .finally(() => this.#onTheirWay(key, null));
+  }
+
+  /**
+   * @param {string} key
+   * @param {PointIn[] | null} points null once they are stored or refused
+   */
+  #onTheirWay(key, points) {
+    if (points) this.#clicks.set(key, points);
+    else this.#clicks.delete(key);
+    this.#say("clicks", {});
   }
 
   /**

@@ -18,7 +18,7 @@ const COMING = { id: -1, colour: "#c8ccd4", number: 0, object: -1, current: fals
 export function markersOn(objects, coming, frame) {
   const stored = objects.sorted.flatMap((object, k) =>
     object.points
-      .filter((point) => point.frame === frame && !objects.hidden.has(object.id))
+      .filter((point) => point.frame === frame && !objects.isHidden(object.id))
       .map((point) => ({
         ...point,
         colour: objects.colour(object),
@@ -39,7 +39,7 @@ export function markersOn(objects, coming, frame) {
 export function masksOn(objects, masks, frame) {
   return objects.sorted.flatMap((object) => {
     const mask = masks.on(object.id, frame)?.mask;
-    if (!mask || objects.hidden.has(object.id)) return [];
+    if (!mask || objects.isHidden(object.id)) return [];
     return [{ object: object.id, colour: rgbOf(objects.colour(object)), mask, current: object.id === objects.current }];
   });
 }

@@ -1,21 +1,34 @@
-/** The objects of the project as the page knows them: which is chosen, which are hidden, in which colour each is drawn. */
+/**
+ * The objects of the project as the page knows them: which is chosen, which are hidden, in which colour each is drawn.
+ * Says "change" when any of it is to be drawn anew, "choose" when another one or none is chosen, "gone" {id}.
+ */
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 
-export class SceneObjects {
+export class SceneObjects extends EventTarget {
   /** @type {Map<number, SceneObject>} */
   #all = new Map();
   /** @type {number | null} */
-  current = null;
+  #current = null;
   /** @type {Set<number>} */
-  hidden = new Set();
+  #hidden = new Set();
   /** @type {string[]} */
   palette = ["#e69f00"];
 
   /** @param {SceneObject[]} objects */
   fill(objects) {
     this.#all = new Map(objects.map((object) => [object.id, object]));
-    this.choose(this.current);
+    if (this.#current !== null && !this.#all.has(this.#current)) this.choose(null);
+    else this.#say("change");
+  }
+
+  /** The number of the chosen one. */
+  get current() {
+    return this.#current;
+  }
+
+  get chosen() {
+    return this.#current === null ? null : this.get(this.#current);
   }
 
   get size() {
@@ -25,10 +38,6 @@ export class SceneObjects {
   /** In the order they were made. */
   get sorted() {
     return [...this.#all.values()].toSorted((a, b) => a.id - b.id);
-  }
-
-  get chosen() {
-    return this.current === null ? null : this.get(this.current);
   }
 
   /** @param {number} id */
@@ -46,35 +55,51 @@ export class SceneObjects {
     return this.palette[object.colour % this.palette.length] ?? "#e69f00";
   }
 
-  /**
-   * Whether an answer to a change is news: what the live connection said of the same change may be newer.
-   * @param {SceneObject} object
-   */
-  isNews(object) {
-    return (this.get(object.id)?.version ?? -1) < object.version;
+  /** @param {number} id */
+  isHidden(id) {
+    return this.#hidden.has(id);
+  }
+
+  /** An answer to a change: what the live connection said of the same change may be newer. @param {SceneObject} object */
+  answered(object) {
+    if ((this.get(object.id)?.version ?? -1) < object.version) this.store(object);
   }
 
   /** @param {SceneObject} object one that was deleted goes */
   store(object) {
-    if (object.deleted) this.#all.delete(object.id);
-    else this.#all.set(object.id, object);
+    if (!object.deleted) this.#all.set(object.id, object);
+    else if (this.#all.delete(object.id)) this.#say("gone", { id: object.id });
+    if (object.deleted && this.#current === object.id) this.choose(null);
+    else this.#say("change");
   }
 
   /** @param {number | null} id */
   choose(id) {
-    this.current = id !== null && this.#all.has(id) ? id : null;
+    this.#current = id !== null && this.#all.has(id) ? id : null;
+    this.#say("choose");
+    this.#say("change");
   }
 
-  /** @param {number} id */
+  /** Hide it, or show it again. @param {number} id */
   toggle(id) {
-    if (!this.hidden.delete(id)) this.hidden.add(id);
+    if (!this.#hidden.delete(id)) this.#hidden.add(id);
+    this.#say("change");
   }
 
   /** The chosen one alone, or all again. */
   solo() {
-    if (this.current === null) return;
-    const others = [...this.#all.keys()].filter((id) => id !== this.current);
-    const alone = others.every((id) => this.hidden.has(id));
-    this.hidden = new Set(alone ? [] : others);
+    if (this.#current === null) return;
+    const others = [...this.#all.keys()].filter((id) => id !== this.#current);
+    const alone = others.every((id) => this.#hidden.has(id));
+    this.#hidden = new Set(alone ? [] : others);
+    this.#say("change");
+  }
+
+  /**
+   * @param {string} type
+   * @param {object} [detail]
+   */
+  #say(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 }

@@ -1,7 +1,8 @@
 /** Header, navigation, the current page, messages and help. */
 
 import { getProject } from "../api.js";
-import { detailOf, h, icon, isTyping, LiveElement, plainKeys } from "../dom.js";
+import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { isTyping, plainKeys } from "../keyboard.js";
 import { fetched } from "../later.js";
 import { actionOf, KEYMAP } from "../lib/keymap.js";
 import { counted } from "../lib/format.js";

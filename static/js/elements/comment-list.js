@@ -2,7 +2,7 @@
 
 import { listComments, resolveComment } from "../api.js";
 import { addComment } from "../changes.js";
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, renew } from "../dom.js";
 import { ago, counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -64,7 +64,8 @@ export class CommentList extends LiveElement {
     const shown = this.#settled.checked ? this.#all : this.open;
     this.#heading.textContent = this.open.length ? `${counted(this.open.length, "open comment")}` : "Comments";
     this.#showSettled.hidden = this.open.length === this.#all.length;
-    this.#list.replaceChildren(
+    renew(
+      this.#list,
       ...(shown.length ? shown.map((comment) => this.#item(comment)) : [h("li", { class: "muted" }, "None open.")]),
     );
   }
@@ -84,6 +85,8 @@ export class CommentList extends LiveElement {
     settle.addEventListener("click", () =>
       resolveComment(this.project, comment.id, !settled).then(() => this.load(), sayError),
     );
+    show.dataset.at = `show:${comment.id}`;
+    settle.dataset.at = `settle:${comment.id}`;
     const about = [comment.who, ago(comment.at, Date.now() / 1000), where].filter(Boolean).join(" · ");
     return h("li", {}, show, h("div", { class: "row" }, h("span", { class: "muted grow" }, about), settle));
   }

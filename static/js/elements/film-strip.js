@@ -1,6 +1,6 @@
 /** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
 
-import { h, icon, LiveElement } from "../dom.js";
+import { h, icon, LiveElement, renew } from "../dom.js";
 import { DOUBTFUL } from "../lib/lanes.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
@@ -91,7 +91,8 @@ export class FilmStrip extends LiveElement {
 
   /** @param {LaneView[]} lanes */
   setLanes(lanes) {
-    this.#lanes.replaceChildren(
+    renew(
+      this.#lanes,
       ...lanes.map((lane) => {
         const label = `${lane.name}: seen in ${lane.frames.size} frames`;
         const canvas = h("canvas", { role: "img", "aria-label": label, title: label, width: 1200, height: 12 });
@@ -110,6 +111,7 @@ export class FilmStrip extends LiveElement {
           },
           lane.name,
         );
+        name.dataset.at = `lane:${lane.id}`;
         name.addEventListener("click", () => this.emit("pick-object", lane.id));
         return h("div", { class: lane.current ? "lane current" : "lane" }, name, canvas);
       }),

@@ -1,6 +1,7 @@
 /** The `?` overlay, printed from the keymap the code uses. */
 
-import { h, plainKeys, setPlainKeys } from "../dom.js";
+import { h } from "../dom.js";
+import { plainKeys, setPlainKeys } from "../keyboard.js";
 import { KEYMAP } from "../lib/keymap.js";
 
 const TITLES = { all: "Everywhere", annotate: "Annotate", review: "Review" };

@@ -3,10 +3,11 @@
  * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id, "stop" id.
  */
 
-import { h, icon, LiveElement } from "../dom.js";
+import { h, icon, LiveElement, renew } from "../dom.js";
 import { counted } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
+/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string }} View */
 
 export class ObjectList extends LiveElement {
   #list = h("ul", { class: "object-list" });
@@ -33,28 +34,23 @@ export class ObjectList extends LiveElement {
 
   /**
    * @param {SceneObject[]} objects
-   * @param {{ current: number | null, hidden: Set<number>, colourOf: (object: SceneObject) => string }} view
+   * @param {View} view
    */
-  setObjects(objects, { current, hidden, colourOf }) {
+  setObjects(objects, view) {
+    const { current, isHidden } = view;
     this.#waiting = null;
     if (this.#isTyping(current)) {
-      this.#waiting = () => this.setObjects(objects, { current, hidden, colourOf });
+      this.#waiting = () => this.setObjects(objects, view);
       return;
     }
     this.#new.setAttribute("aria-pressed", String(current === null));
-    const state = JSON.stringify([objects, current, [...hidden]]);
+    const state = JSON.stringify([objects, current, objects.map(isHidden)]);
     if (state === this.#drawn) return;
     this.#drawn = state;
-    this.#list.replaceChildren(
-      ...objects.map((object, k) =>
-        this.#item(object, k + 1, object.id === current, hidden.has(object.id), colourOf(object)),
-      ),
-    );
+    const none = h("li", { class: "muted none" }, "Click a drawer, a door or a thing in the picture.");
+    renew(this.#list, ...(objects.length ? objects.map((object, k) => this.#item(object, k + 1, view)) : [none]));
     if (this.#shown !== current) this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
     this.#shown = current;
-    if (!objects.length) {
-      this.#list.replaceChildren(h("li", { class: "muted" }, "Click a drawer, a door or a thing in the picture."));
-    }
   }
 
   /**
@@ -63,34 +59,30 @@ export class ObjectList extends LiveElement {
    */
   #isTyping(current) {
     const field = document.activeElement;
-    return (
-      field instanceof HTMLInputElement && this.#list.contains(field) && field.dataset.field?.endsWith(`-${current}`)
-    );
+    return field instanceof HTMLInputElement && this.#list.contains(field) && field.dataset.at?.endsWith(`:${current}`);
   }
 
   /**
    * @param {SceneObject} object
    * @param {number} number
-   * @param {boolean} current
-   * @param {boolean} hidden
-   * @param {string} colour
+   * @param {View} view
    */
-  #item(object, number, current, hidden, colour) {
-    const pick = h("button", { type: "button", class: "pick", "aria-pressed": String(current) }, object.name);
-    pick.title = object.name;
-    pick.addEventListener("click", () => this.emit("pick-object", object.id));
-    const eye = h(
-      "button",
-      { type: "button", class: "quiet", "aria-label": `${hidden ? "Show" : "Hide"} ${object.name}` },
-      icon(hidden ? "eye-off" : "eye"),
-    );
-    eye.addEventListener("click", () => this.emit("toggle", object.id));
-    const remove = h(
-      "button",
-      { type: "button", class: "quiet danger", "aria-label": `Delete ${object.name}` },
-      icon("trash"),
-    );
-    remove.addEventListener("click", () => this.emit("delete", object.id));
+  #item(object, number, { current: chosen, isHidden, colourOf }) {
+    const { id, name } = object;
+    const [current, hidden] = [id === chosen, isHidden(object)];
+    const pick = h("button", { class: "pick", "aria-pressed": String(current), title: name }, name);
+    const eye = h("button", { class: "quiet", "aria-label": `${hidden ? "Show" : "Hide"} ${name}` });
+    eye.append(icon(hidden ? "eye-off" : "eye"));
+    const remove = h("button", { class: "quiet danger", "aria-label": `Delete ${name}` }, icon("trash"));
+    for (const [button, type] of /** @type {const} */ ([
+      [pick, "pick-object"],
+      [eye, "toggle"],
+      [remove, "delete"],
+    ])) {
+      button.type = "button";
+      button.dataset.at = `${type}:${id}`;
+      button.addEventListener("click", () => this.emit(type, id));
+    }
     const badge = h("span", { class: "badge" }, String(number));
     const item = h(
       "li",
@@ -100,7 +92,7 @@ export class ObjectList extends LiveElement {
       current ? this.#fields(object) : null,
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
-    item.style.setProperty("--swatch", colour);
+    item.style.setProperty("--swatch", colourOf(object));
     return item;
   }
 
@@ -108,6 +100,7 @@ export class ObjectList extends LiveElement {
   #stop(object) {
     if (object.segment !== "running" && object.segment !== "waiting") return null;
     const stop = h("button", { type: "button", class: "quiet", "aria-label": `Stop finding ${object.name}` }, "Stop");
+    stop.dataset.at = `stop:${object.id}`;
     stop.addEventListener("click", () => this.emit("stop", object.id));
     return stop;
   }
@@ -117,7 +110,7 @@ export class ObjectList extends LiveElement {
     /** @type {(field: string, label: string, value: string, props?: Record<string, string>) => HTMLElement} */
     const field = (name, label, value, props = {}) => {
       const input = h("input", { type: "text", value, "aria-label": `${label} of ${object.name}`, ...props });
-      input.dataset.field = `${name}-${object.id}`;
+      input.dataset.at = `${name}:${object.id}`;
       input.addEventListener("change", () => {
         if (!input.value.trim() || input.value === value) return;
         const type = name === "name" ? "rename" : "categorise";

@@ -5,7 +5,7 @@
 
 import { getProposals, restoreProposals } from "../api.js";
 import { confirmProposals, dismissProposals } from "../changes.js";
-import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
 import { counted } from "../lib/format.js";
 import { neighbour, surest } from "../lib/proposals.js";
 import { live } from "../live.js";
@@ -204,7 +204,7 @@ export class ProposalList extends LiveElement {
     this.#bulk.hidden = !this.#all.items.length;
     this.#every.textContent = `Confirm ${sure}`;
     this.#every.disabled = sure === 0;
-    this.#list.replaceChildren(...this.#all.items.map((item) => this.#row(item)));
+    renew(this.#list, ...this.#all.items.map((item) => this.#row(item)));
     this.#restore.hidden = this.#all.dismissed === 0;
     this.#restore.textContent = `Bring back ${this.#all.dismissed} dismissed`;
   }
@@ -239,6 +239,9 @@ export class ProposalList extends LiveElement {
     yes.addEventListener("click", () => this.#confirm([item.id]));
     const no = h("button", { type: "button", class: "quiet", "aria-label": `Dismiss the ${name}` }, icon("cross"));
     no.addEventListener("click", () => this.#dismiss(item));
+    pick.dataset.at = `pick:${item.id}`;
+    yes.dataset.at = `confirm:${item.id}`;
+    no.dataset.at = `dismiss:${item.id}`;
     return h("li", { class: current ? "current" : "" }, pick, yes, no);
   }
 }

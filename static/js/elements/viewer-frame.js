@@ -39,11 +39,12 @@ export class ViewerFrame extends LiveElement {
     if (!this.#url) this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
     try {
       const session = await openViewer(project);
+      if (!this.isConnected) return; // the page was left meanwhile
       if (session.state === "down" || !session.url) return this.#down(session.message, session);
       if (session.url !== this.#url) this.#embed(session.url);
       this.show(this.#wanted); // it may have changed while the view opened
     } catch (error) {
-      this.#down(error instanceof Error ? error.message : String(error), null);
+      if (this.isConnected) this.#down(error instanceof Error ? error.message : String(error), null);
     }
   }
 
@@ -60,9 +61,11 @@ export class ViewerFrame extends LiveElement {
    * @returns {Promise<void>}
    */
   async #ask(what, again) {
+    if (!this.isConnected) return;
     try {
       this.emit("shown", await showInViewer(this.#project, what));
     } catch (error) {
+      if (!this.isConnected) return;
       if (!(error instanceof ApiError)) return sayError(error);
       if (error.kind === "not-ready") this.emit("not-ready", error.message);
       else if (error.status !== 503) sayError(error);

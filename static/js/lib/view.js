@@ -67,3 +67,21 @@ export function toImage(view, screen) {
 export function toScreen(view, image) {
   return { x: image.x * view.scale + view.x, y: image.y * view.scale + view.y };
 }
+
+/**
+ * Whether a position is in the image.
+ * @param {{ x: number, y: number }} position
+ * @param {Size} image
+ */
+export function isInside({ x, y }, image) {
+  return x >= 0 && y >= 0 && x < image.width && y < image.height;
+}
+
+/**
+ * The nearest position in the image.
+ * @param {{ x: number, y: number }} position
+ * @param {Size} image
+ */
+export function clamped({ x, y }, image) {
+  return { x: Math.min(Math.max(x, 0.5), image.width - 0.5), y: Math.min(Math.max(y, 0.5), image.height - 0.5) };
+}

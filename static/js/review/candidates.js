@@ -47,6 +47,7 @@ function ranked(group) {
 function card(group, candidate, current, told) {
   const show = h("button", { type: "button", class: "show", "aria-label": `Show ${candidate.id} in 3D` });
   show.append(h("img", { src: candidate.thumbnail, alt: "", loading: "lazy" }));
+  show.dataset.at = `show:${candidate.id}`;
   show.addEventListener("click", () => told.show(candidate));
   const second = candidate.id === group.ranking.find((id) => id !== group.chosen);
   const said = candidate.verdict
@@ -113,6 +114,7 @@ function verdict(candidate, said, told) {
     icon(name ?? ""),
     text,
   );
+  button.dataset.at = `${said}:${candidate.id}`;
   button.addEventListener("click", () => told(candidate, said));
   return button;
 }

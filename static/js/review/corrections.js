@@ -12,14 +12,16 @@ const DEGREES = Math.PI / 180;
 /**
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
- * @param {(() => void) | null} move begins to move it; null where there is no box yet
+ * @param {{ move: (() => void) | null, open: boolean }} how `move` begins to move it: null where there is no box yet
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
-export function corrections(group, item, move, change) {
+export function corrections(group, item, { move, open }, change) {
+  const summary = h("summary", {}, "Correct it");
+  summary.dataset.at = "correct:";
   return h(
     "details",
-    { open: hasCorrection(group) },
-    h("summary", {}, "Correct it"),
+    { open: open || hasCorrection(group) },
+    summary,
     h(
       "div",
       { class: "stack" },

@@ -13,7 +13,8 @@ export function objectNav(groups, { current, project, choose }) {
   const done = groups.filter((group) => group.accepted).length;
   const items = groups.map((group) => {
     const [text, tone] = standing(group);
-    const button = h("button", { type: "button", "aria-pressed": String(group.object === current) });
+    const button = h("button", { type: "button", "aria-pressed": String(group.object === current), title: group.name });
+    button.dataset.at = `object:${group.object}`;
     button.append(h("span", { class: "name" }, group.name), h("span", { class: `chip ${tone}` }, text));
     button.addEventListener("click", () => choose(group.object));
     return h("li", {}, button);
@@ -25,16 +26,6 @@ export function objectNav(groups, { current, project, choose }) {
       ? h("ul", {}, ...items)
       : h("p", {}, "Nothing to review yet. ", h("a", { href: `/p/${project}/run` }, "Run the pipeline")),
   ];
-}
-
-/**
- * The next object that nobody accepted yet; undefined when all are.
- * @param {CandidateGroup[]} groups
- * @param {number} object
- */
-export function nextToReview(groups, object) {
-  const at = groups.findIndex((group) => group.object === object);
-  return [...groups.slice(at + 1), ...groups.slice(0, at)].find((group) => !group.accepted);
 }
 
 /**

@@ -1,0 +1,137 @@
+/** What can be done on the page by a key or from the palette, by the names of the keymap. */
+
+import { say } from "../elements/toasts.js";
+
+/**
+ * @typedef {object} Doers
+ * @property {import("./scene-objects.js").SceneObjects} objects
+ * @property {import("./masks.js").Masks} masks
+ * @property {import("./edits.js").Edits} edits
+ * @property {import("./player.js").Player} player
+ * @property {import("./presses.js").Presses} presses
+ * @property {import("./objects-pane.js").ObjectsPane} pane
+ * @property {import("./evidence-pane.js").EvidencePane} evidence
+ * @property {import("./stage-tools.js").StageTools} tools
+ * @property {import("../elements/frame-canvas.js").FrameCanvas} canvas
+ * @property {import("../elements/frame-mosaic.js").FrameMosaic} mosaic
+ */
+
+/** What a key held down must not do again and again. */
+export const ONE_A_PRESS = [
+  "confirm-proposal",
+  "dismiss-proposal",
+  "confirm-all",
+  "segment",
+  "comment",
+  "depth",
+  "mosaic",
+];
+
+/**
+ * @param {Doers} doers
+ * @returns {import("../keyboard.js").Actions}
+ */
+export function actionsOf(doers) {
+  return { ...moves(doers), ...changes(doers), ...looks(doers) };
+}
+
+/**
+ * From frame to frame.
+ * @param {Doers} doers
+ * @returns {import("../keyboard.js").Actions}
+ */
+function moves({ player, objects, masks }) {
+  /** @param {1 | -1} direction */
+  const seekPrompt = (direction) =>
+    player.seekOneOf(new Set((objects.chosen?.points ?? []).map((point) => point.frame)), direction);
+  /** @param {1 | -1} direction */
+  const seekDoubtful = (direction) => {
+    const lane = objects.current === null ? new Map() : masks.lane(objects.current);
+    if (!player.seekDoubtful(lane, direction)) say("No doubtful frame that way.");
+  };
+  return {
+    "next-frame": () => player.seek(player.position + 1),
+    "previous-frame": () => player.seek(player.position - 1),
+    "forward-ten": () => player.seek(player.position + 10),
+    "back-ten": () => player.seek(player.position - 10),
+    "first-frame": () => player.seek(0),
+    "last-frame": () => player.seek(player.frames.list.length - 1),
+    play: () => player.play(),
+    "next-prompt": () => seekPrompt(1),
+    "previous-prompt": () => seekPrompt(-1),
+    "next-doubtful": () => seekDoubtful(1),
+    "previous-doubtful": () => seekDoubtful(-1),
+  };
+}
+
+/**
+ * What is stored.
+ * @param {Doers} doers
+ * @returns {import("../keyboard.js").Actions}
+ */
+function changes({ objects, edits, player, pane: { proposals }, presses }) {
+  const deleteLast = () => {
+    const last = objects.chosen?.points.findLast((point) => point.frame === player.frame?.index);
+    if (last) edits.removePoint(last.id);
+  };
+  return {
+    undo: () => edits.undoRedo("undo", player.frame?.index),
+    redo: () => edits.undoRedo("redo", player.frame?.index),
+    "delete-point": deleteLast,
+    segment: () => edits.segment(),
+    "cancel-segment": () => edits.stopSegmenting(),
+    "confirm-proposal": () => proposals.confirm(),
+    "dismiss-proposal": () => proposals.dismiss(),
+    "next-proposal": () => proposals.move(1),
+    "previous-proposal": () => proposals.move(-1),
+    "confirm-all": () => proposals.confirmAll(),
+    comment: () => (presses.pinning = !presses.pinning),
+  };
+}
+
+/**
+ * What is chosen and shown.
+ * @param {Doers} doers
+ * @returns {import("../keyboard.js").Actions}
+ */
+function looks({ objects, masks, player, canvas, tools, evidence, mosaic }) {
+  const openMosaic = () => {
+    const object = objects.chosen;
+    if (!object) return say("Choose an object first.");
+    const { id, name } = object;
+    const { frames } = player;
+    const looked = { id, name, colour: objects.colour(object), lane: masks.lane(id) };
+    mosaic.open(looked, frames.list, (frame, width) => frames.url(frame, width));
+  };
+  return {
+    "pick-number": (key) => objects.choose(objects.sorted[Number(key) - 1]?.id ?? objects.current),
+    finish: () => objects.choose(null),
+    hide: () => objects.current !== null && objects.toggle(objects.current),
+    solo: () => objects.solo(),
+    raw: () => canvas.showRaw(true),
+    depth: () => player.switchDepth(),
+    mosaic: openMosaic,
+    fit: () => canvas.fit(),
+    sign: () => tools.switchSign(),
+    evidence: () => (evidence.open = !evidence.open),
+    crosshair: () => canvas.showCrosshair(!canvas.crosshair),
+  };
+}
+
+/**
+ * What the palette offers besides the keys: a frame by its number, an object, a category.
+ * @param {string} typed
+ * @param {Pick<Doers, "player" | "objects">} doers
+ * @param {string[]} categories
+ * @param {(category: string) => void} categorise
+ * @returns {import("../lib/commands.js").Command[]}
+ */
+export function offers(typed, { player, objects }, categories, categorise) {
+  const position = player.frames.positionOf(Number(typed || Number.NaN));
+  const frame = position < 0 ? [] : [{ text: `${typed.trim()}: go to that frame`, run: () => player.seek(position) }];
+  return [
+    ...frame,
+    ...objects.sorted.map(({ id, name }) => ({ text: `Object ${name}`, run: () => objects.choose(id) })),
+    ...categories.map((name) => ({ text: `Category ${name}`, run: () => categorise(name) })),
+  ];
+}

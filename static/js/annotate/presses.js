@@ -1,0 +1,83 @@
+/**
+ * What a press on the frame means: a click or a box of an object, or the place of a comment.
+ * Says "pinning" when the next click is to say where a comment belongs, or no longer is; "pin" {frame, x, y} once it did.
+ */
+
+import { say } from "../elements/toasts.js";
+import { clicksOfBox } from "../lib/box.js";
+
+/** @typedef {import("../api-types").PointIn} PointIn */
+/** @typedef {{ x: number, y: number }} Spot in pixels of the frame */
+
+export class Presses extends EventTarget {
+  #objects;
+  #edits;
+  #player;
+  #category;
+  #pinning = false;
+  #batching = false;
+
+  /**
+   * @param {import("./scene-objects.js").SceneObjects} objects
+   * @param {import("./edits.js").Edits} edits
+   * @param {import("./player.js").Player} player
+   * @param {() => string} category of the next object
+   */
+  constructor(objects, edits, player, category) {
+    super();
+    this.#objects = objects;
+    this.#edits = edits;
+    this.#player = player;
+    this.#category = category;
+  }
+
+  /** Whether the next click is the place of a comment. */
+  get pinning() {
+    return this.#pinning;
+  }
+
+  set pinning(on) {
+    this.#pinning = on;
+    this.dispatchEvent(new Event("pinning"));
+  }
+
+  /** @param {Spot & { label: 0 | 1, hold: boolean }} point */
+  click({ x, y, label, hold }) {
+    const frame = this.#player.frame?.index;
+    if (frame === undefined) return;
+    if (this.#pinning) return this.#pin({ frame, x, y });
+    if (this.#objects.current === null && label === 0)
+      return say("Left click on the object first: a right click takes away from the chosen one.");
+    this.#place([{ frame, x, y, label }], hold);
+  }
+
+  /** @param {{ from: Spot, to: Spot, hold: boolean }} box */
+  box({ from, to, hold }) {
+    const { frame } = this.#player;
+    const points = frame && clicksOfBox(from, to, frame);
+    if (points) this.#place(points, hold);
+  }
+
+  /** The key that holds masks back was let go. */
+  release() {
+    if (!this.#batching) return;
+    this.#batching = false;
+    this.#edits.segment();
+  }
+
+  /**
+   * Clicks on the current object, or on a new one.
+   * @param {PointIn[]} points
+   * @param {boolean} hold whether more will follow before masks are wanted
+   */
+  #place(points, hold) {
+    this.#batching = hold;
+    this.#edits.place(points, { category: this.#category(), infer: !hold });
+  }
+
+  /** @param {Spot & { frame: number }} pin */
+  #pin(pin) {
+    this.pinning = false;
+    this.dispatchEvent(new CustomEvent("pin", { detail: pin }));
+  }
+}

@@ -1,0 +1,39 @@
+/** What can be done in the review by a key or from the palette, by the names of the keymap. */
+
+/** What a key held down must not do again and again. */
+export const ONE_A_PRESS = ["comment", "more", "accept", "reject"];
+
+/**
+ * @param {object} doers
+ * @param {import("./objects.js").ReviewObjects} doers.objects
+ * @param {import("./decisions.js").Decisions} doers.decisions
+ * @param {import("./centre.js").Centre} doers.centre
+ * @param {() => void} doers.comment
+ * @returns {import("../keyboard.js").Actions}
+ */
+export function actionsOf({ objects, decisions, centre, comment }) {
+  const { bar, photos, joints, mover } = centre;
+  return {
+    accept: () => decisions.accept(),
+    reject: () => decisions.reject(),
+    more: () => decisions.more(),
+    undo: () => decisions.undoRedo("undo"),
+    redo: () => decisions.undoRedo("redo"),
+    comment,
+    "next-object": () => objects.step(1),
+    "previous-object": () => objects.step(-1),
+    "next-photo": () => photos.move(1),
+    "previous-photo": () => photos.move(-1),
+    blink: () => photos.blink(true),
+    sweep: () => joints.sweep(objects.group?.name ?? null),
+    "view-candidate": () => bar.set("candidate"),
+    "view-aligned": () => bar.set("aligned"),
+    "view-scene": () => bar.set("scene"),
+    "view-cloud": () => bar.set("cloud"),
+    "view-photo": () => bar.set("photo"),
+    "move-object": () => bar.move(!bar.moving),
+    nudge: (key, fine) => centre.nudge(key, fine),
+    "store-move": () => bar.moving && mover.store(),
+    "drop-move": () => bar.moving && mover.drop(),
+  };
+}

@@ -1,0 +1,75 @@
+/** The right of the review: the chosen object, what speaks for and against it, its candidates, what may be corrected. */
+
+import { h, icon } from "../dom.js";
+import { counted } from "../lib/format.js";
+import { choice, gallery } from "./candidates.js";
+import { corrections } from "./corrections.js";
+import { findingsOf, placement } from "./evidence.js";
+
+/** @typedef {import("../api-types").Candidate} Candidate */
+/** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
+/** @typedef {import("./decisions.js").Decisions} Decisions */
+/** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
+/**
+ * @typedef {object} Asked what a press may ask of the page
+ * @property {(candidate: Candidate) => void} show
+ * @property {(() => void) | null} move null where there is no box to move
+ * @property {() => void} comment
+ */
+
+/**
+ * @param {ReviewObjects} objects
+ * @param {Decisions} decisions
+ * @param {Asked} asked
+ * @param {boolean} correcting whether what may be corrected is to be seen
+ * @returns {(Node | string)[]}
+ */
+export function panel(objects, decisions, asked, correcting) {
+  const { group, item, groups, certificate, candidate } = objects;
+  if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
+  const names = groups.map(({ name }) => name);
+  return [
+    heading(group, decisions),
+    choice(group),
+    group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
+    findingsOf(certificate, group.name, names),
+    corrections(group, item, { move: asked.move, open: correcting }, (patch) => decisions.correct(patch)),
+    h("h3", {}, counted(group.candidates.length, "candidate")),
+    gallery(group, candidate, { show: asked.show, verdict: (one, said) => decisions.judge(one, said) }),
+    others(group, decisions, asked),
+  ];
+}
+
+/**
+ * @param {CandidateGroup} group
+ * @param {Decisions} decisions
+ */
+function heading(group, decisions) {
+  const undo = h("button", { class: "quiet", disabled: !group.can_undo, "aria-label": "Undo" }, icon("undo"));
+  undo.dataset.at = "undo:";
+  undo.addEventListener("click", () => decisions.undoRedo("undo"));
+  return h("div", { class: "row" }, h("h2", {}, group.name), h("span", { class: "chip" }, group.category), undo);
+}
+
+/**
+ * Other candidates than these, and words about them.
+ * @param {CandidateGroup} group
+ * @param {Decisions} decisions
+ * @param {Asked} asked
+ */
+function others(group, decisions, { comment }) {
+  const mesh = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
+  mesh.addEventListener("change", () => mesh.files?.[0] && decisions.upload(mesh.files[0]));
+  /** @type {[string, string, () => void, string][]} */
+  const buttons = [
+    ["more", "More candidates", () => decisions.more(), group.can_regenerate ? "" : "no further ones are made"],
+    ["upload", "Upload a mesh…", () => mesh.click(), ""],
+    ["comment", "Comment", comment, ""],
+  ];
+  const made = buttons.map(([at, text, act, not]) => {
+    const button = h("button", { type: "button", disabled: not !== "", title: not, onClick: act }, text);
+    button.dataset.at = `${at}:`;
+    return button;
+  });
+  return h("div", { class: "row" }, ...made, mesh);
+}
