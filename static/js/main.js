@@ -1,5 +1,6 @@
 /** The only file with side effects: defines the shell's elements and starts the router. */
 
+import { merged } from "./conflict.js";
 import { AppShell } from "./elements/app-shell.js";
 import { CommandPalette } from "./elements/command-palette.js";
 import { HelpOverlay } from "./elements/help-overlay.js";
@@ -18,6 +19,6 @@ customElements.define("r2c2r-palette", CommandPalette);
 customElements.define("r2c2r-review-state", ReviewState);
 customElements.define("r2c2r-app", AppShell);
 
-outbox.merge = async (change, stored) => (await import("./conflict.js")).merged(change, stored);
+outbox.merge = merged;
 const shell = document.querySelector("r2c2r-app");
 if (shell instanceof AppShell) startRouter((route) => shell.show(route));

@@ -1,11 +1,14 @@
 /**
  * Changes on their way to the server, one after the other. Each is kept in the browser's storage until it is answered, so that
- * neither a lost connection nor a closed tab loses any; its key lets the server do it once however often it is sent.
- * Says "change" whenever the number of waiting ones or the state does, "refused" when one of an earlier visit is.
+ * neither a lost connection nor a closed tab loses any; its key lets the server do it once however often it is sent. A tab sends
+ * its own, and those of tabs that are gone.
+ * Says "change" whenever the number of waiting ones or the state does, "caught-up" when those of another tab are stored, "refused"
+ * {detail: error} when one of them is not.
  */
 
 import { ApiError, perform } from "./api.js";
-import { forget, keep, keptBy, named } from "./lib/kept.js";
+import { forget, isChange, keep, keptBy, named } from "./lib/kept.js";
+import { Tabs } from "./lib/tabs.js";
 import { live } from "./live.js";
 
 /** @typedef {import("./lib/kept.js").Kept} Kept */
@@ -18,9 +21,11 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5000;
 const NOT_MADE = { kind: "not-made", message: "the object of this click could not be made", hint: "click it again" };
 
-class Outbox extends EventTarget {
+export class Outbox extends EventTarget {
   #chain = Promise.resolve();
-  #user = "";
+  #tabs;
+  /** Whose changes these are; null while it is not known. @type {string | null} */
+  #user = null;
   /** @type {Kept[]} */
   #waiting = [];
   /** What to send instead of a change that somebody else's disagrees with; null lets theirs stand. @type {(change: Kept, stored: unknown) => Promise<Change<unknown> | null>} */
@@ -30,9 +35,12 @@ class Outbox extends EventTarget {
   /** Whether what waits would outlive this page. */
   safe = true;
 
-  constructor() {
+  /** @param {Tabs} tabs */
+  constructor(tabs) {
     super();
+    this.#tabs = tabs;
     addEventListener("beforeunload", (event) => this.#waiting.length && !this.safe && event.preventDefault());
+    addEventListener("storage", ({ key }) => tabs.known && isChange(key) && this.#inherit());
   }
 
   get waiting() {
@@ -40,19 +48,34 @@ class Outbox extends EventTarget {
   }
 
   /**
-   * Know whose changes these are, and send what an earlier visit of that person left.
+   * Know whose changes these are, and send what earlier visits of that person left.
    * @param {string} user
    */
   begin(user) {
     this.#user = user;
     this.#waiting = this.#waiting.map((one) => (one.user ? one : this.#keep({ ...one, user })));
+    this.#inherit();
+  }
+
+  /** What other tabs of this person keep is sent here once they are gone. */
+  #inherit() {
+    if (this.#user === null) return;
+    for (const { tab } of keptBy(localStorage, this.#user))
+      this.#tabs.whenGone(tab, () => Promise.all(this.#left(tab).map((change) => this.#sendLeft(change))));
+  }
+
+  /** What that tab left. @param {string} tab */
+  #left(tab) {
     const here = new Set(this.#waiting.map(({ key }) => key));
-    for (const change of keptBy(localStorage, user).filter(({ key }) => !here.has(key))) {
-      this.#enqueue(change).then(
-        () => this.dispatchEvent(new Event("caught-up")),
-        (error) => this.dispatchEvent(new CustomEvent("refused", { detail: error })),
-      );
-    }
+    return keptBy(localStorage, this.#user ?? "").filter((change) => change.tab === tab && !here.has(change.key));
+  }
+
+  /** @param {Kept} change */
+  #sendLeft(change) {
+    return this.#enqueue(change).then(
+      () => this.dispatchEvent(new Event("caught-up")),
+      (error) => this.dispatchEvent(new CustomEvent("refused", { detail: error })),
+    );
   }
 
   /**
@@ -63,7 +86,7 @@ class Outbox extends EventTarget {
    * @returns {Promise<T>}
    */
   send(change, key = newKey()) {
-    const kept = { ...change, key, user: this.#user, at: now() };
+    const kept = { ...change, key, user: this.#user ?? "", tab: this.#tabs.mine, at: now() };
     return /** @type {Promise<T>} */ (this.#enqueue(this.#keep(kept)));
   }
 
@@ -202,4 +225,4 @@ function online(wait) {
   });
 }
 
-export const outbox = new Outbox();
+export const outbox = new Outbox(new Tabs(globalThis.navigator?.locks, newKey()));

@@ -2,7 +2,9 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 const kept = new Map();
-globalThis.addEventListener ??= () => {};
+/** What listens to the browser's storage. */
+const listeners = [];
+globalThis.addEventListener = (type, act) => type === "storage" && listeners.push(act);
 globalThis.localStorage = {
   get length() {
     return kept.size;
@@ -12,7 +14,8 @@ globalThis.localStorage = {
   setItem: (name, text) => kept.set(name, text),
   removeItem: (name) => kept.delete(name),
 };
-const { outbox } = await import("../../static/js/outbox.js");
+const { Outbox, outbox } = await import("../../static/js/outbox.js");
+const { Tabs } = await import("../../static/js/lib/tabs.js");
 const { live } = await import("../../static/js/live.js");
 
 /** A server that answers what it is told to. */
@@ -120,4 +123,53 @@ test("what was done before it is known who does it is that person's", async () =
   outbox.begin("ann");
   assert.deepEqual([...kept.values()].map((text) => JSON.parse(text).user), ["ann"]);
   await sent;
+});
+
+/** A browser's locks: one holder each, the others in the order they came; `close` is the end of a tab. */
+function locksOf(all) {
+  const mine = [];
+  return {
+    async request(name, act) {
+      const queue = (all[name] ??= []);
+      const before = queue.at(-1);
+      let free;
+      const turn = new Promise((resolve) => (free = resolve));
+      queue.push(turn);
+      mine.push(free);
+      await before;
+      await act();
+      free();
+    },
+    close: () => mine.forEach((free) => free()),
+  };
+}
+
+test("what waits in an open tab is left to it; once it is gone one of the others sends it, once", async () => {
+  const all = {};
+  const tabs = ["one", "two", "three"].map((name) => ({ locks: locksOf(all), name }));
+  const [one, two, three] = tabs.map(({ locks, name }) => new Outbox(new Tabs(locks, name)));
+  const asked = [];
+  globalThis.fetch = async (path) => {
+    asked.push(path);
+    throw new TypeError("no network");
+  };
+  one.begin("ann");
+  one.send(change("/a"));
+  one.send(change("/b"));
+  two.begin("ann"); // opened while they wait
+  three.begin("bea");
+  for (const heard of listeners) heard({ key: [...kept.keys()][0] });
+  await new Promise((resolve) => setTimeout(resolve));
+  assert.deepEqual([one.waiting, two.waiting, three.waiting], [2, 0, 0]);
+  assert.deepEqual(new Set(asked), new Set(["/a"]));
+  globalThis.fetch = () => new Promise(() => {}); // the first tab says nothing any more
+  live.dispatchEvent(new Event("online"));
+  await new Promise((resolve) => setTimeout(resolve));
+  asked.length = 0;
+  globalThis.fetch = async (path) => (asked.push(path), new Response("{}"));
+  tabs[0].locks.close();
+  await new Promise((resolve) => two.addEventListener("caught-up", resolve));
+  await two.settled;
+  assert.deepEqual(asked, ["/a", "/b"]);
+  assert.equal(kept.size, 0);
 });

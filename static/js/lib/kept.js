@@ -1,10 +1,15 @@
 /** Changes kept in the browser's storage until the server has answered them, each in an item of its own: tabs do not overwrite each other's. */
 
 /** @typedef {import("../changes.js").Change} Change */
-/** @typedef {Change & { key: string, user: string, at: number }} Kept */
+/** @typedef {Change & { key: string, user: string, tab: string, at: number }} Kept of whom, made in which tab, when */
 /** @typedef {Pick<Storage, "getItem" | "setItem" | "removeItem" | "key" | "length">} Store */
 
 const PREFIX = "r2c2r-change-";
+
+/** Whether an item of the storage is a change. @param {string | null} name */
+export function isChange(name) {
+  return Boolean(name?.startsWith(PREFIX));
+}
 
 /**
  * @param {Store} store
@@ -35,7 +40,7 @@ export function forget(store, change) {
  * @returns {Kept[]}
  */
 export function keptBy(store, user) {
-  const names = Array.from({ length: store.length }, (_, k) => store.key(k)).filter((name) => name?.startsWith(PREFIX));
+  const names = Array.from({ length: store.length }, (_, k) => store.key(k)).filter(isChange);
   return names
     .toSorted()
     .map((name) => parsed(store.getItem(name ?? "")))
