@@ -107,3 +107,16 @@ def body(kind: str, message: str, hint: str = "", current: Any = None) -> dict[s
 def error_body(error: core.R2C2RError) -> dict[str, Any]:
     """The error as the API says it."""
     return body(kind_of(error)[0], error.message, error.hint, getattr(error, "current", None))
+
+
+def told(error: core.R2C2RError) -> dict[str, str]:
+    """The error as one process tells it to another, in JSON."""
+    return {"kind": type(error).__name__, "message": error.message, "hint": error.hint}
+
+
+def told_body(told: dict[str, Any]) -> dict[str, Any]:
+    """What another process told of its failure, as the API says it: class names become kinds."""
+    by_class = {cls.__name__: kind for cls, kind, _ in KINDS}
+    kind = str(told.get("kind", "error"))
+    known = by_class.get(kind, kind if kind.islower() else "internal")
+    return body(known, str(told.get("message", "")), str(told.get("hint", "")))

@@ -59,6 +59,16 @@ class ProjectFiles:
         """The frame table (frames.json), written when the recording was read."""
         return self.root / "frames.json"
 
+    @property
+    def facts(self) -> Path:
+        """What the recording is (facts.json), written when it was read."""
+        return self.root / "facts.json"
+
+    @property
+    def scan_pictures(self) -> tuple[Path, ...]:
+        """Pictures of the fused scan that there may be."""
+        return tuple(self.root.glob("scan-*.png"))
+
 
 def project_files(data_dir: Path, project_id: str, work: str | None = None) -> ProjectFiles:
     """The files of a project; `work` when its workspace is elsewhere."""

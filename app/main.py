@@ -5,13 +5,11 @@ import errno
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import partial
 
 import anyio
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
 from app import errors, schemas
@@ -40,11 +38,11 @@ from app.routes import (
 from app.routes.once import Once
 from app.routes.static import PageFiles
 from app.security import Guard, Person
-from app.services import masks, sending
+from app.services import leftovers, masks, sending
 from app.services.context import Context
 from app.services.people import People
 from app.services.prompts import tell_object
-from app.services.uploads import tidy as tidy_uploads
+from app.services.uploads import forget_stopped
 from app.settings import Settings, shipped
 from app.viewer.client import Viewer
 from r2c2r_core.errors import R2C2RError
@@ -112,20 +110,24 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
     return context
 
 
-def _person_of(app: FastAPI, session: str) -> Person | None:
+async def _person_of(app: FastAPI, session: str) -> Person | None:
     context: Context = app.state.context
-    return context.people.of(session)
+    return await context.people.of(session)
 
 
 async def _tidy(context: Context) -> None:
     """Close what nobody looks at any more."""
     while True:
         await asyncio.sleep(TIDY_S)
-        for tidy in (context.viewer.close_idle, partial(tidy_uploads, context), partial(sending.tidy, context)):
+        for tidy in (_close_idle_views, forget_stopped, leftovers.tidy, sending.tidy):
             try:
-                await anyio.to_thread.run_sync(tidy)
+                await anyio.to_thread.run_sync(tidy, context)
             except Exception:  # a full disk or a locked database now must not end tidying for good
                 _log.exception("tidying")
+
+
+def _close_idle_views(context: Context) -> None:
+    context.viewer.close_idle()
 
 
 def _tell(context: Context, project: str, number: int) -> None:
@@ -160,13 +162,6 @@ def _add_error_handlers(app: FastAPI) -> None:
     async def refused(_: Request, error: HTTPException) -> JSONResponse:
         kind = STATUS_KINDS.get(error.status_code, "error")
         return JSONResponse(errors.body(kind, str(error.detail)), error.status_code, headers=error.headers)
-
-    @app.exception_handler(OperationalError)
-    async def database(request: Request, error: OperationalError) -> JSONResponse:
-        if "disk" in str(error.orig) or "full" in str(error.orig):
-            return _full_disk()
-        _log.exception("%s %s", request.method, request.url.path, exc_info=error)
-        return JSONResponse(errors.body("environment", "the database does not answer", "try again in a moment"), 503)
 
     @app.exception_handler(OSError)
     async def files(request: Request, error: OSError) -> JSONResponse:

@@ -5,21 +5,23 @@ database knows (app.services.people), so a restart keeps people in and signing o
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
 from typing import Literal
 from urllib.parse import parse_qs, quote, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import cookie_parser
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import body
+from app.errors import body, kind_of
+from r2c2r_core.errors import R2C2RError
 
 COOKIE = "r2c2r_session"
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 OPEN_PATHS = ("/api/health", "/api/login", "/login", "/static/", "/favicon.ico")
 Role = Literal["annotator", "reviewer", "admin"]
+Refusal = tuple[int, str, str, str]  # status, kind, message, hint
 ROLES: tuple[Role, ...] = ("annotator", "reviewer", "admin")  # each may do what those before it may
 PAGE_POLICY = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -44,17 +46,15 @@ class Person:
 
 def session_in(cookie_header: str) -> str:
     """The session id of a request's cookies; empty when there is none."""
-    try:
-        cookies = SimpleCookie(cookie_header)
-    except CookieError:
-        return ""
-    return cookies[COOKIE].value if COOKIE in cookies else ""
+    return cookie_parser(cookie_header).get(COOKIE, "")  # other apps of this machine may have set anything beside it
 
 
 class Guard:
     """The middleware."""
 
-    def __init__(self, app: ASGIApp, person_of: Callable[[str], Person | None], allowed_hosts: tuple[str, ...]) -> None:
+    def __init__(
+        self, app: ASGIApp, person_of: Callable[[str], Awaitable[Person | None]], allowed_hosts: tuple[str, ...]
+    ) -> None:
         self.app, self.person_of, self.allowed_hosts = app, person_of, allowed_hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -64,31 +64,40 @@ class Guard:
             return
         headers = Headers(scope=scope)
         session = session_in(headers.get("cookie", ""))
-        person = self.person_of(session) if session else None
-        refusal = self._refusal(scope, headers, person)
+        refusal, person = self._foreign(scope, headers), None
+        try:
+            person = await self.person_of(session) if session and refusal is None else None
+        except R2C2RError as error:  # the database does not answer
+            kind, status = kind_of(error)
+            refusal = status, kind, error.message, error.hint
+        refusal = refusal or (_closed(scope) if person is None else None)
         if refusal is not None:
             await _refuse(scope, receive, _with_safe_headers(send, scope), *refusal)
             return
         scope.setdefault("state", {}).update(session=session if person else "", person=person)
         await self.app(scope, receive, _with_safe_headers(send, scope) if scope["type"] == "http" else send)
 
-    def _refusal(self, scope: Scope, headers: Headers, person: Person | None) -> tuple[int, str, str, str] | None:
-        """(status, kind, message, hint) of a request that may not pass."""
+    def _foreign(self, scope: Scope, headers: Headers) -> Refusal | None:
+        """Why a request does not come from our own pages, or not to us."""
         host = headers.get("host", "")
         if _host_name(host) not in self.allowed_hosts:
             return 421, "forbidden", f"this app does not answer for host '{host[:80]}'", "use the address it printed"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and _network_location(origin) != host:
             return 403, "forbidden", "the request comes from another site", "use the app's own pages"
-        path, method = scope["path"], scope.get("method", "GET")
         if scope["type"] == "websocket":
             if origin is None:
                 return 403, "forbidden", "a connection without an Origin is refused", "connect from the app's own pages"
-        elif method not in SAFE_METHODS and "x-requested-with" not in headers:
+        elif scope["method"] not in SAFE_METHODS and "x-requested-with" not in headers:
             return 403, "forbidden", "the header X-Requested-With is missing", "send X-Requested-With: r2c2r"
-        if person is None and not path.startswith(OPEN_PATHS) and not _brings_token(scope):
-            return 401, "unauthorised", "no session", NO_SESSION
         return None
+
+
+def _closed(scope: Scope) -> Refusal | None:
+    """Why nobody in particular may not see this."""
+    if scope["path"].startswith(OPEN_PATHS) or _brings_token(scope):
+        return None
+    return 401, "unauthorised", "no session", NO_SESSION
 
 
 def _brings_token(scope: Scope) -> bool:
@@ -104,6 +113,14 @@ def _host_name(host: str) -> str:
     """The name of a Host header, without its port."""
     try:
         return (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def _network_location(origin: str) -> str:
+    """Host and port of an Origin header; empty when it has none."""
+    try:
+        return urlsplit(origin).netloc
     except ValueError:
         return ""
 

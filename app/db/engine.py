@@ -1,5 +1,6 @@
 """SQLite in WAL mode: many readers, one writer, nothing lost when the process dies."""
 
+import logging
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,11 +9,15 @@ from typing import Any
 
 from alembic.config import Config
 from sqlalchemy import Engine, event
+from sqlalchemy.exc import OperationalError
 from sqlmodel import Session, create_engine
 
 from alembic import command
 from app.db import once
+from app.errors import NoSpace, Unavailable
 from app.settings import shipped
+
+_log = logging.getLogger(__name__)
 
 
 def open_engine(database: Path) -> Engine:
@@ -37,17 +42,33 @@ def migrate(engine: Engine, revision: str = "head") -> None:
 
 @contextmanager
 def reading(engine: Engine) -> Iterator[Session]:
-    """A session for reading."""
-    with Session(engine, expire_on_commit=False) as session:
+    """A session for reading; raises Unavailable when the database does not answer."""
+    with _said_plainly(), Session(engine, expire_on_commit=False) as session:
         yield session
 
 
 @contextmanager
 def writing(engine: Engine) -> Iterator[Session]:
-    """One transaction that takes the write lock at its start, so that what it read is still true when it writes."""
-    with Session(engine.execution_options(write=True), expire_on_commit=False) as session, session.begin():
+    """One transaction that takes the write lock at its start, so that what it read is still true when it writes.
+
+    Raises NoSpace when the disk is full, Unavailable when the database does not answer: nothing of it is stored then.
+    """
+    options = engine.execution_options(write=True)
+    with _said_plainly(), Session(options, expire_on_commit=False) as session, session.begin():
         once.claim(session)
         yield session
+
+
+@contextmanager
+def _said_plainly() -> Iterator[None]:
+    try:
+        yield
+    except OperationalError as error:
+        said = str(error.orig)
+        if "disk" in said or "full" in said:
+            raise NoSpace("the disk is full", hint="free some space: nothing already made is lost") from error
+        _log.warning("the database does not answer: %s", said)
+        raise Unavailable("the database does not answer", hint="try again in a moment") from error
 
 
 def _prepare(connection: sqlite3.Connection, _record: Any) -> None:

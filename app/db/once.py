@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from sqlmodel import Session, col, delete
 
 from app.db.tables import SentChange
+from app.errors import Conflict
 
 KEPT_S = 30 * 24 * 3600.0
 
@@ -41,9 +42,14 @@ def marked(sending: Sending) -> Iterator[None]:
 
 
 def claim(session: Session) -> None:
-    """Store the key with what this transaction changes; nothing outside a marked change."""
+    """Store the key with what this transaction changes; nothing outside a marked change.
+
+    Raises Conflict for a key that is stored: whatever happened to the first one, a second one changes nothing.
+    """
     sending = _sending.get()
-    if sending is not None and session.get(SentChange, sending.digest) is None:
+    if sending is not None:
+        if session.get(SentChange, sending.digest) is not None:
+            raise Conflict("this change is stored already", hint="look at what is there now")
         session.add(SentChange(digest=sending.digest, request=sending.request, project_id=sending.project_id, at=time.time()))
 
 

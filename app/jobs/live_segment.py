@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.errors import told
 from app.jobs.mask_wire import mask_bits
 from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
@@ -50,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         desk = _open_desk(options.workdir, options.width, options.segmenter)
     except R2C2RError as error:
-        _say(state="failed", error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
+        _say(state="failed", error=told(error))
         return error.exit_code
     except Exception as error:  # the edge of the process: the traceback goes to the log
         traceback.print_exc()
@@ -230,9 +231,7 @@ def _named(error: Exception) -> R2C2RError:
 
 
 def _fail(number: int, key: str, error: R2C2RError) -> None:
-    _say(
-        object=number, key=key, end="failed", error={"kind": type(error).__name__, "message": error.message, "hint": error.hint}
-    )
+    _say(object=number, key=key, end="failed", error=told(error))
 
 
 def _read_commands(commands: Commands) -> None:

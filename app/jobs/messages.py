@@ -6,6 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable
 
+from app.errors import told
 from r2c2r_core.errors import Cancelled, R2C2RError
 from r2c2r_core.progress import Progress
 
@@ -20,7 +21,7 @@ def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
     try:
         work(report)
     except R2C2RError as error:
-        say(error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
+        say(error=told(error))
         return 130 if isinstance(error, Cancelled) else error.exit_code
     except MemoryError:
         traceback.print_exc()

@@ -15,7 +15,7 @@ from sqlmodel import Session, select
 from app.db import history
 from app.db.queries import live_objects, newest_bundle
 from app.db.tables import Bundle, Job, Point, Project, SceneObject
-from app.files import ProjectFiles
+from app.files import ProjectFiles, delete_folder
 from app.jobs.runner import Finisher
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.segment.prompts import parse_prompts
@@ -42,13 +42,28 @@ def run_done(session: Session, job: Job, project: Project, files: ProjectFiles) 
 
 
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
-    """An import that did not come to its end leaves the project failed, with the reason."""
+    """An import that did not come to its end leaves the project failed, with the reason.
+
+    Of an upload that never could be read nothing else stays: asking again would end the same.
+    """
     project.updated = time.time()
     if job.kind in ("import", "sample"):
         project.status = "failed"
         cancelled = {"kind": "cancelled", "message": "the import was cancelled", "hint": "retry it, or delete the project"}
         project.error = job.error or cancelled
+        refused = not project.capture and (job.error or {}).get("kind") == "capture"
+        if refused and Path(project.source_path or "").is_relative_to(files.source):
+            project.source_path = None
+            _delete_what_was_read(files)
     session.add(project)
+
+
+def _delete_what_was_read(files: ProjectFiles) -> None:
+    """The recording, what was unpacked of it, and what was drawn; the log stays."""
+    for folder in (files.source, files.work, files.previews, files.masks):
+        delete_folder(folder)
+    for path in (files.frames, files.facts, *files.scan_pictures):
+        path.unlink(missing_ok=True)
 
 
 FINISHERS: dict[str, Finisher] = {"import": import_done, "sample": sample_done, "run": run_done}
@@ -56,7 +71,7 @@ FINISHERS: dict[str, Finisher] = {"import": import_done, "sample": sample_done, 
 
 def adopt_capture(project: Project, files: ProjectFiles) -> None:
     """Take over facts.json, which the ingest process wrote."""
-    found: dict[str, Any] = json.loads((files.root / "facts.json").read_text())
+    found: dict[str, Any] = json.loads(files.facts.read_text())
     project.capture, project.notices = found["facts"], found["notices"]
     project.source_path = found["source"] or project.source_path
     project.status, project.error, project.updated = "ready", None, time.time()

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request
 from app import schemas
 from app.deps import Ctx, ReviewerCtx
 from app.routes.numbers import RowId
-from app.services import overlays, reviews
+from app.services import mesh_uploads, overlays, reviews
 
 Version = Annotated[int | None, Query(ge=0)]
 
@@ -37,7 +37,7 @@ async def upload_candidate(
     version: Version = None,
 ) -> schemas.Reviewed:
     """A mesh (the request's body: GLB, OBJ, PLY or STL) as this object's candidate, chosen by a person."""
-    return await reviews.upload(context, project, object, filename, request.stream(), rerun, version)
+    return await mesh_uploads.upload(context, project, object, filename, request.stream(), rerun, version)
 
 
 @router.post("/objects/{object}/verdicts", operation_id="giveVerdict")

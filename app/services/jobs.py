@@ -85,7 +85,7 @@ def retry(context: Context, job_id: int) -> schemas.Job:
             )
         else:
             if project.source_path is None:
-                raise Conflict("the recording never arrived", hint="delete the project and upload it again")
+                raise Conflict("the recording was refused, and is not kept", hint="delete the project, and upload another one")
             project.status, project.error = "importing", None
             session.add(project)
             job = queue_job(context, session, project, row.kind, row.payload)

@@ -18,9 +18,11 @@ from app.security import Person
 from app.services import accounts
 from app.services.attempts import Attempts
 from app.settings import Settings
+from r2c2r_core.errors import R2C2RError
 
 KEPT_S = 30 * 24 * 3600.0  # since it was last used
 REMEMBERED_S = 2.0  # a person is looked up again after this: `r2c2r user` changes the file from another process
+LOOK_UPS = 4  # at a time, in threads of their own: slow requests take those of requests
 
 
 class People:
@@ -30,19 +32,16 @@ class People:
         self._engine, self._settings = engine, settings
         self._attempts = Attempts()
         self._known: dict[str, tuple[float, Person]] = {}
+        self._threads = anyio.CapacityLimiter(LOOK_UPS)
+        self._changes = 0  # so that what was read before a change is not remembered after it
         self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
 
-    def of(self, session_id: str) -> Person | None:
-        """Whose session it is; None when nobody's."""
-        now = time.monotonic()
+    async def of(self, session_id: str) -> Person | None:
+        """Whose session it is; None when nobody's. Nobody else waits for the database meanwhile."""
         found = self._known.get(session_id)
-        if found is not None and now < found[0]:
+        if found is not None and time.monotonic() < found[0]:
             return found[1]
-        self._known.pop(session_id, None)
-        person = self._look_up(session_id)
-        if person is not None:
-            self._known[session_id] = (now + REMEMBERED_S, person)
-        return person
+        return await anyio.to_thread.run_sync(self._look_up, session_id, limiter=self._threads)
 
     async def until_other(self, session_id: str, person: Person) -> Person | None:
         """Wait until the session is not that person's any more: then whose it is, such as the same one's with another role.
@@ -53,7 +52,7 @@ class People:
         waiting = (asyncio.get_running_loop(), woken)
         self._waiting.add(waiting)
         try:
-            while (found := await anyio.to_thread.run_sync(self.of, session_id)) == person:
+            while (found := await self.of(session_id)) == person:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(woken.wait(), REMEMBERED_S)
                 woken.clear()
@@ -63,6 +62,7 @@ class People:
 
     def look_again(self) -> None:
         """Accounts or sessions changed: nobody is taken for who they were, on open connections neither."""
+        self._changes += 1
         self._known.clear()
         for loop, woken in tuple(self._waiting):
             with contextlib.suppress(RuntimeError):  # its loop is gone
@@ -111,6 +111,16 @@ class People:
         return session_id
 
     def _look_up(self, session_id: str) -> Person | None:
+        """Whose session it is, as stored, and remembered for a moment."""
+        until, changes = time.monotonic() + REMEMBERED_S, self._changes
+        person = self._stored(session_id)
+        if person is None:
+            self._known.pop(session_id, None)
+        elif changes == self._changes:
+            self._known[session_id] = (until, person)
+        return person
+
+    def _stored(self, session_id: str) -> Person | None:
         now = time.time()
         with reading(self._engine) as session:
             query = select(SignIn, Account).join(Account, isouter=True).where(SignIn.digest == _digest(session_id))
@@ -121,7 +131,7 @@ class People:
         if account is None and self._settings.accounts_only:
             return None
         if now - sign_in.used > 3600.0:
-            with writing(self._engine) as session:
+            with contextlib.suppress(R2C2RError), writing(self._engine) as session:  # a full disk keeps nobody out
                 sign_in.used = now
                 session.merge(sign_in)
         return accounts.person(account) if account else Person(self._settings.user, "admin")

@@ -1,13 +1,10 @@
 """What people say about candidates, and what they correct."""
 
 import json
-import re
 import time
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import anyio
 from sqlmodel import Session, select
 
 from app import schemas
@@ -15,17 +12,14 @@ from app.db import history, queries
 from app.db.documents import overrides_entry
 from app.db.engine import reading, writing
 from app.db.tables import Project, SceneObject, Verdict
-from app.errors import Conflict, NotFound, NotReady, TooLarge
-from app.files import inside, require_free, safe_name
+from app.errors import Conflict, NotFound, NotReady
+from app.files import inside
 from app.services import jobs
 from app.services.candidates import facts_of, group_of, override_shape
 from app.services.context import Context
 from app.services.prompts import tell_object
 from r2c2r_core.errors import OverrideError, PromptError
 from r2c2r_core.overrides import MOST_BATCHES
-
-MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
-MAX_MESH_BYTES = 512 * 1024 * 1024
 
 
 def groups(context: Context, project_id: str) -> list[schemas.CandidateGroup]:
@@ -52,7 +46,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        _refuse_overtaken(context, session, project, item, body)
+        refuse_overtaken(context, session, project, item, body)
         facts = facts_of(context.files(project), item.name)
         before = history.override_data(session, item)
         known = {c["candidate_id"] for c in facts["candidates"]} if facts else set()
@@ -64,7 +58,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
             history.set_override(session, item, _override_after(before, body, facts))
         changed = history.override_data(session, item) != before
         job = _rerun(context, session, project) if body.rerun and changed else None
-    return _reviewed(context, project_id, object_id, job, text)
+    return reviewed_shape(context, project_id, object_id, job, text)
 
 
 def get_override(context: Context, project_id: str, object_id: int) -> schemas.OverrideData:
@@ -76,11 +70,17 @@ def get_override(context: Context, project_id: str, object_id: int) -> schemas.O
 
 def set_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> schemas.Reviewed:
     """Correct the object; the fields that were sent are set, null clears."""
+    job, text = store_override(context, project_id, object_id, body)
+    return reviewed_shape(context, project_id, object_id, job, text)
+
+
+def store_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> tuple[int | None, str]:
+    """Store the correction; the job that follows from it, and what was done in words."""
     wanted = {key: value for key, value in body.model_dump(exclude_unset=True).items() if key not in ("rerun", "version")}
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        _refuse_overtaken(context, session, project, item, body)
+        refuse_overtaken(context, session, project, item, body)
         before = history.override_data(session, item)
         merged = {key: value for key, value in {**before, **wanted}.items() if value is not None}
         _check_override(context, project, item, merged)
@@ -89,51 +89,10 @@ def set_override(context: Context, project_id: str, object_id: int, body: schema
         with history.change(session, item, "review", "correct", text, who=context.who):
             history.set_override(session, item, merged)
         job = _rerun(context, session, project) if body.rerun and merged != before else None
-    return _reviewed(context, project_id, object_id, job, text)
+    return job, text
 
 
-async def upload(
-    context: Context,
-    project_id: str,
-    object_id: int,
-    filename: str,
-    stream: AsyncIterator[bytes],
-    rerun: bool,
-    version: int | None = None,
-) -> schemas.Reviewed:
-    """A mesh that a person made, as the object's candidate."""
-    suffix = Path(safe_name(filename)).suffix.lower()
-    if suffix not in MESH_SUFFIXES:
-        raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(MESH_SUFFIXES)}")
-    with reading(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
-    require_free(context.settings.data_dir, 0, context.settings.min_free_bytes)
-    stem = re.sub(r"[^A-Za-z0-9_]+", "_", Path(safe_name(filename)).stem)[:40] or "mesh"
-    target = context.files(project).uploads / item.name / f"{stem}-{int(time.time())}{suffix}"
-    await _receive(stream, target)
-    patch = schemas.OverridePatch(candidate=str(target), rerun=rerun, version=version)
-    return await anyio.to_thread.run_sync(set_override, context, project_id, object_id, patch)
-
-
-async def _receive(stream: AsyncIterator[bytes], target: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    received = 0
-    try:
-        async with await anyio.open_file(target, "wb") as out:
-            async for chunk in stream:
-                received += len(chunk)
-                if received > MAX_MESH_BYTES:
-                    raise TooLarge(f"the mesh is larger than {MAX_MESH_BYTES / 1e6:.0f} MB", hint="simplify it first")
-                await out.write(chunk)
-        if received == 0:
-            raise OverrideError("the upload is empty", hint="choose a mesh file")
-    except BaseException:
-        target.unlink(missing_ok=True)
-        raise
-
-
-def _refuse_overtaken(
+def refuse_overtaken(
     context: Context, session: Session, project: Project, item: SceneObject, body: schemas.VerdictIn | schemas.OverridePatch
 ) -> None:
     """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
@@ -224,7 +183,8 @@ def _in_words(key: str, value: Any) -> str:
     return f"{name} {value}"
 
 
-def _reviewed(context: Context, project_id: str, object_id: int, job_id: int | None, text: str) -> schemas.Reviewed:
+def reviewed_shape(context: Context, project_id: str, object_id: int, job_id: int | None, text: str) -> schemas.Reviewed:
+    """What follows from something stored: its job begins, every tab is told, and the object as it is now."""
     if job_id is not None:
         context.runner.wake()
         context.runner.tell(job_id)

@@ -5,12 +5,12 @@ project's: finishing twice, or again after a crash, is finishing once.
 """
 
 import contextlib
-import queue
 import secrets
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
+from typing import Literal
 
 import anyio
 from sqlmodel import Session, col, select
@@ -19,18 +19,15 @@ from starlette.requests import ClientDisconnect
 from app import archives, schemas
 from app.db.engine import reading, writing
 from app.db.tables import Project, Upload
-from app.errors import KINDS, Conflict, NotFound, TooLarge, Unavailable
-from app.files import project_files, require_free, safe_name
-from app.process import Worker
-from app.services import imports
+from app.errors import Conflict, NotFound, TooLarge, Unavailable
+from app.files import delete_folder, project_files, require_free, safe_name
+from app.services import imports, probing
 from app.services.context import Context
-from r2c2r_core.errors import CaptureError, R2C2RError
+from r2c2r_core.errors import CaptureError
 
 SPARE = 2.5  # a recording needs its own size again when it is read, and some more
-PROBE_S = 120.0
-_writing: set[str] = set()  # uploads that are being written to
+_busy: dict[str, Literal["sent", "finished"]] = {}  # uploads that a request is at work on
 _lock = threading.Lock()
-_probing = threading.BoundedSemaphore(2)
 
 
 def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
@@ -61,9 +58,9 @@ def state(context: Context, upload_id: str) -> schemas.Upload:
 
 async def append(context: Context, upload_id: str, offset: int, stream: AsyncIterator[bytes]) -> int:
     """Store what comes from `offset` on; the new offset. What arrived stays when the sender leaves."""
-    found = await anyio.to_thread.run_sync(state, context, upload_id)
-    with _alone(upload_id):
-        at = _path(context, upload_id).stat().st_size
+    with _alone(upload_id, "sent"):
+        found = await anyio.to_thread.run_sync(state, context, upload_id)
+        at = found.offset
         if offset != at:
             raise Conflict(f"{at} bytes are here, and these start at {offset}", hint="go on at `current`", current=at)
         with contextlib.suppress(ClientDisconnect):
@@ -78,24 +75,25 @@ def finish(context: Context, upload_id: str) -> schemas.Project:
     with reading(context.engine) as session:
         if session.get(Project, upload_id) is not None:  # asked twice
             return projects.get_project(context, upload_id)
-        row = _row(context, session, upload_id)
-    with _alone(upload_id):
+    with _alone(upload_id, "finished"):
+        with reading(context.engine) as session:
+            row = _row(context, session, upload_id)
         found = _shape(context, row)
         if found.offset != row.size:
             raise Conflict(f"{found.offset} of {row.size} bytes are here", hint="send the rest first", current=found.offset)
         try:
             _check(context, _present(context, row), row.file_name)
         except CaptureError:
-            forget(context, upload_id)
+            _forget(context, upload_id)
             raise
         return imports.from_finished_upload(context, row, _path(context, upload_id))
 
 
 def forget(context: Context, upload_id: str) -> None:
-    """Delete an upload and its bytes."""
-    with writing(context.engine) as session:
-        session.delete(_row(context, session, upload_id))
-    _path(context, upload_id).unlink(missing_ok=True)
+    """Delete an upload and its bytes; raises Unavailable while it is made a project."""
+    if _busy.get(upload_id) == "finished":
+        raise Unavailable("this upload is being made a project", hint="wait a moment, then delete the project")
+    _forget(context, upload_id)
 
 
 async def whole(
@@ -121,21 +119,16 @@ async def whole(
         raise
 
 
-def tidy(context: Context) -> None:
-    """Forget uploads that did not go on for long, and bytes that belong to none."""
-    limit = time.time() - context.settings.upload_kept_s
+def forget_stopped(context: Context) -> None:
+    """Forget uploads that did not go on for long."""
+    limit, forgotten = time.time() - context.settings.upload_kept_s, []
     with writing(context.engine) as session:
-        known = set()
         for row in session.exec(select(Upload)):
-            known.add(row.id)
-            if _touched(_path(context, row.id), row.created) < limit:
+            if row.id not in _busy and _touched(_path(context, row.id), row.created) < limit:
                 session.delete(row)
-                known.discard(row.id)
-    with _lock:
-        strays = [path for path in context.settings.uploads.glob("*") if path.stem not in known | _writing]
-    for path in strays:
-        if _touched(path, time.time()) < time.time() - 3600:  # one that begins just now has no row yet
-            path.unlink(missing_ok=True)
+                forgotten.append(row.id)
+    for upload_id in forgotten:
+        delete_bytes(context, upload_id)
 
 
 async def _store(context: Context, upload_id: str, at: int, size: int, stream: AsyncIterator[bytes]) -> int:
@@ -158,40 +151,32 @@ def _check(context: Context, path: Path, file_name: str) -> None:
     """Raise CaptureError, in one line, for what the import could not read."""
     settings, name = context.settings, safe_name(file_name)
     archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
-    log = path.with_suffix(".log")
-    with _probing:
-        worker = Worker((*context.runner.commands.probe, str(path), name), log)
-        try:
-            line = worker.next_line(timeout=PROBE_S)
-        except queue.Empty:
-            line = None
-        worker.close()
-    log.unlink(missing_ok=True)
-    if line is None:
-        raise CaptureError(f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
-    if "error" in line:
-        raise _said(name, line["error"])
+    probing.look_at(context, "recording", path, name)
 
 
-def _said(name: str, error: dict[str, str]) -> R2C2RError:
-    """What the probe said; whatever else went wrong in it, the file is the cause."""
-    message, hint = (" ".join(str(error[part]).split())[:most] for part, most in (("message", 500), ("hint", 400)))
-    if error["kind"] in {cls.__name__ for cls, _, _ in KINDS}:
-        return CaptureError(message, hint=hint)
-    return CaptureError(f"{name} cannot be read ({message[:200]})", hint="export it again from the app that made it")
+def _forget(context: Context, upload_id: str) -> None:
+    with writing(context.engine) as session:
+        session.delete(_row(context, session, upload_id))
+    delete_bytes(context, upload_id)
+
+
+def delete_bytes(context: Context, upload_id: str) -> None:
+    """The bytes of an upload without a row, also where they were moved before finishing it was interrupted."""
+    _path(context, upload_id).unlink(missing_ok=True)
+    delete_folder(project_files(context.settings.data_dir, upload_id).root)
 
 
 @contextlib.contextmanager
-def _alone(upload_id: str) -> Iterator[None]:
-    """Only one request at a time writes or finishes an upload."""
+def _alone(upload_id: str, being: Literal["sent", "finished"]) -> Iterator[None]:
+    """Only one request at a time sends or finishes an upload."""
     with _lock:
-        if upload_id in _writing:
+        if upload_id in _busy:
             raise Unavailable("another request is still sending this file", hint="wait a moment, then ask for its offset")
-        _writing.add(upload_id)
+        _busy[upload_id] = being
     try:
         yield
     finally:
-        _writing.discard(upload_id)
+        del _busy[upload_id]
 
 
 def _row(context: Context, session: Session, upload_id: str) -> Upload:
@@ -209,7 +194,10 @@ def _set_size(context: Context, upload_id: str, size: int) -> None:
 
 
 def _shape(context: Context, row: Upload) -> schemas.Upload:
-    offset = _present(context, row).stat().st_size
+    try:
+        offset = _present(context, row).stat().st_size
+    except FileNotFoundError:  # somebody else deleted it: all of it is to be sent again
+        offset = 0
     return schemas.Upload(offset=offset, **row.model_dump(include={"id", "file_name", "size", "modified", "created"}))
 
 

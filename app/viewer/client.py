@@ -17,12 +17,19 @@ from typing import Any
 from app.errors import Forbidden, Unavailable
 from app.process import Worker, python_module
 from app.settings import Settings
-from r2c2r_core.errors import InputError
+from r2c2r_core.errors import InputError, R2C2RError
 
 ANSWER_S = 60.0
 TOKEN_S = 12 * 3600.0
 MOST_VIEWS = 24  # each holds what it shows
 WORKER = python_module("app.viewer.worker")
+
+
+class _Closed(InputError):
+    """The view is not open, or not any more."""
+
+
+_FAILURES: dict[str, type[R2C2RError]] = {"internal": Unavailable, "NotOpen": _Closed}  # else what was asked is at fault
 
 
 @dataclass(slots=True)
@@ -59,22 +66,21 @@ class Viewer:
 
     def open(self, project: str, workdir: Path, session: str) -> str:
         """A token by which this session reaches its view; raises Unavailable when there is no viewer."""
-        return self._running_view(project, workdir, session).token
+        return self._running_view(project, workdir, session)[0].token
 
     def show(self, project: str, workdir: Path, session: str, wish: dict[str, Any]) -> dict[str, Any]:
         """Change what the session's view shows."""
-        view = self._running_view(project, workdir, session)
-        answer = self._ask({"cmd": "show", "view": view.name, **wish})
+        view, answer = self._ask_view(project, workdir, session, {"cmd": "show", **wish})
         view.shown = wish
         return answer
 
     def move(self, project: str, workdir: Path, session: str, values: dict[str, float]) -> dict[str, Any]:
         """Move joints of the shown scene."""
-        return self._ask({"cmd": "joints", "view": self._running_view(project, workdir, session).name, "values": values})
+        return self._ask_view(project, workdir, session, {"cmd": "joints", "values": values})[1]
 
     def place(self, project: str, workdir: Path, session: str, pose: list[list[float]] | None) -> dict[str, Any]:
         """Put the object that is being moved somewhere; with None, where it is."""
-        return self._ask({"cmd": "place", "view": self._running_view(project, workdir, session).name, "pose": pose})
+        return self._ask_view(project, workdir, session, {"cmd": "place", "pose": pose})[1]
 
     def port(self, token: str, session: str) -> int:
         """The loopback port behind a token, its view started anew where it has stopped.
@@ -84,9 +90,7 @@ class Viewer:
         view = self._view_of(token)
         if view is None or view.session != session or view.until < time.monotonic():
             raise Forbidden("this 3D view belongs to another session or has expired", hint="open the review page again")
-        running = self._running_view(view.project, view.workdir, session)
-        assert running.port is not None
-        return running.port
+        return self._running_view(view.project, view.workdir, session)[1]
 
     def close(self, project: str) -> None:
         """Close everybody's views of a project; their tokens are worth nothing any more."""
@@ -125,27 +129,38 @@ class Viewer:
     def _view_of(self, token: str) -> Opened | None:
         return next((view for view in tuple(self._views.values()) if secrets.compare_digest(view.token, token)), None)
 
-    def _running_view(self, project: str, workdir: Path, session: str) -> Opened:
-        """The session's view, running and showing what it showed last."""
+    def _ask_view(self, project: str, workdir: Path, session: str, command: dict[str, Any]) -> tuple[Opened, dict[str, Any]]:
+        """Ask the session's view; one that was closed between finding it and asking it is opened again."""
+        for _ in range(2):
+            view, _ = self._running_view(project, workdir, session)
+            try:
+                return view, self._ask({**command, "view": view.name})
+            except _Closed:
+                view.port = None
+        raise Unavailable("the 3D view was closed meanwhile", hint="try again in a moment")
+
+    def _running_view(self, project: str, workdir: Path, session: str) -> tuple[Opened, int]:
+        """The session's view, running and showing what it showed last, and its port."""
         view = self._views.get((project, session))
-        if view is not None and self._runs(view):  # without the lock: somebody's large scene may be on its way
+        if view is not None and (port := self._port_of(view)):  # without the lock: a large scene may be on its way
             view.used = time.monotonic()
-            return view
+            return view, port
         with self._lock:
             found = self._views.get((project, session))
             view = found if found is not None and found.until > time.monotonic() else Opened(project, session, workdir)
             view.used = time.monotonic()
-            if self._runs(view):
-                return view
+            if port := self._port_of(view):
+                return view, port
             self._make_room()
-            view.port = int(self._ask({"cmd": "open", "view": view.name, "workdir": str(workdir)})["port"])
+            port = view.port = int(self._ask({"cmd": "open", "view": view.name, "workdir": str(workdir)})["port"])
             self._views[project, session] = view
             self._show_again(view)
-            return view
+            return view, port
 
-    def _runs(self, view: Opened) -> bool:
+    def _port_of(self, view: Opened) -> int | None:
+        """The view's port while it runs."""
         worker = self._worker
-        return view.port is not None and view.until > time.monotonic() and worker is not None and worker.alive
+        return view.port if view.until > time.monotonic() and worker is not None and worker.alive else None
 
     def _show_again(self, view: Opened) -> None:
         """What the view showed before it was closed or its process ended; what is gone meanwhile is not shown."""
@@ -185,7 +200,7 @@ class Viewer:
             answer = self._answer(worker)
         if "error" in answer:
             error = answer["error"]
-            raise (Unavailable if error["kind"] == "internal" else InputError)(error["message"], hint=error["hint"])
+            raise _FAILURES.get(error["kind"], InputError)(error["message"], hint=error["hint"])
         result: dict[str, Any] = answer["ok"]
         return result
 

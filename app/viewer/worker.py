@@ -14,12 +14,17 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import told
 from app.viewer import contract
 from app.viewer.scene import View
 from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.workspace import Workspace
 
 AMBIENT = 1.6  # textures carry the room's light already: shown darker than the scan beside them, they look wrong
+
+
+class NotOpen(InputError):
+    """The view was closed; whoever asked opens it and asks again."""
 
 
 def main() -> int:
@@ -31,7 +36,7 @@ def main() -> int:
         try:
             answer: dict[str, Any] = {"ok": _COMMANDS[command["cmd"]](views, key, command)}
         except R2C2RError as error:
-            answer = {"error": {"kind": type(error).__name__, "message": error.message, "hint": error.hint}}
+            answer = {"error": told(error)}
         except Exception as error:  # one wish must not end the view of everybody
             traceback.print_exc()
             answer = {"error": {"kind": "internal", "message": f"unexpected: {error}", "hint": "see the viewer's log"}}
@@ -77,7 +82,7 @@ def _close(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[st
 
 def _view(views: dict[str, View], command: dict[str, Any]) -> View:
     if command["view"] not in views:
-        raise InputError("the 3D view of this project is not open", hint="open it first")
+        raise NotOpen("the 3D view of this project is not open", hint="open it first")
     return views[command["view"]]
 
 

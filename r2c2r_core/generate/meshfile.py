@@ -16,7 +16,7 @@ from r2c2r_core.geometry.raster import sample_texture
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
 
-_MOST_BYTES = 300_000_000
+MOST_BYTES = 300_000_000
 _MOST_FACES = 2_000_000
 _PLAIN = 160  # grey of a mesh without colours
 
@@ -45,9 +45,9 @@ def read_parts(path: Path) -> list[MeshPart]:
         raise OverrideError(f"{path.name}: a mesh file expected", hint=f"give one of {', '.join(SUFFIXES)}")
     if not path.is_file():
         raise OverrideError(f"{path}: no such file", hint="check the path of the uploaded mesh")
-    if path.stat().st_size > _MOST_BYTES:
+    if path.stat().st_size > MOST_BYTES:
         raise OverrideError(
-            f"{path.name}: {path.stat().st_size // 1_000_000} MB, at most {_MOST_BYTES // 1_000_000} MB expected"
+            f"{path.name}: {path.stat().st_size // 1_000_000} MB, at most {MOST_BYTES // 1_000_000} MB expected"
         )
     try:
         geometries = _triangles(trimesh.load_scene(path))
@@ -74,6 +74,8 @@ def missing_files(path: Path) -> tuple[str, ...]:
 
 def _named_in(path: Path, keywords: tuple[str, ...]) -> list[str]:
     """The files behind the keywords of an OBJ or MTL file; options such as `-o 0 0 0` stand before the name."""
+    if not path.is_file():  # a device would be read for ever
+        return []
     try:
         with path.open(errors="replace") as lines:
             words = [line.split() for line in lines if line.lstrip().startswith(keywords)]
@@ -86,7 +88,7 @@ def _glb_pictures(path: Path) -> list[str]:
     """The pictures that a binary glTF keeps in files of their own."""
     with path.open("rb") as handle:
         head = handle.read(20)
-        chunk = handle.read(min(int.from_bytes(head[12:16], "little"), _MOST_BYTES))
+        chunk = handle.read(min(int.from_bytes(head[12:16], "little"), MOST_BYTES))
     try:
         images = json.loads(chunk).get("images", [])
         return [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]

@@ -202,10 +202,10 @@ export const getJobLog = async (job) => (await call(`/api/jobs/${job}/log`)).tex
 
 /** @param {string} id @returns {Promise<CandidateGroup[]>} */
 export const listCandidates = (id) => get(`${of(id)}/candidates`);
-/** @param {string} id @param {number} object @param {File} file @returns {Promise<Reviewed>} */
-export const uploadCandidate = async (id, object, file) => {
-  const query = new URLSearchParams({ filename: file.name });
-  return (await call(`${of(id)}/objects/${object}/candidates?${query}`, { method: "POST", body: file })).json();
+/** @param {string} id @param {CandidateGroup} seen @param {File} file @returns {Promise<Reviewed>} */
+export const uploadCandidate = async (id, seen, file) => {
+  const query = new URLSearchParams({ filename: file.name, version: String(seen.version) });
+  return (await call(`${of(id)}/objects/${seen.object}/candidates?${query}`, { method: "POST", body: file })).json();
 };
 
 /** @param {string} id @returns {Promise<ReviewStatus>} */

@@ -1,15 +1,18 @@
 """An app of one's own, with workers that obey the tests."""
 
+import asyncio
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi import FastAPI
+from sqlalchemy import Engine, event
 from starlette.testclient import TestClient
 
 from app.jobs.plans import Commands
@@ -104,8 +107,23 @@ def running(
     settings = Settings(data_dir=data_dir, **{**given, **options})
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
+        blocked = blocked_by_the_database(app.state.context.engine)
         client.get(f"/?token={settings.launch_token}")
         yield Running(app, client, settings)
+        assert blocked == [], "everybody waited for the database"
+
+
+def blocked_by_the_database(engine: Engine) -> list[str]:
+    """What asked the database on the thread of the event loop, where everybody waits for the answer."""
+    found: list[str] = []
+
+    def note(_: object) -> None:
+        with suppress(RuntimeError):  # no loop runs on this thread, as it should be
+            asyncio.get_running_loop()
+            found.append("".join(traceback.format_stack(limit=12)))
+
+    event.listen(engine, "begin", note)
+    return found
 
 
 @pytest.fixture

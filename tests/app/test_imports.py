@@ -29,8 +29,8 @@ def upload(web: Running, content: bytes, name: str = "scan.r3d", status: int = 2
 
 
 def left_behind(web: Running) -> list[Path]:
-    folders = (web.settings.data_dir / "projects", web.settings.uploads)
-    return [p for folder in folders for p in folder.rglob("*") if p.is_file()]
+    """Files and folders of projects and uploads."""
+    return [path for folder in (web.settings.data_dir / "projects", web.settings.uploads) for path in folder.rglob("*")]
 
 
 def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> None:
@@ -149,6 +149,23 @@ def test_a_recording_that_cannot_be_read_leaves_a_failed_project_with_the_reason
     assert (error["kind"], error["message"], error["hint"]) == ("capture", "no depth in it", "record again")
     assert web.get(f"/api/projects/{project}/frames", 409)["kind"] == "not-ready"
     assert web.post(f"/api/projects/{project}/run", {}, 409)["kind"] == "not-ready"
+
+
+def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and_the_log_stay(web: Running) -> None:
+    project = upload(web, R3D, "broken.r3d")
+    web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "failed")
+    log = web.settings.data_dir / "projects" / project["id"] / "logs" / f"job-{project['job']['id']}.log"
+    assert [path for path in left_behind(web) if path.is_file()] == [log]
+    assert "refused" in web.post(f"/api/jobs/{project['job']['id']}/retry", status=409)["message"]
+    web.delete(f"/api/projects/{project['id']}")
+    assert left_behind(web) == []
+
+
+def test_a_recording_that_cannot_be_read_where_it_lies_stays_there(web: Running, tmp_path: Path) -> None:
+    (tmp_path / "broken.r3d").write_bytes(R3D)
+    project = web.post("/api/projects/import", {"path": str(tmp_path / "broken.r3d")}, 202)["id"]
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "failed")
+    assert (tmp_path / "broken.r3d").read_bytes() == R3D
 
 
 def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) -> None:

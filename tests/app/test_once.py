@@ -1,19 +1,26 @@
 """A change that is sent again, because its answer got lost, is not made again."""
 
 import contextlib
-import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlmodel import select
 
-from app.db import engine as engines
 from app.db import once
-from app.db.engine import reading
-from app.db.tables import SentChange
-from app.services import sending
-from tests.app.conftest import Running
+from app.db.engine import reading, writing
+from app.db.once import Sending
+from app.db.tables import Comment, Event, Job, Override, Point, Project, SceneObject, SentChange, Verdict
+from app.errors import Conflict
+from app.routes.once import COVERED
+from app.services import prompts, sending
+from app.settings import Settings
+from app.viewer.client import Viewer
+from tests.app.conftest import Running, fake
+from tests.app.nouns import finish
+from tests.app.test_jobs import behave, run
 
 CLICK = {"frame": 3, "x": 20.0, "y": 20.0, "label": 1}
 
@@ -92,16 +99,33 @@ def test_a_key_is_for_one_change(web: Running, at: str) -> None:
     keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
     refused = keyed(web, "POST", f"{at}/objects/2/points", "k", CLICK)
     assert (refused.status_code, refused.json()["kind"]) == (422, "input")
+    assert [len(item["points"]) for item in web.get(f"{at}/objects")] == [2, 1]
     assert keyed(web, "POST", f"{at}/objects/1/points", "k" * 200, CLICK).status_code == 422
 
 
-def test_the_same_change_sent_at_once_is_made_once(web: Running, at: str) -> None:
+def test_the_same_change_sent_at_once_is_made_once_and_answered_each_time(
+    web: Running, at: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = len(web.get(f"{at}/objects")[0]["points"])
-    threads = [threading.Thread(target=keyed, args=(web, "POST", f"{at}/objects/1/points", "twin", CLICK)) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    came: list[int] = []
+    check, add = sending.check_person, prompts.add_point
+
+    def arrive(*given: Any) -> None:
+        came.append(1)
+        check(*given)
+
+    def add_late(*given: Any) -> Any:
+        web.until(lambda: len(came) == 4)  # the first is still at work when the last one comes
+        return add(*given)
+
+    monkeypatch.setattr(sending, "check_person", arrive)
+    monkeypatch.setattr(prompts, "add_point", add_late)
+    with ThreadPoolExecutor(4) as pool:
+        sent = [pool.submit(keyed, web, "POST", f"{at}/objects/1/points", "twin", CLICK) for _ in range(4)]
+        answers = [each.result() for each in sent]
+    assert [answer.status_code for answer in answers] == [201] * 4
+    assert len({answer.content for answer in answers}) == 1
+    assert ["idempotency-replayed" in answer.headers for answer in answers].count(True) == 3
     assert len(web.get(f"{at}/objects")[0]["points"]) == before + 1
 
 
@@ -121,37 +145,114 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
     assert _kept(web) == 0
 
 
-@pytest.mark.parametrize(
-    ("method", "path", "body"),
-    [
-        ("POST", "/objects", {"category": "mug", "points": [CLICK]}),
-        ("PATCH", "/objects/1", {"category": "oven"}),
-        ("DELETE", "/objects/2", None),
-        ("POST", "/objects/1/clicks", {"points": [CLICK, CLICK]}),
-        ("POST", "/undo", {"object": 1}),
-        ("PATCH", "/objects/1/override", {"hinge": "left"}),
-        ("POST", "/comments", {"text": "look"}),
-        ("POST", "/review", {"from_state": "draft", "to": "ready", "reason": "go"}),
-        ("POST", "/run", {}),
-        ("POST", "/prompts.json", {"version": 1, "objects": [{"name": "a", "category": "mug", "points": [CLICK]}] * 2}),
-    ],
-)
-def test_a_marked_change_is_one_transaction(
-    web: Running, at: str, method: str, path: str, body: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    web.post(f"{at}/objects/1/points", CLICK)
-    claimed: list[int] = []
-    claim = once.claim
+def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Callable[..., Any], tmp_path: Path) -> None:
+    viewer = Viewer(Settings(data_dir=tmp_path / "data"), fake("viewer"))
+    with start(viewer=viewer) as web:
+        tried = set()
+        for operation, method, path, sent in changes(web, tmp_path):
+            before = stored(web)
+            first = send_marked(web, method, path, operation, sent)
+            assert first.status_code in (200, 201, 202), f"{operation}: {first.text}"
+            after = stored(web)
+            assert (after == before) == (operation in CHANGES_NOTHING_STORED), operation
+            again = send_marked(web, method, path, operation, sent)
+            assert again.status_code == first.status_code, f"{operation}: {again.text}"
+            assert stored(web) == after, operation
+            if operation not in CHANGES_NOTHING_STORED:
+                assert (again.content, again.headers["idempotency-replayed"]) == (first.content, "true"), operation
+            tried.add(operation)
+    assert tried == covered(web)
 
-    def count(session: Any) -> None:
-        if once._sending.get() is not None:
-            claimed.append(1)
-        claim(session)
 
-    monkeypatch.setattr(engines.once, "claim", count)
-    answer = keyed(web, method, at + path, "one", body)
-    assert answer.status_code in (200, 201, 202, 422), answer.text
-    assert len(claimed) <= 1
+CHANGES_NOTHING_STORED = {"openLive", "segmentObject", "cancelSegment", "cancelJob"} | {
+    "openViewer", "showInViewer", "setJoints", "placeInViewer",
+}  # fmt: skip
+
+
+def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
+    """(operation, method, path, body) of every change that may be sent again, each one possible when its turn comes."""
+    project = web.sample()
+    at, on = f"/api/projects/{project}", f"/api/projects/{project}/objects/1"
+    web.job(run(web, project), "done")
+    finish(web.settings.data_dir / "projects" / project / "work")
+    (folder / "elsewhere").mkdir()
+    (folder / "elsewhere" / "frame.txt").touch()
+    yield "sampleProject", "POST", "/api/projects/sample", {}
+    yield "importProject", "POST", "/api/projects/import", {"path": str(folder / "elsewhere")}
+    yield "createObject", "POST", f"{at}/objects", {"category": "mug", "points": [CLICK]}
+    yield "editObject", "PATCH", on, {"colour": 5}
+    yield "addPoint", "POST", f"{on}/points", CLICK
+    yield "addPoints", "POST", f"{on}/clicks", {"points": [CLICK, CLICK]}
+    first, *_, last = web.get(f"{at}/objects")[0]["points"]
+    yield "movePoint", "PATCH", f"{on}/points/{first['id']}", {"x": 11.0}
+    yield "deletePoint", "DELETE", f"{on}/points/{last['id']}", None
+    yield "undo", "POST", f"{at}/undo", {"object": 1}
+    yield "redo", "POST", f"{at}/redo", {"object": 1}
+    named = {"name": "of_the_file", "category": "mug", "points": [CLICK]}
+    yield "importPrompts", "POST", f"{at}/prompts.json", {"version": 1, "objects": [named]}
+    yield "openLive", "POST", f"{at}/live/open", None
+    yield "segmentObject", "POST", f"{on}/segment", None
+    yield "cancelSegment", "POST", f"{on}/segment/cancel", None
+    web.until(lambda: web.get(f"{at}/proposals")["state"] == "done")
+    one, another = (proposal["id"] for proposal in web.get(f"{at}/proposals")["items"][:2])
+    yield "confirmProposals", "POST", f"{at}/proposals/confirm", {"ids": [one]}
+    yield "dismissProposals", "POST", f"{at}/proposals/dismiss", {"ids": [another]}
+    yield "restoreProposals", "POST", f"{at}/proposals/restore", None
+    yield "giveVerdict", "POST", f"{on}/verdicts", {"candidate": "c1", "verdict": "accepted", "rerun": False}
+    yield "setOverride", "PATCH", f"{on}/override", {"hinge": "left", "rerun": False}
+    yield "uploadCandidate", "POST", f"{on}/candidates?filename=mine.glb&rerun=false", b"glTF"
+    yield "addComment", "POST", f"{at}/comments", {"text": "look"}
+    yield "changeComment", "PATCH", f"{at}/comments/1", {"resolved": True}
+    yield "openViewer", "POST", f"{at}/viewer", None
+    yield "showInViewer", "POST", f"{at}/viewer/show", {"mode": "cloud"}
+    yield "setJoints", "POST", f"{at}/viewer/joints", {"values": {"door": 0.5}}
+    yield "placeInViewer", "POST", f"{at}/viewer/place", {"pose": None}
+    held = behave(web, project, segment="hang")
+    yield "runProject", "POST", f"{at}/run", {}
+    web.until(lambda: (held / "hanging").exists())
+    job = web.get(f"/api/jobs?project={project}")[0]["id"]
+    yield "cancelJob", "POST", f"/api/jobs/{job}/cancel", None
+    web.job(job, "cancelled")
+    yield "retryJob", "POST", f"/api/jobs/{job}/retry", None
+    yield "stepReview", "POST", f"{at}/review", {"from_state": "draft", "to": "ready", "reason": "go"}
+    yield "deleteObject", "DELETE", on, None
+
+
+def covered(web: Running) -> set[str]:
+    """Every operation that changes something and may be sent again."""
+    paths = web.app.openapi()["paths"]
+    return {
+        said["operationId"]
+        for path, methods in paths.items()
+        for method, said in methods.items()
+        if method not in ("get", "head") and COVERED.fullmatch(path)
+    }
+
+
+def stored(web: Running) -> Any:
+    """What people gave, and what was queued: all that a change may change, once no import is about to add something."""
+    busy = ("queued", "running")
+    web.until(lambda: not [job for job in web.get("/api/jobs") if job["kind"] != "run" and job["state"] in busy])
+    tables = (Project.id, Job.id, SceneObject, Point, Override, Verdict, Comment, Event)
+    with reading(web.context.engine) as session:
+        rows = [sorted(repr(row) for row in session.exec(select(table))) for table in tables]
+    return rows, sorted(path.name for path in web.settings.data_dir.glob("projects/*/uploads/*/*"))
+
+
+def send_marked(web: Running, method: str, path: str, key: str, sent: Any) -> Any:
+    if isinstance(sent, bytes):
+        return web.client.request(method, path, content=sent, headers={"Idempotency-Key": key})
+    return keyed(web, method, path, key, sent)
+
+
+def test_a_second_transaction_of_one_change_is_refused_by_the_database(web: Running, at: str) -> None:
+    change = Sending("digest", "POST /x", None)
+    with once.marked(change):
+        with writing(web.context.engine) as session:
+            session.get(Project, at)
+        with pytest.raises(Conflict, match="stored already"), writing(web.context.engine) as session:
+            session.add(Job(project_id=at.split("/")[3], kind="run", state="done", created=1.0))
+    assert "run" not in [job["kind"] for job in web.get("/api/jobs")]
 
 
 def _kept(web: Running) -> int:

@@ -148,16 +148,6 @@ def test_corrections_are_checked_kept_and_cleared(reviewed: Reviewed) -> None:
     assert web.patch(address, {"hinge": "diagonal"}, 422)["kind"] == "invalid"
 
 
-def test_an_uploaded_mesh_is_a_candidate(reviewed: Reviewed) -> None:
-    web, project, number = reviewed
-    address = f"/api/projects/{project}/objects/{number}/candidates"
-    said = web.post(f"{address}?filename=../../mine.glb&rerun=false", content=b"glTF123", status=201)
-    path = said["group"]["override"]["candidate"]
-    assert path.startswith(str(web.settings.data_dir / "projects" / project / "uploads"))
-    assert web.post(f"{address}?filename=x.exe", content=b"MZ", status=422)["kind"] == "override"
-    assert web.post(f"{address}?filename=x.glb", content=b"", status=422)["kind"] == "override"
-
-
 def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     scene = web.get(f"/api/projects/{project}/scene")

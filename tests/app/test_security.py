@@ -69,6 +69,13 @@ def test_a_session_outlives_the_server(start: Callable[..., Any]) -> None:
         assert other.get("/api/projects").status_code == 200
 
 
+@pytest.mark.parametrize("others", ['a={"b": [1, 2]}; ', "plain; ", "x=\x01; ", 'q="half; '])
+def test_what_other_apps_of_this_machine_keep_in_cookies_signs_nobody_out(web: Running, others: str) -> None:
+    cookie = web.client.cookies[COOKIE]
+    headers = {"cookie": f"{others}{COOKIE}={cookie}; theirs=2".encode()}
+    assert fresh(web).get("/api/projects", headers=headers).status_code == 200
+
+
 def test_what_is_stored_of_a_session_lets_nobody_in(web: Running) -> None:
     stored = b"".join(path.read_bytes() for path in web.settings.data_dir.glob("r2c2r.db*"))
     assert web.client.cookies[COOKIE].encode() not in stored
@@ -84,7 +91,9 @@ def test_loopback_names_are(web: Running, host: str) -> None:
     assert web.client.get("/api/health", headers={"host": host}).status_code == 200
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "http://localhost:8000"])
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "http://localhost:8000", "http://["]
+)
 def test_requests_from_other_sites_are_refused(web: Running, origin: str) -> None:
     for method, path in (("POST", "/api/projects/sample"), ("GET", "/api/projects"), ("DELETE", "/api/projects/x")):
         answer = web.client.request(method, path, headers={"origin": origin})

@@ -5,9 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sqlmodel import select
 from starlette.testclient import TestClient
 
-from app.services import accounts, uploads
+from app.db.engine import writing
+from app.db.tables import Upload
+from app.services import accounts, leftovers, uploads
 from tests.app.conftest import ORIGIN, Running
 from tests.app.test_imports import R3D, archive, break_off, left_behind
 
@@ -101,20 +104,64 @@ def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
 
 def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
     old, new = begin(web), begin(web)
-    stray = web.settings.uploads / "stray.part"
-    stray.touch()
-    for path in (web.settings.uploads / f"{old}.part", stray):
-        os.utime(path, (1, 1))
-    uploads.tidy(web.context)
+    os.utime(web.settings.uploads / f"{old}.part", (1, 1))
+    uploads.forget_stopped(web.context)
     assert [found["id"] for found in web.get("/api/uploads")] == [new]
     assert [path.name for path in Path(web.settings.uploads).iterdir()] == [f"{new}.part"]
 
 
-def test_a_crash_while_finishing_is_made_good_by_finishing_again(web: Running) -> None:
-    upload = begin(web)
-    send(web.client, upload, 0, R3D)
+def test_what_a_crash_left_is_deleted_once_it_is_old(web: Running) -> None:
+    upload, project = begin(web), web.sample()
+    projects = web.settings.data_dir / "projects"
+    left = [web.settings.uploads / "stray.part", web.settings.uploads / "mesh.glb", projects / "deleted"]
+    for path in left[:2]:
+        path.touch()
+    (projects / "deleted" / "source").mkdir(parents=True)
+    leftovers.tidy(web.context)
+    assert all(path.exists() for path in left)  # something may begin just now
+    for path in (*left, web.settings.uploads / f"{upload}.part", projects / project):
+        os.utime(path, (1, 1))
+    leftovers.tidy(web.context)
+    assert not any(path.exists() for path in left)
+    assert [found["id"] for found in web.get("/api/uploads")] == [upload]
+    assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
+
+
+def interrupted(web: Running, content: bytes = R3D) -> str:
+    """An upload whose server was killed while finishing it, after its bytes were moved."""
+    upload = begin(web, content)
+    send(web.client, upload, 0, content)
     source = web.settings.data_dir / "projects" / upload / "source"
     source.mkdir(parents=True)
-    (web.settings.uploads / f"{upload}.part").rename(source / "Kitchen.r3d")  # and the server is killed here
+    (web.settings.uploads / f"{upload}.part").rename(source / "Kitchen.r3d")
+    return upload
+
+
+def test_a_crash_while_finishing_is_made_good_by_finishing_again(web: Running) -> None:
+    upload = interrupted(web)
     assert int(web.client.head(f"/api/uploads/{upload}").headers["upload-offset"]) == len(R3D)
+    assert finish(web, upload)["id"] == upload
+
+
+def test_what_is_refused_or_given_up_after_such_a_crash_leaves_nothing_either(web: Running) -> None:
+    finish(web, interrupted(web, archive(("unreadable", b"x"))), 422)
+    assert left_behind(web) == []
+    assert web.client.delete(f"/api/uploads/{interrupted(web)}").status_code == 204
+    assert left_behind(web) == []
+    upload = interrupted(web)
+    with writing(web.context.engine) as session:
+        for row in session.exec(select(Upload)):
+            row.created = 1.0
+            session.add(row)
+    uploads.forget_stopped(web.context)
+    assert (left_behind(web), web.get("/api/uploads")) == ([], [])
+    assert finish(web, upload, 404)["kind"] == "not-found"
+
+
+def test_an_upload_whose_bytes_somebody_deleted_starts_anew(web: Running) -> None:
+    upload = begin(web)
+    send(web.client, upload, 0, R3D[:50])
+    (web.settings.uploads / f"{upload}.part").unlink()
+    assert [found["offset"] for found in web.get("/api/uploads")] == [0]
+    assert send(web.client, upload, 0, R3D).status_code == 204
     assert finish(web, upload)["id"] == upload

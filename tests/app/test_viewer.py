@@ -116,6 +116,28 @@ def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> Non
         assert web.post(f"/api/projects/{project}/viewer")["url"] == url
 
 
+def test_a_view_closed_between_finding_and_asking_it_is_opened_again(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project, viewer = seen.sample(), seen.context.viewer
+    show = f"/api/projects/{project}/viewer/show"
+    seen.post(show, {"mode": "cloud"})
+    (view,) = viewer._views.values()
+    ask, closings = viewer._ask, [0]  # how often it is closed as idle before it is asked
+
+    def ask_late(command: dict[str, Any]) -> dict[str, Any]:
+        if command["cmd"] != "open" and closings[0] > 0:
+            closings[0] -= 1
+            ask({"cmd": "close", "view": view.name})
+        return ask(command)
+
+    monkeypatch.setattr(viewer, "_ask", ask_late)
+    for path, body in (("show", {"mode": "cloud"}), ("joints", {"values": {"door": 0.5}}), ("place", {"pose": None})):
+        closings[0] = 1
+        seen.post(f"/api/projects/{project}/viewer/{path}", body, 200)
+    closings[0] = 99
+    refused = seen.post(show, {"mode": "cloud"}, 503)
+    assert (refused["kind"], "closed meanwhile" in refused["message"]) == ("unavailable", True)
+
+
 def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
     project = seen.sample()
     seen.post(f"/api/projects/{project}/viewer")

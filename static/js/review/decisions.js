@@ -71,7 +71,7 @@ export class Decisions extends EventTarget {
   /** A mesh of one's own. @param {File} file */
   upload(file) {
     const { group } = this.#objects;
-    if (group) this.#report(uploadCandidate(this.#project, group.object, file));
+    if (group) this.#report(uploadCandidate(this.#project, group, file));
   }
 
   /** @param {"undo" | "redo"} which */

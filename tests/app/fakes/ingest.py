@@ -30,7 +30,8 @@ def frame(index: int) -> dict[str, object]:
 if __name__ == "__main__":
     workdir, project = Path(sys.argv[1]), Path(sys.argv[2])
     request = json.loads((workdir / "request.json").read_text())
-    if "broken" in request["source"]:
+    if "broken" in request["source"]:  # which shows late
+        write_recording(workdir, project, request["source"])
         error = {"kind": "CaptureError", "message": "no depth in it", "hint": "record again"}
         sys.stdout.write(json.dumps({"error": error}) + "\n")
         sys.exit(2)

@@ -1,4 +1,4 @@
-"""A viewer whose upstream echoes; opacity 0.123 kills it."""
+"""A viewer whose upstream echoes; opacity 0.123 kills it; a view that is not open says so."""
 
 import json
 import sys
@@ -36,10 +36,20 @@ server = serve(echo, "127.0.0.1", 0, process_request=page, select_subprotocol=ch
 threading.Thread(target=server.serve_forever, daemon=True).start()
 port = server.socket.getsockname()[1]
 shown: dict[str, int] = {}  # times, by view
+opened: set[str] = set()
 for line in sys.stdin:
     command = json.loads(line)
     if command.get("opacity") == 0.123:
         sys.exit(1)
+    if command["cmd"] == "open":
+        opened.add(command["view"])
+    elif command["view"] not in opened:
+        error = {"kind": "NotOpen", "message": "the 3D view of this project is not open", "hint": "open it first"}
+        sys.stdout.write(json.dumps({"id": command["id"], "error": error}) + "\n")
+        sys.stdout.flush()
+        continue
+    if command["cmd"] == "close":
+        opened.discard(command["view"])
     answer: dict[str, Any] = {"port": port}
     if command["cmd"] == "show":
         shown[command["view"]] = shown.get(command["view"], 0) + 1

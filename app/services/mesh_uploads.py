@@ -1,0 +1,88 @@
+"""A mesh that a person made, as a candidate: received, looked at, and only then kept."""
+
+import contextlib
+import re
+import secrets
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import anyio
+from starlette.requests import ClientDisconnect
+
+from app import schemas
+from app.db import history, queries
+from app.db.engine import reading
+from app.errors import TooLarge
+from app.files import require_free, safe_name
+from app.services import probing, reviews
+from app.services.context import Context
+from r2c2r_core.errors import OverrideError
+from r2c2r_core.generate.meshfile import MOST_BYTES, SUFFIXES
+
+
+async def upload(
+    context: Context,
+    project_id: str,
+    object_id: int,
+    filename: str,
+    stream: AsyncIterator[bytes],
+    rerun: bool,
+    version: int | None = None,
+) -> schemas.Reviewed:
+    """The object's candidate from a mesh file; nothing of it stays when it is refused or breaks off."""
+    name = safe_name(filename, "mesh")
+    suffix = Path(name).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(SUFFIXES)}")
+    folder = await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, version)
+    stem, token = re.sub(r"[^A-Za-z0-9_]+", "_", Path(name).stem)[:40] or "mesh", secrets.token_hex(4)
+    received, target = context.settings.uploads / f"{token}{suffix}", folder / f"{stem}-{token}{suffix}"
+    wish = schemas.OverridePatch(candidate=str(target), rerun=rerun, version=version)
+    try:
+        await _receive(stream, received)
+        await anyio.to_thread.run_sync(probing.look_at, context, "mesh", received, name)
+        return await anyio.to_thread.run_sync(_adopt, context, project_id, object_id, received, wish)
+    except ClientDisconnect as error:
+        raise OverrideError("the sender left before the last byte", hint="upload it again") from error
+    finally:
+        with anyio.CancelScope(shield=True):
+            await anyio.Path(received).unlink(missing_ok=True)
+
+
+def _folder_for(context: Context, project_id: str, object_id: int, version: int | None) -> Path:
+    """Where the object's uploaded meshes are; raises what can be known to be wrong before a byte is received."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        history.require_open(project)
+        reviews.refuse_overtaken(context, session, project, item, schemas.OverridePatch(version=version))
+    require_free(context.settings.data_dir, 0, context.settings.min_free_bytes)
+    return context.files(project).uploads / item.name
+
+
+async def _receive(stream: AsyncIterator[bytes], target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    received = 0
+    async with await anyio.open_file(target, "wb") as out:
+        async for chunk in stream:
+            received += len(chunk)
+            if received > MOST_BYTES:
+                raise TooLarge(f"the mesh is larger than {MOST_BYTES / 1e6:.0f} MB", hint="simplify it first")
+            await out.write(chunk)
+    if received == 0:
+        raise OverrideError("the upload is empty", hint="choose a mesh file")
+
+
+def _adopt(context: Context, project_id: str, object_id: int, received: Path, wish: schemas.OverridePatch) -> schemas.Reviewed:
+    """Keep the file for as long as the correction that names it is stored."""
+    target = Path(wish.candidate or "")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    received.replace(target)
+    try:
+        job, text = reviews.store_override(context, project_id, object_id, wish)
+    except BaseException:  # whatever it was: nothing names the file
+        target.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # others lie in it
+            target.parent.rmdir()
+        raise
+    return reviews.reviewed_shape(context, project_id, object_id, job, text)

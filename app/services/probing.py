@@ -1,0 +1,42 @@
+"""A look at what people send, in a process of its own, before anything else believes it."""
+
+import os
+import queue
+import threading
+from pathlib import Path
+from typing import Literal
+
+from app.errors import told_body
+from app.process import Worker
+from app.services.context import Context
+from r2c2r_core.errors import CaptureError, InputError, OverrideError
+
+Kind = Literal["recording", "mesh"]
+PROBE_S: dict[Kind, float] = {"recording": 120.0, "mesh": 300.0}
+_REFUSAL: dict[Kind, type[InputError]] = {"recording": CaptureError, "mesh": OverrideError}
+_probing = threading.BoundedSemaphore(2)
+
+
+def look_at(context: Context, kind: Kind, path: Path, name: str) -> None:
+    """Raise CaptureError or OverrideError, in one line, for a file that the core could not use; it is called `name`."""
+    with _probing:
+        worker = Worker((*context.runner.commands.probe, kind, str(path), name), Path(os.devnull))
+        try:
+            line = worker.next_line(timeout=PROBE_S[kind])
+        except queue.Empty:
+            line = None
+        finally:
+            worker.close()
+    if line is None:
+        raise _REFUSAL[kind](f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
+    if "error" in line:
+        raise _refusal(kind, name, line["error"])
+
+
+def _refusal(kind: Kind, name: str, told: dict[str, str]) -> InputError:
+    """What the probe said; whatever else went wrong in it, the file is the cause."""
+    said = told_body(told)
+    message, hint = (" ".join(said[part].split())[:most] for part, most in (("message", 500), ("hint", 400)))
+    if said["kind"] == "internal":
+        message, hint = f"{name} cannot be read ({message[:200]})", "export it again from the app that made it"
+    return _REFUSAL[kind](message, hint=hint)
