@@ -12,11 +12,12 @@ from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.edges import as_lab, panel_edges
 from r2c2r_core.segment.fronts import Front, near_plane, nudged, wall_behind
 from r2c2r_core.segment.handles import find_handles
-from r2c2r_core.segment.outline import outlined
+from r2c2r_core.segment.outline import outlined, photos_of
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.squaring import squared
+from r2c2r_core.segment.stance import stood
 from r2c2r_core.segment.things import ThingConfig, support_height
 from r2c2r_core.segment.trimming import trimmed
 from r2c2r_core.segment.workbench import Workbench
@@ -26,10 +27,13 @@ _OFF_FRONT_M = 0.04  # behind its plane: a side or the top
 _PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
 
 
-def appliance_front(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points) -> tuple[Front, bool] | None:
+def appliance_front(
+    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points, *, glimpse: bool = False
+) -> tuple[Front, bool] | None:
     """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
 
-    Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere.
+    Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
+    the photographs, which take most of the time and move the box by millimetres.
     """
     assert hint.appliance is not None
     clicks = [click for click in prompt.points if click.label == 1]
@@ -53,9 +57,19 @@ def appliance_front(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, 
     wall = wall_behind(run, front.cell, room, hint.depth_m)
     depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
     front = squared(replace(front, depth_m=depth), bench.scene)
-    front, outlined_depth = outlined(front, bench.scene, hint.depth_m, wall)
+    if not glimpse:
+        front, outlined_depth = _photographed(front, bench.scene, hint.depth_m, wall)
+        seen = seen or outlined_depth
     front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
-    return front, seen or outlined_depth
+    return front, seen
+
+
+def _photographed(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
+    """The front by the edges of its box in the photographs; and whether they show its depth."""
+    photos = photos_of(front, scene)
+    front, clear = outlined(front, photos, usual_m, wall_m)
+    standing = stood(front, photos)
+    return (front, clear) if standing is front else outlined(standing, photos, usual_m, wall_m)
 
 
 def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize, support_row: float | None) -> Cell | None:

@@ -43,8 +43,12 @@ def find_object(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, posi
     )
 
 
-def glimpse_object(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> Found | None:
-    """A first look at what is slow to find, from depth alone: small things. None for the rest, which are found at once."""
+def glimpse_object(
+    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, positives: Points, negatives: Points
+) -> Found | None:
+    """A first look at what is slow to find, from depth alone: small things, appliances. None for the rest, found at once."""
+    if hint.kind == "appliance":
+        return _appliance(bench, prompt, hint, negatives, glimpse=True)
     if hint.kind != "thing" or hint.thing.radius_m >= _SMALL_M or not len(positives):
         return None
     small = glimpse_small(bench.scene, positives, negatives, hint.thing, _structure_off(bench, positives[0]))
@@ -63,8 +67,10 @@ def _front(bench: Workbench, hint: CategoryHint, positives: Points, negatives: P
     return FoundFront(replace(front, sides=seen_sides(front, bench.scene)), bench.scene, swings=not (hint.pair or hint.stacked))
 
 
-def _appliance(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points) -> FoundAppliance | None:
-    front, seen = appliance_front(bench, prompt, hint, negatives) or (None, False)
+def _appliance(
+    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points, *, glimpse: bool = False
+) -> FoundAppliance | None:
+    front, seen = appliance_front(bench, prompt, hint, negatives, glimpse=glimpse) or (None, False)
     if front is None:
         return None
     usual = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"

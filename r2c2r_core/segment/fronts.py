@@ -70,7 +70,7 @@ def find_front(
 def front_panel(front: Front) -> FrontPanel:
     """The measured rectangle in the `front` frame."""
     grid, cell = front.run.grid, front.cell
-    centre = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+    centre = front_middle(front)
     rotation = front.run.region.world_from_plane.rotation
     width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
     handle = _handle_in_front(front, cell) if front.handle is not None else None
@@ -289,6 +289,13 @@ def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Po
     """World corners of a panel as a frame shows it: top left, then clockwise."""
     corners = np.array([[cell.left, cell.top], [cell.right, cell.top], [cell.right, cell.bottom], [cell.left, cell.bottom]])
     return grid.points_at(corners - np.array(slide))
+
+
+def front_middle(front: Front) -> Vector3:
+    """The world point in the middle of a panel."""
+    cell = front.cell
+    at = np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]])
+    return np.asarray(front.run.grid.points_at(at)[0])
 
 
 _SIDE_EDGES = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}

@@ -73,8 +73,8 @@ class GeometricSession:
         return self.find(prompt).see(self.scene.frame(frame_index)).mask
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
-        """A first mask in the frame clicked last: what `stream` brings there, or for small things, from depth alone."""
-        found = self._found.get(prompt) or glimpse_object(self, *self._clicked(prompt)) or self.find(prompt)
+        """A first mask in the frame clicked last: what `stream` brings there; of things and appliances, nearly that."""
+        found = self._found.get(prompt) or glimpse_object(self, prompt, *self._clicked(prompt)) or self.find(prompt)
         frame = self.scene.frame(prompt.points[-1].frame)
         view = found.see(frame)
         return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None

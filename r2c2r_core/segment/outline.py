@@ -15,7 +15,7 @@ from r2c2r_core.arrays import DepthMetres, Image, Points
 from r2c2r_core.geometry.camera import Intrinsics, project
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.fronts import Front
+from r2c2r_core.segment.fronts import Front, front_middle
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.viewpoints import best_views
 
@@ -53,23 +53,28 @@ class Body(NamedTuple):
     depth_m: float
 
 
-def outlined(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
-    """The front with its upper edge and its depth at their colour edges, where those are clear; and whether the depth was."""
+def body_of(front: Front) -> Body:
+    """The box behind a front."""
     grid, cell = front.run.grid, front.cell
-    middle = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
     half_height = cell.height * grid.cell_m / 2
-    body = Body(
-        Rigid3(grid.world_from_plane.rotation, middle),
-        cell.width * grid.cell_m / 2,
-        -half_height,
-        half_height,
-        front.depth_m,
-    )
-    photos = [_photo(scene, frame) for frame in best_views(scene, middle, _FRAMES)]
+    world_from_front = Rigid3(grid.world_from_plane.rotation, front_middle(front))
+    return Body(world_from_front, cell.width * grid.cell_m / 2, -half_height, half_height, front.depth_m)
+
+
+def photos_of(front: Front, scene: Scene) -> list[Photo]:
+    """Frames that show the middle of a front, from many directions."""
+    return [_photo(scene, frame) for frame in best_views(scene, front_middle(front), _FRAMES)]
+
+
+def outlined(front: Front, photos: Sequence[Photo], usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
+    """The front with its upper edge and its depth at their colour edges, where those are clear; and whether the depth was."""
+    body = body_of(front)
+    half_height = body.top_m
     farthest = min(_DEPTH_RANGE[1] * usual_m, np.inf if wall_m is None else wall_m)
     depths = np.arange(_DEPTH_RANGE[0] * usual_m, farthest, _DEPTH_STEP_M)
     body, clear = outlined_body(body, photos, half_height + np.arange(-_TOP_REACH_M, _TOP_REACH_M, _TOP_STEP_M), depths)
-    moved = replace(cell, top=cell.top - (body.top_m - half_height) / grid.cell_m)
+    cell = front.cell
+    moved = replace(cell, top=cell.top - (body.top_m - half_height) / front.run.grid.cell_m)
     return replace(front, cell=moved, depth_m=body.depth_m), clear
 
 
@@ -157,7 +162,7 @@ def _contrast(photo: Photo, edge: Points) -> np.ndarray | None:
     uv = project(in_camera, photo.camera).reshape(*edge.shape[:2], 2)
     shift = np.linalg.norm(uv[-1] - uv[0], axis=1)
     inside = (uv > 4).all(axis=2) & (uv < [photo.camera.width - 4, photo.camera.height - 4]).all(axis=2)
-    inside &= ~_hidden(photo, uv, in_camera[:, 2].reshape(inside.shape))
+    inside &= ~hidden(photo, uv, in_camera[:, 2].reshape(inside.shape))
     if np.median(shift) < _LEAST_SHIFT_PX or inside.mean() < 0.7:
         return None
     direction = uv[:, -1] - uv[:, 0]
@@ -168,7 +173,7 @@ def _contrast(photo: Photo, edge: Points) -> np.ndarray | None:
     return np.asarray(np.where(inside, np.minimum(difference, 60.0), 0.0).sum(axis=1) / np.maximum(inside.sum(axis=1), 1))
 
 
-def _hidden(photo: Photo, uv_px: np.ndarray, z_m: np.ndarray) -> np.ndarray:
+def hidden(photo: Photo, uv_px: np.ndarray, z_m: np.ndarray) -> np.ndarray:
     """Whether the photo's depth shows something in front of each point."""
     rows, columns = photo.depth_m.shape
     row = np.clip(uv_px[..., 1] * rows / photo.camera.height, 0, rows - 1).astype(int)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.segment.cut import Cell
-from r2c2r_core.segment.fronts import Front
+from r2c2r_core.segment.fronts import Front, front_middle
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import ThingConfig, support_height
 
@@ -39,7 +39,7 @@ class _Faces:
 def squared(front: Front, scene: Scene) -> Front:
     """The front turned and its edges moved to where the body's faces are; as it was where depth saw none of them."""
     grid, cell = front.run.grid, front.cell
-    middle = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+    middle = front_middle(front)
     centred = Rigid3(grid.world_from_plane.rotation, middle)
     half_w, half_h = cell.width * grid.cell_m / 2, cell.height * grid.cell_m / 2
     reach = np.array([half_w + _SHELL_M, front.depth_m, half_h + _SHELL_M])
@@ -65,10 +65,20 @@ def squared(front: Front, scene: Scene) -> Front:
     moved = Cell(
         column + left / grid.cell_m, row - upper / grid.cell_m, column + right / grid.cell_m, row - lower / grid.cell_m
     )
-    run = front.run
-    world_from_plane = _turned(grid.world_from_plane, middle, turn)
-    region = replace(run.region, world_from_plane=_turned(run.region.world_from_plane, middle, turn))
-    return replace(front, cell=moved, run=replace(run, grid=replace(grid, world_from_plane=world_from_plane), region=region))
+    return turned_front(front, moved, turn)
+
+
+def turned_front(front: Front, cell: Cell, turn_rad: float, forward_m: float = 0.0) -> Front:
+    """A front with another rectangle of its grid, turned about the upright axis through its middle and moved outwards."""
+    run, middle = front.run, front_middle(front)
+
+    def moved(world_from_plane: Rigid3) -> Rigid3:
+        turned = Rigid3(rotation_about_z(turn_rad), middle) @ Rigid3(np.eye(3), -middle) @ world_from_plane
+        return Rigid3(turned.rotation, turned.translation - forward_m * turned.rotation[:, 1])
+
+    grid = replace(run.grid, world_from_plane=moved(run.grid.world_from_plane))
+    region = replace(run.region, world_from_plane=moved(run.region.world_from_plane))
+    return replace(front, cell=cell, run=replace(run, grid=grid, region=region))
 
 
 def _turn(face: _Faces, sides: dict[int, _Faces]) -> tuple[float, dict[int, float]]:
@@ -132,10 +142,3 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, total[-1] / 2)])
-
-
-def _turned(world_from_plane: Rigid3, about_world: Vector3, turn_rad: float) -> Rigid3:
-    """A plane turned about the upright axis through a point of it."""
-    c, s = np.cos(turn_rad), np.sin(turn_rad)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-    return Rigid3(turn @ world_from_plane.rotation, about_world + turn @ (world_from_plane.translation - about_world))
