@@ -18,6 +18,7 @@ from app.hub import Hub
 from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
 from app.jobs.plans import Commands
+from app.jobs.rows import JobRows
 from app.jobs.runner import Runner
 from app.routes import (
     jobs,
@@ -91,7 +92,7 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
 def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) -> Context:
     """Everything that runs: the database, the queue, the live segmenters, the viewer."""
     engine, hub = open_engine(settings.database), Hub()
-    runner = Runner(engine, hub, settings, commands, FINISHERS, job_ended)
+    runner = Runner(JobRows(engine, hub, settings, FINISHERS, job_ended), settings, commands)
     context = Context(
         settings=settings,
         engine=engine,
@@ -99,7 +100,7 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
         people=People(engine, settings),
         person=Person(settings.user, "admin"),
         runner=runner,
-        live=LiveSegmenters(hub, settings, commands),
+        live=LiveSegmenters(engine, hub, settings, commands),
         viewer=viewer_client or Viewer(settings),
         static=shipped("static", "index.html"),
     )

@@ -228,6 +228,18 @@ class JobEvent(SQLModel, table=True):
     text: str = ""
 
 
+class Computing(SQLModel, table=True):
+    """A time in which a project's live segmenter was at work: preparing, proposing or drawing masks."""
+
+    __tablename__ = "computing"
+    __table_args__ = (Index("ix_computing_project", "project_id"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    began: float
+    ended: float
+
+
 class Bundle(SQLModel, table=True):
     """One finished bundle."""
 

@@ -16,7 +16,7 @@ from app.db import history
 from app.db.queries import live_objects, newest_bundle
 from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
-from app.jobs.runner import Finisher
+from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.segment.prompts import parse_prompts
 

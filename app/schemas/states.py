@@ -89,5 +89,5 @@ class Figures(Shape):
     verdicts: int  # verdicts and corrections
     automatic_kept: float | None  # share of accepted candidates that were the automatic choice
     upload_to_approval_s: float | None
-    computing_s: float  # of the import and the runs
+    computing_s: float  # of the import, proposals, masks and runs; what went on at the same time counts once
     age_s: float

@@ -70,8 +70,7 @@ def queue_job(context: Context, session: Session, project: Project, kind: str, p
 
 
 def _started(context: Context, project_id: str, job: Job) -> schemas.Project:
-    context.runner.wake()
-    context.runner.tell(job.id or 0)
+    context.runner.queued(job.id or 0)
     projects.tell(context, project_id)
     return projects.get_project(context, project_id)
 

@@ -22,8 +22,7 @@ def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         job = queue_run(context, session, project, body)
-    context.runner.wake()
-    context.runner.tell(job.id or 0)
+    context.runner.queued(job.id or 0)
     projects.tell(context, project_id)
     return get_job(context, job.id or 0)
 
@@ -89,8 +88,7 @@ def retry(context: Context, job_id: int) -> schemas.Job:
             project.status, project.error = "importing", None
             session.add(project)
             job = queue_job(context, session, project, row.kind, row.payload)
-    context.runner.wake()
-    context.runner.tell(job.id or 0)
+    context.runner.queued(job.id or 0)
     projects.tell(context, job.project_id)
     return get_job(context, job.id or 0)
 

@@ -186,8 +186,7 @@ def _in_words(key: str, value: Any) -> str:
 def reviewed_shape(context: Context, project_id: str, object_id: int, job_id: int | None, text: str) -> schemas.Reviewed:
     """What follows from something stored: its job begins, every tab is told, and the object as it is now."""
     if job_id is not None:
-        context.runner.wake()
-        context.runner.tell(job_id)
+        context.runner.queued(job_id)
     tell_object(context, project_id, object_id)
     context.hub.publish("review", project_id, object=object_id)
     with reading(context.engine) as session:

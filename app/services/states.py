@@ -11,9 +11,10 @@ from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import history, queries
+from app.db.computing import computing_s
 from app.db.documents import inputs_key
 from app.db.engine import reading, writing
-from app.db.tables import Comment, Event, Job, Project, Verdict
+from app.db.tables import Comment, Event, Project, Verdict
 from app.errors import Conflict
 from app.services import masks, projects
 from app.services.context import Context
@@ -174,7 +175,6 @@ def _figures(session: Session, project: Project) -> schemas.Figures:
     approved = session.exec(
         select(func.min(Event.at)).where(Event.project_id == project.id, Event.scope == SCOPE, Event.action == "approved")
     ).one()
-    jobs = select(Job).where(Job.project_id == project.id, col(Job.started).is_not(None))
     return schemas.Figures(
         objects=len(items),
         clicks=clicks,
@@ -182,7 +182,7 @@ def _figures(session: Session, project: Project) -> schemas.Figures:
         verdicts=_events(session, project.id, "review"),
         automatic_kept=named.count(False) / len(named) if named else None,
         upload_to_approval_s=approved - project.created if approved is not None else None,
-        computing_s=sum((job.finished or time.time()) - (job.started or time.time()) for job in session.exec(jobs)),
+        computing_s=computing_s(session, project.id, time.time()),
         age_s=time.time() - project.created,
     )
 

@@ -111,7 +111,7 @@ def test_the_queue_goes_on_after_an_error_nobody_thought_of(web: Running, monkey
         raise ZeroDivisionError
 
     with monkeypatch.context() as broken:
-        broken.setattr("app.jobs.runner.steps_of", boom)
+        broken.setattr("app.jobs.rows.steps_of", boom)
         job = web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "failed")
     assert job["error"]["kind"] == "internal"
     again = web.post(f"/api/jobs/{job['id']}/retry", status=202)

@@ -8,10 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from sqlmodel import select
 
 from app.db.engine import open_engine, reading, writing
 from app.db.tables import Job
+from app.errors import Unavailable
 from app.process import started_at
 from app.settings import Settings
 from tests.app.conftest import Running
@@ -171,6 +173,31 @@ def test_deleting_a_project_stops_its_job(web: Running) -> None:
     web.until(lambda: (folder / "hanging").exists())
     web.delete(f"/api/projects/{project}")
     assert not folder.exists()
+
+
+def test_a_job_that_is_deleted_while_it_runs_is_stopped_and_the_queue_goes_on(web: Running) -> None:
+    project = web.sample()
+    folder = behave(web, project, generate="hang")
+    job = run(web, project)
+    web.until(lambda: (folder / "hanging").exists())
+    with writing(web.context.engine) as session:
+        row = session.get(Job, job)
+        assert row is not None
+        worker = row.worker_pid or 0
+        session.delete(row)
+    (folder / "behave.json").unlink()
+    assert web.job(run(web, project), "done")["state"] == "done"
+    web.until(lambda: not _alive(worker))
+
+
+def test_a_job_goes_on_when_nobody_can_be_told_how_far_it_is(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    def busy(*_: object) -> None:
+        raise Unavailable("the database does not answer")
+
+    project = web.sample()
+    monkeypatch.setattr(web.context.runner.rows, "progressed", busy)
+    monkeypatch.setattr("app.jobs.runner.STORE_EVERY_S", -1.0)
+    assert web.job(run(web, project), "done", "failed")["state"] == "done"
 
 
 def test_stopping_the_server_in_order_puts_the_job_back_into_the_queue(start: Callable[..., Any]) -> None:

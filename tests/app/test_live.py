@@ -1,4 +1,5 @@
 import base64
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -106,6 +107,37 @@ def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
     stopped = web.post(f"/api/projects/{project}/objects/{made['id']}/segment/cancel")
     assert stopped["segment"] == "partial"
     assert stopped["mask_frames"] >= 1
+
+
+def test_masks_that_were_still_to_come_go_on_after_an_orderly_restart(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        held = {"category": "drawer", "points": [{**CLICK, "x": 156.5}]}  # gets one frame and no further
+        made = web.post(f"/api/projects/{project}/objects", held, 201)
+        web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
+    with start() as web:
+        web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
+
+
+def test_the_time_of_preparing_proposing_and_drawing_masks_is_computing(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        before = web.get(f"/api/projects/{project}/figures")["computing_s"]
+        slow = next(web.settings.data_dir.rglob("work")) / "prepare_slowly"
+        slow.touch()
+        web.post(f"/api/projects/{project}/live/open")
+        began = time.monotonic()
+        web.until(lambda: time.monotonic() - began > 1.0)
+        slow.unlink()
+        web.until(lambda: web.get(f"/api/projects/{project}/proposals")["state"] == "done")
+        web.until(lambda: web.get(f"/api/projects/{project}/figures")["computing_s"] >= before + 1.0)
+        ready = web.get(f"/api/projects/{project}/figures")["computing_s"]
+        held = {"category": "drawer", "points": [{**CLICK, "x": 155.5}]}  # slow
+        made = web.post(f"/api/projects/{project}/objects", held, 201)
+        web.until(lambda: _object(web, project, made["id"])["segment"] == "done")
+        web.until(lambda: web.get(f"/api/projects/{project}/figures")["computing_s"] >= ready + 0.3)
+    with start() as web:
+        assert web.get(f"/api/projects/{project}/figures")["computing_s"] >= ready + 0.3
 
 
 def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,213 @@
+"""What one project's live segmenter is at: its state, its objects' masks, its proposals, told to every tab as they come.
+
+The methods are called under the lock of app.jobs.live, but for `take`, which takes it.
+"""
+
+import contextlib
+import json
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app import schemas
+from app.errors import told_body
+from app.files import ProjectFiles
+from app.hub import Hub
+from app.jobs import mask_store
+from app.jobs.mask_store import MaskFile, mask_path
+from app.process import Line, Worker
+from r2c2r_core.workspace import write_atomically
+
+_log = logging.getLogger(__name__)
+
+NOTED_S = 10.0  # work is noted this often while it goes on, for the server may die
+
+
+@dataclass(slots=True)
+class Task:
+    """One object being segmented."""
+
+    key: str
+    path: Path
+    prompt: dict[str, Any]
+    state: schemas.SegmentState = "waiting"
+    asked: float = field(default_factory=time.monotonic)
+    masks: MaskFile = field(default_factory=MaskFile)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its masks are still to come."""
+        return self.state in ("waiting", "running")
+
+
+@dataclass(slots=True)
+class LiveSession:
+    """One project's process. `on_object` is told of every object whose masks came to an end."""
+
+    project: str
+    files: ProjectFiles
+    segmenter: str
+    worker: Worker
+    hub: Hub
+    lock: threading.RLock
+    on_object: Callable[[str, int], None]
+    deaths: int = 0  # of processes before this one, since one finished an object
+    state: schemas.LiveState = "starting"
+    fraction: float = 0.0
+    text: str = "starting"
+    error: dict[str, Any] | None = None
+    total: int = 0
+    used: float = field(default_factory=time.monotonic)
+    watched: float | None = None  # when a tab last looked; None when none ever did
+    tasks: dict[int, Task] = field(default_factory=dict)
+    proposals_path: Path | None = None  # where proposals go; None when they are there already
+    proposals: list[dict[str, Any]] = field(default_factory=list)
+    proposed: float = 0.0  # share of the work of proposing
+    at_work: float | None = field(default_factory=time.time)  # since when, as far as it is not noted yet
+    worked: list[tuple[float, float]] = field(default_factory=list)  # (began, ended), for whoever stores it
+
+    @property
+    def status(self) -> schemas.LiveStatus:
+        """How far the process is."""
+        error = schemas.ErrorBody(**self.error) if self.error else None
+        return schemas.LiveStatus(state=self.state, fraction=self.fraction, text=self.text, error=error)
+
+    @property
+    def working(self) -> bool:
+        """Whether it has something to do that somebody may wait for."""
+        preparing = self.state in ("starting", "preparing")
+        proposing = self.state == "ready" and self.proposals_path is not None
+        return preparing or proposing or any(task.is_open for task in self.tasks.values())
+
+    def segment(self, number: int, key: str, prompt: dict[str, Any]) -> None:
+        """Compute the object's masks, before anything asked for earlier; what was asked about it before is superseded."""
+        self.used = time.monotonic()
+        path = mask_path(self.files.masks, number, key)
+        mask_store.begin(path)
+        task = self.tasks[number] = Task(key, path, prompt)
+        if self.state == "ready":
+            self._send(number, task)
+        self._note_work()
+        self._tell_segment(number, task, restart=True)
+
+    def cancel(self, number: int) -> None:
+        """Stop computing the object's masks; those there stay."""
+        task = self.tasks.get(number)
+        if task is None or not task.is_open:
+            return
+        if self.state == "ready":
+            self.worker.say({"cmd": "cancel", "object": number})
+        self._end_task(number, task, "cancelled", None)
+
+    def end(self, error: dict[str, Any] | None) -> None:
+        """The process is gone: stopped in order, or with an error."""
+        self.state, self.error = ("off", None) if error is None else ("failed", error)
+        for number, task in self.tasks.items():
+            if task.is_open:
+                self._end_task(number, task, "cancelled" if error is None else "failed", error)
+        self._note_work(ended=True)
+
+    def take(self, line: Line) -> None:
+        """One message of the process."""
+        if "state" in line:
+            self._take_state(line)
+        elif "proposals" in line:
+            self._take_proposals(line)
+        else:
+            self._take_mask(line)
+
+    def tell_status(self) -> None:
+        """Show every tab how far the process is."""
+        self.hub.publish("live", self.project, status=self.status.model_dump())
+
+    def _take_state(self, line: Line) -> None:
+        with self.lock:
+            self.state = line["state"]
+            self.fraction, self.text = float(line.get("fraction", 1.0)), str(line.get("text", ""))
+            self.total = int(line.get("total", self.total))
+            self.error = told_body(line["error"]) if line.get("error") else None
+            self.used = time.monotonic()
+            if self.state == "ready":
+                for number, task in self.tasks.items():
+                    if task.state == "waiting":
+                        task.asked = time.monotonic()
+                        self._send(number, task)
+                if self.proposals_path is not None:
+                    self.worker.say({"cmd": "propose"})
+            self._note_work()
+        self.tell_status()
+
+    def _take_proposals(self, line: Line) -> None:
+        with self.lock:
+            self.used = time.monotonic()
+            grown = len(line["proposals"]) != len(self.proposals)
+            self.proposals, self.proposed = line["proposals"], float(line["fraction"])
+            done = self.proposed >= 1.0
+            if done:
+                self._keep_proposals("error" in line)
+            self._note_work()
+        self.hub.publish("proposals", self.project, fraction=self.proposed, changed=grown or done)
+
+    def _keep_proposals(self, failed: bool) -> None:
+        path, self.proposals_path = self.proposals_path, None
+        if path is not None and not failed:
+            try:
+                write_atomically(path, json.dumps(self.proposals).encode())
+            except OSError as error:  # a full disk: they are shown as long as this goes on, and made again another time
+                _log.warning("proposals of %s: %s", self.project, error)
+
+    def _take_mask(self, line: Line) -> None:
+        number = int(line["object"])
+        with self.lock:
+            task = self.tasks.get(number)
+            if task is None or task.key != line["key"] or not task.is_open:
+                return  # superseded
+            self.used = time.monotonic()
+            if "end" in line:
+                error = told_body(line["error"]) if line.get("error") else None
+                self._end_task(number, task, line["end"], error)
+                return
+            first = task.state == "waiting"
+            task.state = "running"
+            entry = {key: line[key] for key in ("frame", "confidence", "area", "mask")}
+            task.masks.frames[int(line["frame"])] = entry
+            counts = {"done": len(task.masks.frames), "total": self.total}
+            self._note_work()
+        mask_store.append(task.path, entry)
+        if first:
+            waited_ms = 1000 * (time.monotonic() - task.asked)
+            _log.info("%s: object %d: first mask after %.0f ms", self.project, number, waited_ms)
+            self._tell_segment(number, task)
+        shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
+        self.hub.publish("mask", self.project, object=number, **counts, **shown)
+
+    def _send(self, number: int, task: Task) -> None:
+        self.worker.say({"cmd": "segment", "object": number, "key": task.key, "prompt": task.prompt})
+
+    def _end_task(self, number: int, task: Task, end: str, error: dict[str, Any] | None) -> None:
+        task.masks.end, task.masks.error = end, error
+        task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
+        self.deaths = 0 if end == "done" else self.deaths
+        with contextlib.suppress(OSError):
+            mask_store.append(task.path, {"end": end, "error": error})
+        self._note_work()
+        self._tell_segment(number, task)
+        self.on_object(self.project, number)
+
+    def _note_work(self, *, ended: bool = False) -> None:
+        """Note when it was at work: once that ends, and now and then before."""
+        now, working = time.time(), self.working and not ended
+        if self.at_work is not None and (not working or now - self.at_work > NOTED_S):
+            self.worked.append((self.at_work, now))
+            self.at_work = None
+        if working and self.at_work is None:
+            self.at_work = now
+
+    def _tell_segment(self, number: int, task: Task, *, restart: bool = False) -> None:
+        counts = {"done": len(task.masks.frames), "total": self.total}
+        said = {"state": task.state, "error": task.masks.error, "restart": restart}
+        self.hub.publish("segment", self.project, object=number, **said, **counts)

@@ -1,0 +1,221 @@
+"""What becomes of a job's row: each step is one transaction with an event beside it, and shown to every tab."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Engine, text
+from sqlmodel import Session, col, select
+
+from app.db.documents import inputs_key
+from app.db.engine import reading, writing
+from app.db.queries import STAGES, job_row, job_shape, project_row
+from app.db.tables import Job, JobEvent, Project
+from app.errors import told_body
+from app.files import ProjectFiles, project_files, require_free
+from app.hub import Hub
+from app.jobs.plans import Commands, Step, steps_of, write_request
+from app.process import Worker, end_orphan, started_at
+from app.settings import Settings
+
+Finisher = Callable[[Session, Job, Project, ProjectFiles], None]
+
+_CLAIM = text(
+    "UPDATE jobs SET state='running', owner_pid=:pid, attempts=attempts+1, started=COALESCE(started, :now), "
+    "heartbeat=:now, error=NULL, stage='', stage_fraction=0 "
+    "WHERE id=(SELECT id FROM jobs WHERE state='queued' ORDER BY id LIMIT 1) RETURNING id"
+)
+
+
+class JobRows:
+    """The table of jobs. `finishers` take over what a finished job made, `ended` what one that came to no end leaves."""
+
+    def __init__(self, engine: Engine, hub: Hub, settings: Settings, finishers: dict[str, Finisher], ended: Finisher) -> None:
+        self.engine, self.hub, self.settings = engine, hub, settings
+        self._finishers, self._ended = finishers, ended
+
+    def recover(self) -> None:
+        """Take up what an earlier server left: its workers are ended, its jobs wait again."""
+        with writing(self.engine) as session:
+            for row in session.exec(select(Job).where(col(Job.state).in_(("running", "cancelling")))):
+                end_orphan(row.worker_pid, row.worker_started)
+                row.worker_pid = row.worker_started = row.owner_pid = None
+                if row.state == "cancelling":
+                    row.state, row.finished = "cancelled", time.time()
+                elif row.attempts >= self.settings.job_losses:
+                    row.state, row.finished = "failed", time.time()
+                    row.error = {
+                        "kind": "interrupted",
+                        "message": f"the server stopped {row.attempts} times during this job",
+                        "hint": "look at its log, then retry",
+                    }
+                else:
+                    row.state, row.message = "queued", "taken up again after the server stopped"
+                _note(session, row, "state", row.message or row.state)
+                if row.state in ("failed", "cancelled"):
+                    self._leave(session, row)
+                session.add(row)
+
+    def claim(self) -> int | None:
+        """Take the oldest waiting job; no two threads or servers get the same one."""
+        with writing(self.engine) as session:
+            found = session.execute(_CLAIM, {"pid": os.getpid(), "now": time.time()}).first()
+        return int(found[0]) if found else None
+
+    def next_waits(self, why: str) -> None:
+        """Say once why the job that is next does not start; `why` begins the same as long as the reason is the same."""
+        with writing(self.engine) as session:
+            row = session.exec(select(Job).where(Job.state == "queued").order_by(col(Job.id))).first()
+            if row is None or row.message.startswith(why[:16]):
+                return
+            row.message, number = why, row.id or 0
+            session.add(row)
+        self.tell(number)
+
+    def begin(self, job_id: int, commands: Commands) -> tuple[list[Step], Path]:
+        """Write down what the job is given; its processes, and its log. Raises NoSpace where there is no room for it."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            project = project_row(session, row.project_id)
+            files = self._files(session, row)
+            require_free(files.root, 0, self.settings.min_free_bytes)
+            write_request(session, row, project, files)
+            row.payload = {**row.payload, "inputs": inputs_key(session, project.id)}
+            session.add(row)
+            return steps_of(row, project, files, commands), files.root / "logs" / f"job-{job_id}.log"
+
+    def began_step(self, job_id: int, stage: str, log: Path, worker: Worker, progress: float, eta_s: float | None) -> None:
+        """A process of the job was started."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            row.log_path, row.worker_pid, row.worker_started = str(log), worker.pid, started_at(worker.pid)
+            _note(session, row, "stage", stage, stage=stage)
+            _set_progress(session, row, stage, 0.0, progress, eta_s)
+            if row.state == "running":
+                row.message = ""
+        self.tell(job_id)
+
+    def progressed(
+        self, job_id: int, stage: str, fraction: float, message: str | None, progress: float, eta_s: float | None
+    ) -> None:
+        """How far it is; without a message it only lives."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            if message is not None:
+                _note(session, row, "progress", message, stage=stage, fraction=fraction)
+                row.message = message if row.state == "running" else row.message
+            _set_progress(session, row, stage, fraction, progress, eta_s)
+        self.tell(job_id)
+
+    def got_further(self, job_id: int, stages: int) -> None:
+        """So many stages are finished: what was tried in vain before does not count any more."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            if stages > row.reached:
+                row.reached, row.attempts = stages, 1
+                session.add(row)
+
+    def finish(self, job_id: int) -> None:
+        """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            self._finishers[row.kind](session, row, project_row(session, row.project_id), self._files(session, row))
+            row.state, row.finished, row.progress, row.stage_fraction = "done", time.time(), 1.0, 1.0
+            row.stage, row.eta_s, row.worker_pid, row.error = STAGES[row.kind][-1], None, None, None
+            _note(session, row, "state", "done")
+            session.add(row)
+        self._tell_end(job_id)
+
+    def end(self, job_id: int, state: str, error: dict[str, Any]) -> None:
+        """It failed or was cancelled."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            row.state, row.finished, row.eta_s, row.worker_pid = state, time.time(), None, None
+            row.error = None if state == "cancelled" else told_body(error)
+            row.message = "cancelled; finished stages are kept" if state == "cancelled" else str(error["message"])
+            _note(session, row, "state" if state == "cancelled" else "error", row.message)
+            self._leave(session, row)
+            session.add(row)
+        self._tell_end(job_id)
+
+    def queue_again(self, job_id: int, why: str) -> bool:
+        """Wait for another try after its process vanished; False when that happened too often at the same place."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            if row.attempts >= self.settings.job_attempts:
+                return False
+            _set_waiting(session, row, "taken up again after its process ended early")
+            _note(session, row, "state", f"{why}; taken up again")
+        self.tell(job_id)
+        return True
+
+    def give_back(self, job_id: int) -> None:
+        """Wait for the next server: this one stops, and that is no failed try."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            row.attempts = max(row.attempts - 1, 0)
+            _set_waiting(session, row, "waits for the server")
+
+    def cancel(self, job_id: int) -> bool:
+        """Cancel it where it only waits; whether it runs and is to be stopped now."""
+        with writing(self.engine) as session:
+            row = job_row(session, job_id)
+            running = row.state == "running"
+            if row.state == "queued":
+                row.state, row.finished, row.message = "cancelled", time.time(), "cancelled before it started"
+                _note(session, row, "state", "cancelled")
+                self._leave(session, row)
+            elif running:
+                row.state, row.message = "cancelling", "stopping"
+                _note(session, row, "state", "cancelling")
+            session.add(row)
+        self.tell(job_id)
+        return running
+
+    def busy(self, project_id: str) -> bool:
+        """Whether a process works for the project."""
+        with reading(self.engine) as session:
+            query = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(("running", "cancelling")))
+            return session.exec(query).first() is not None
+
+    def tell(self, job_id: int) -> None:
+        """Show the row to every tab."""
+        with reading(self.engine) as session:
+            row = session.get(Job, job_id)
+            if row is not None:
+                self.hub.publish("job", row.project_id, job=job_shape(session, row).model_dump())
+
+    def _tell_end(self, job_id: int) -> None:
+        self.tell(job_id)
+        with reading(self.engine) as session:
+            row = session.get(Job, job_id)
+        if row is not None:
+            self.hub.publish("projects", None)
+            self.hub.publish("project", row.project_id)
+
+    def _leave(self, session: Session, row: Job) -> None:
+        self._ended(session, row, project_row(session, row.project_id), self._files(session, row))
+
+    def _files(self, session: Session, row: Job) -> ProjectFiles:
+        project = project_row(session, row.project_id)
+        return project_files(self.settings.data_dir, project.id, project.work_path)
+
+
+def _set_progress(session: Session, row: Job, stage: str, fraction: float, progress: float, eta_s: float | None) -> None:
+    row.stage, row.stage_fraction, row.heartbeat = stage, round(fraction, 4), time.time()
+    row.progress, row.eta_s = round(progress, 4), eta_s
+    session.add(row)
+
+
+def _set_waiting(session: Session, row: Job, message: str) -> None:
+    row.state, row.message = "queued", message
+    row.worker_pid, row.owner_pid, row.eta_s = None, None, None
+    session.add(row)
+
+
+def _note(session: Session, row: Job, kind: str, words: str, *, stage: str = "", fraction: float = 0.0) -> None:
+    event = JobEvent(job_id=row.id or 0, at=time.time(), kind=kind, text=words)
+    event.stage, event.fraction = stage or row.stage, round(fraction, 4)
+    session.add(event)
