@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from r2c2r_core.align.shape import hull_directions, least_volume_axes
+from r2c2r_core.align.shape import least_volume_axes
+from r2c2r_core.align.standing import hull_directions
 from r2c2r_core.generate.upload import read_upload
 from r2c2r_core.geometry.transforms import Similarity3, rotation_between
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh

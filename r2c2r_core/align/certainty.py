@@ -3,19 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.special import ndtri, stdtrit
 
 from r2c2r_core.align.judge import Judgement
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation
-from r2c2r_core.align.refine import Anchors, Rows, all_rows, finest_gate, rim_unit
-from r2c2r_core.align.shape import Shape
-from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.align.refine import rim_unit
+from r2c2r_core.align.residuals import Anchors, Rows, all_rows, finest_gate
+from r2c2r_core.align.shape import Shape, spins_alike
+from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel
 
 _SIGMAS = 2.0
+_CONFIDENCE = 0.975  # one-sided, of two standard deviations
 _LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
 
 
@@ -47,8 +49,9 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     """Covariance (7, 7) of the step in `unit`: what single readings' noise leaves, and what frames disagree by.
 
     A mask's outline and a depth frame are wrong over whole stretches, so their pixels are no independent readings. What
-    that makes of the pose is seen by leaving out one frame at a time (the jackknife, one Newton step for each). The
-    normal matrix is inverted as a whole: a turn that a shift makes up for counts as free.
+    that makes of the pose is seen by leaving out one frame at a time (the jackknife, one Newton step for each), and is
+    widened by Student's t: two frames that agree by chance say little. The normal matrix is inverted as a whole: a turn
+    that a shift makes up for counts as free.
     """
     joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
     jacobian = joined.jacobian * unit
@@ -64,21 +67,8 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)
-    return np.asarray(noise + (len(steps) - 1) / len(steps) * apart.T @ apart)
-
-
-def spins_alike(shape: Shape, axis_mesh: Vector3) -> bool:
-    """Whether any turn about the axis (of any length) leaves the shape as it is."""
-    axis_mesh = axis_mesh / np.linalg.norm(axis_mesh)
-    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
-    sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
-    radius = float(np.median(np.linalg.norm(np.cross(sample, axis_mesh), axis=1)))
-    worst = 0.0
-    for angle in (0.4, 0.9, 1.7):
-        spin: Matrix3 = Rotation.from_rotvec(angle * axis_mesh).as_matrix()
-        distance, _ = shape.tree.query(sample @ spin.T + middle)
-        worst = max(worst, float(np.quantile(distance, 0.9)))
-    return worst < 0.2 * radius  # a square's corners move by 0.3
+    widened = float(stdtrit(len(steps) - 1, _CONFIDENCE) / ndtri(_CONFIDENCE))
+    return np.asarray(noise + widened**2 * (len(steps) - 1) / len(steps) * apart.T @ apart)
 
 
 def ties(best: Judgement, rival: Judgement) -> bool:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.align.judge import face_depth
-from r2c2r_core.align.observe import Observation, View, mask_box
+from r2c2r_core.align.observe import Observation
 from r2c2r_core.align.shape import Shape
+from r2c2r_core.align.view import View, mask_box
 from r2c2r_core.arrays import Matrix3, Vector3
 from r2c2r_core.geometry.registration import umeyama_batch
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z, rotation_between

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.align.observe import View, depth_noise
+from r2c2r_core.align.observe import depth_noise
 from r2c2r_core.align.shape import Shape
+from r2c2r_core.align.view import View
 from r2c2r_core.arrays import DepthMetres, Mask, Points
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.raster import rasterize

@@ -1,44 +1,16 @@
-"""Fine registration: observed points onto the model, outlines onto masks, keypoints onto rays, uprightness (paper eq. 7, ICP).
-
-Closest points alone let a flat front slide in its plane, so mask outlines (and the measured panel's edges) hold it there.
-"""
+"""Fine registration: one robust least-squares estimate over all frames and kinds of evidence (paper eq. 7, ICP)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
-import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from r2c2r_core.align.judge import behind_face, face_depth, render_pose
 from r2c2r_core.align.lift import Lifted
-from r2c2r_core.align.observe import Observation, View
+from r2c2r_core.align.observe import Observation
+from r2c2r_core.align.residuals import Anchors, Rows, all_rows, finest_gate, pivot_of, point_rows
 from r2c2r_core.align.shape import Shape
-from r2c2r_core.arrays import Matrix3, Points, Vector3
+from r2c2r_core.arrays import Matrix3, Vector3
 from r2c2r_core.geometry.transforms import Similarity3
-from r2c2r_core.model.track import FrontPanel, MaskTrack
-
-_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Anchors:
-    """What is known besides points and masks."""
-
-    up_mesh: Vector3 | None  # should be vertical
-    up_weight: float  # 0..1
-    front: FrontPanel | None
-    support_z_m: float | None
-
-
-class Rows(NamedTuple):
-    """Linearised residuals: `jacobian` (n, 7) over turn, shift, log scale; residuals in the unit of `weight` ** -0.5."""
-
-    jacobian: np.ndarray
-    residual: np.ndarray
-    weight: np.ndarray
-    frame_index: np.ndarray  # (n,) int, of the frame it was seen in; -1 where it is of none
 
 
 def refine(
@@ -70,223 +42,6 @@ def loosest_motion(
     unit = rim_unit(observation.size_m)[:6]
     values, vectors = np.linalg.eigh(normal[:6, :6] * np.outer(unit, unit))
     return np.append(unit * vectors[:, 0], 0.0), float(1.0 / np.sqrt(max(values[0], 1e-12)))
-
-
-def finest_gate(observation: Observation) -> float:
-    """Half the distance (m) at which evidence stops counting once a pose has settled."""
-    return max(0.012 * observation.size_m, 0.006)
-
-
-def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anchors:
-    """What holds for this kind of object."""
-    box_axis = up_mesh is not None and float(np.abs(shape.frames[0].T @ up_mesh).max()) > np.cos(np.radians(3))
-    strength = 1.0 if track.kind != "thing" else 0.3
-    return Anchors(
-        up_mesh=up_mesh,
-        up_weight=strength if box_axis else 0.01,  # the mean normal of a flat side is a degree off
-        front=track.front if track.kind == "front" else None,
-        support_z_m=track.box.support_z_m if track.box is not None and track.kind == "thing" else None,
-    )
-
-
-def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot: Vector3, gate: float) -> Rows:
-    """Each observed point to the tangent plane of the nearest mesh point that faces the cameras."""
-    observed = observation.points_world
-    if not len(observed):
-        return _no_rows()
-    _, nearest = shape.tree.query(pose.inverse.apply(observed))
-    placed = pose.apply(shape.points[nearest])
-    normals = shape.normals[nearest] @ pose.rotation.T
-    residual = np.einsum("nj,nj->n", normals, placed - observed)
-    apart = np.linalg.norm(placed - observed, axis=1)
-    weight = 1.0 / (1.0 + (apart / gate) ** 2) ** 2 / observation.noise_m**2
-    if shape.oriented:
-        weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < -0.1] = 0.0
-    # Depth errors are correlated: thousands of points carry the information of some hundreds.
-    weight *= 800.0 / len(observed)
-    return Rows(_jacobian(placed - pivot, normals), residual, weight, observation.frame_index)
-
-
-def outline_rows(
-    pose: Similarity3, shape: Shape, views: tuple[View, ...], front: FrontPanel | None, pivot: Vector3, gate: float
-) -> Rows:
-    """Each silhouette pixel of the placed mesh to the mask's outline, in metres across the line of sight."""
-    vertices = pose.apply(shape.vertices)
-    behind = behind_face(pose, shape, vertices, front)
-    parts = [_outline_of_view(shape, vertices, behind, view, pivot, gate) for view in views]
-    parts = [p for p in parts if len(p.residual)]
-    if not parts:
-        return _no_rows()
-    total = sum(len(p.residual) for p in parts)
-    joined = Rows(*(np.concatenate([getattr(p, name) for p in parts]) for name in Rows._fields))
-    return joined._replace(weight=joined.weight * min(200.0 / total, 1.0))
-
-
-def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, gate: float) -> Rows:
-    """Each keypoint's spot on the mesh to the ray it was seen along: what is painted holds where shape and outline do not.
-
-    Only across the ray, where a pixel is finer than depth; the depth there is among the observed points already.
-    """
-    matched = [m for m in lifted if len(m.points_mesh)]
-    if not matched:
-        return _no_rows()
-    placed = pose.apply(np.concatenate([m.points_mesh for m in matched]))
-    rays, pixel_m = np.concatenate([m.rays for m in matched]), np.concatenate([m.pixel_m for m in matched])
-    apart = placed - np.concatenate([m.points_world for m in matched])
-    along = np.einsum("nj,nj->n", apart, rays)
-    across = np.linalg.norm(apart - along[:, None] * rays, axis=1)
-    near = np.abs(along) < 3.0 * np.concatenate([m.noise_m for m in matched]) + gate
-    weight = near / (1.0 + (across / gate) ** 2) ** 2 / (1.5 * pixel_m + 0.001) ** 2
-    weight *= min(1.0, 150.0 / max(int(np.count_nonzero(near & (across < gate))), 1))
-    helper = np.where(np.abs(rays[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    first = np.cross(rays, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    sides = (first, np.cross(rays, first))
-    return Rows(
-        np.concatenate([_jacobian(placed - pivot, side) for side in sides]),
-        np.concatenate([np.einsum("nj,nj->n", apart, side) for side in sides]),
-        np.tile(weight, 2),
-        np.tile(np.repeat([m.frame_index for m in matched], [len(m.points_mesh) for m in matched]), 2),
-    )
-
-
-def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector3) -> Rows:
-    """Uprightness, the measured panel's edges and direction, and the height of what the thing stands on."""
-    rows: list[tuple[np.ndarray, float, float]] = []
-    if anchors.up_mesh is not None:
-        up = pose.rotation @ anchors.up_mesh
-        weight = 100.0 * anchors.up_weight / np.radians(1.0) ** 2
-        rows += [(_turn_row(up, axis), float(up @ axis), weight) for axis in np.eye(3)[:2]]
-    if anchors.front is not None:
-        rows += _panel_rows(pose, shape, anchors.front, pivot)
-    if anchors.support_z_m is not None:
-        placed = pose.apply(shape.vertices)
-        lowest = placed[int(np.argmin(placed[:, 2]))]
-        gap = float(lowest[2] - anchors.support_z_m)
-        if abs(gap) < 0.03:
-            up_axis = np.array([[0.0, 0.0, 1.0]])
-            rows.append((_jacobian((lowest - pivot)[None], up_axis)[0], gap, 40.0 / 0.008**2))
-    if not rows:
-        return _no_rows()
-    jacobian, residual, weight = (np.array(column) for column in zip(*rows, strict=True))
-    return Rows(jacobian, residual, weight, np.full(len(rows), -1))
-
-
-def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
-    """Largest over smallest eigenvalue of the points' normal matrix in turn and shift: large = the surface slides."""
-    rows = point_rows(pose, shape, observation, pivot_of(pose, shape), 0.05 * observation.size_m)
-    if len(rows.residual) < 6:
-        return 1e9
-    scaled = rows.jacobian[:, :6] / np.array([0.5 * observation.size_m] * 3 + [1.0] * 3)
-    values = np.linalg.eigvalsh((scaled * rows.weight[:, None]).T @ scaled)
-    return float(min(values[-1] / max(values[0], 1e-12 * values[-1]), 1e9))
-
-
-def surface_distance(pose: Similarity3, shape: Shape, points_world: Points) -> np.ndarray:
-    """Distance of points to the placed surface, metres; the spacing of the samples it is known by is allowed for."""
-    local = pose.inverse.apply(points_world)
-    distance, nearest = shape.tree.query(local)
-    away = np.abs(np.einsum("nj,nj->n", shape.normals[nearest], local - shape.points[nearest]))
-    spacing = _spacing(shape)
-    along = np.sqrt(np.maximum(distance**2 - away**2, 0.0))
-    return np.asarray(np.hypot(away, np.maximum(along - 1.5 * spacing, 0.0)) * pose.scale)
-
-
-def _spacing(shape: Shape) -> float:
-    """Typical distance between neighbouring samples, in the mesh's unit."""
-    distance, _ = shape.tree.query(shape.points[:: max(len(shape.points) // 300, 1)], k=2)
-    return float(np.median(distance[:, 1]) * 2.0)
-
-
-def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: View, pivot: Vector3, gate: float) -> Rows:
-    """Silhouette residuals of one view."""
-    rendered = render_pose(shape, vertices, behind, view)
-    own = rendered.own.astype(np.uint8)
-    rim = rendered.own & (cv2.erode(own, _CROSS) == 0)
-    beside_hidden = cv2.dilate((rendered.hidden | _nearer(view, rendered.depth_m)).astype(np.uint8), _CROSS, iterations=2) > 0
-    rows, columns = np.nonzero(rim & view.trusted & view.inside & ~beside_hidden)
-    if len(rows) < 4:
-        return _no_rows()
-    depth = rendered.depth_m[rows, columns].astype(np.float64)
-    metres_per_px = depth / view.camera.fx
-    residual = (view.signed_px[rows, columns] + 0.5) * metres_per_px
-    g = view.outwards[rows, columns].astype(np.float64)
-    usable = g.any(axis=1)
-    x = (columns + 0.5 - view.camera.cx) / view.camera.fx
-    y = (rows + 0.5 - view.camera.cy) / view.camera.fy
-    points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
-    direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
-    weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
-    jacobian = _jacobian(points - pivot, view.world_from_camera.turn(direction))
-    return Rows(jacobian, residual, weight, np.full(len(residual), view.frame_index))
-
-
-def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
-    """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
-    grown = cv2.dilate(rendered_depth, np.ones((5, 5), np.uint8))
-    return np.asarray(
-        (rendered_depth == 0) & (grown > 0) & ~view.mask & (view.depth_m > 0) & (view.depth_m < grown - 0.04 - 0.02 * grown)
-    )
-
-
-def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vector3) -> list[tuple[np.ndarray, float, float]]:
-    """The mesh's front face to the measured rectangle: four edges, and the facing direction."""
-    to_front = front.world_from_front.inverse
-    axes = front.world_from_front.rotation
-    local = to_front.apply(pose.apply(shape.points))
-    depth = face_depth(pose, shape, front)
-    facing = to_front.turn(shape.normals @ pose.rotation.T)[:, 1] < -0.85
-    face = local[facing & (np.abs(local[:, 1] - depth) < 0.012)]
-    if len(face) < 50:
-        return []
-    trust = 60.0 * max(front.confidence, 0.1)
-    rows = []
-    for axis, size in ((0, front.width_m), (2, front.height_m)):
-        inner_low, inner_high = np.quantile(face[:, axis], [0.01, 0.99])
-        overhang = 0.01 / 0.98 * (inner_high - inner_low)  # what the quantiles cut from an evenly sampled face
-        for edge, wanted in ((inner_low - overhang, -size / 2), (inner_high + overhang, size / 2)):
-            middle = np.median(face, axis=0)
-            middle[axis] = edge
-            point = front.world_from_front.apply(middle[None])[0]
-            rows.append((_jacobian((point - pivot)[None], axes[:, axis][None])[0], float(edge - wanted), trust / 0.005**2))
-    outward = pose.rotation @ _nearest_axis(shape, pose.rotation.T @ -axes[:, 1])
-    if outward @ -axes[:, 1] > np.cos(np.radians(8)):
-        rows += [(_turn_row(outward, axes[:, k]), float(outward @ axes[:, k]), trust / np.radians(1.0) ** 2) for k in (0, 2)]
-    return rows
-
-
-def _nearest_axis(shape: Shape, direction: Vector3) -> Vector3:
-    """The box axis of the mesh nearest to a direction, signed along it."""
-    along = shape.frames[0].T @ direction
-    k = int(np.argmax(np.abs(along)))
-    return np.asarray(shape.frames[0][:, k] * np.sign(along[k]))
-
-
-def _turn_row(direction: Vector3, axis: Vector3) -> np.ndarray:
-    """How `direction @ axis` changes with a turn of `direction`."""
-    return np.concatenate([np.cross(direction, axis), np.zeros(4)])
-
-
-def _jacobian(arms: Points, directions: Points) -> np.ndarray:
-    """How points at `arms` from the pivot move along `directions`, by turn (rad), shift (m) and log scale."""
-    return np.column_stack([np.cross(arms, directions), directions, np.einsum("nj,nj->n", arms, directions)])
-
-
-def _no_rows() -> Rows:
-    return Rows(np.zeros((0, 7)), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
-
-
-def all_rows(
-    pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted], gate: float
-) -> list[Rows]:
-    """Every kind of evidence at a pose."""
-    pivot = pivot_of(pose, shape)
-    return [
-        point_rows(pose, shape, observation, pivot, gate),
-        outline_rows(pose, shape, observation.views, anchors.front, pivot, gate),
-        keypoint_rows(pose, lifted, pivot, gate),
-        anchor_rows(pose, shape, anchors, pivot),
-    ]
 
 
 def normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
@@ -329,6 +84,16 @@ def moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
     return Similarity3(pose.scale * grow, turn @ pose.rotation, translation)
 
 
-def pivot_of(pose: Similarity3, shape: Shape) -> Vector3:
-    """The middle of the placed mesh."""
-    return np.asarray(pose.apply(((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2)[None])[0])
+def turned_about_middle(pose: Similarity3, turn: Matrix3, shape: Shape) -> Similarity3:
+    """The pose after a turn in the world that leaves the middle of the placed mesh where it is."""
+    return moved(pose, np.append(Rotation.from_matrix(turn).as_rotvec(), np.zeros(4)), pivot_of(pose, shape))
+
+
+def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
+    """Largest over smallest eigenvalue of the points' normal matrix in turn and shift: large = the surface slides."""
+    rows = point_rows(pose, shape, observation, pivot_of(pose, shape), 0.05 * observation.size_m)
+    if len(rows.residual) < 6:
+        return 1e9
+    scaled = rows.jacobian[:, :6] / np.array([0.5 * observation.size_m] * 3 + [1.0] * 3)
+    values = np.linalg.eigvalsh((scaled * rows.weight[:, None]).T @ scaled)
+    return float(min(values[-1] / max(values[0], 1e-12 * values[-1]), 1e9))

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial.transform import Rotation
 
-from r2c2r_core.arrays import Faces, Matrix3, Points
+from r2c2r_core.align.standing import hull_directions, standing_directions
+from r2c2r_core.arrays import Faces, Matrix3, Points, Vector3
 from r2c2r_core.errors import PlacementFailed
-from r2c2r_core.geometry.transforms import nearest_rotation, rotation_between
+from r2c2r_core.geometry.transforms import Similarity3, nearest_rotation, rotation_between
 from r2c2r_core.model.mesh import TexturedMesh
 
 
@@ -23,8 +25,9 @@ class Shape:
     faces: Faces
     diameter: float
     frames: tuple[Matrix3, ...]  # columns: candidate box axes of the mesh, right-handed, best first
-    ups: tuple[np.ndarray, ...]  # directions the thing may stand along: box axes and flat sides of its hull
     boxiness: float  # 0..1: share of the surface facing along the first frame's axes
+    ups: tuple[Vector3, ...]  # directions that may point up (standing.py)
+    bases: tuple[Vector3, ...]  # those of them along which the thing stands without toppling
     oriented: bool  # faces wind outwards
 
 
@@ -44,6 +47,7 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
     frames = _distinct_frames(boxes)
     volume = float((triangles[:, 0] * np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6)
     diameter = float(np.linalg.norm(np.ptp(points @ frames[0], axis=0)))  # of its own box: the frame's is arbitrary
+    ups, bases = standing_directions(points, frames, boxiness)
     return Shape(
         points=points,
         normals=normals,
@@ -53,10 +57,35 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
         faces=faces,
         diameter=diameter,
         frames=frames,
-        ups=_standing_directions(points, frames),
         boxiness=boxiness,
+        ups=ups,
+        bases=bases,
         oriented=volume > 0.02 * float(np.prod(np.ptp(points @ frames[0], axis=0))),
     )
+
+
+def surface_distance(pose: Similarity3, shape: Shape, points_world: Points) -> np.ndarray:
+    """Distance of points to the placed surface, metres; the spacing of the samples it is known by is allowed for."""
+    local = pose.inverse.apply(points_world)
+    distance, nearest = shape.tree.query(local)
+    away = np.abs(np.einsum("nj,nj->n", shape.normals[nearest], local - shape.points[nearest]))
+    spacing = _spacing(shape)
+    along = np.sqrt(np.maximum(distance**2 - away**2, 0.0))
+    return np.asarray(np.hypot(away, np.maximum(along - 1.5 * spacing, 0.0)) * pose.scale)
+
+
+def spins_alike(shape: Shape, axis_mesh: Vector3) -> bool:
+    """Whether any turn about the axis (of any length) leaves the shape as it is."""
+    axis_mesh = axis_mesh / np.linalg.norm(axis_mesh)
+    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
+    sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
+    radius = float(np.median(np.linalg.norm(np.cross(sample, axis_mesh), axis=1)))
+    worst = 0.0
+    for angle in (0.4, 0.9, 1.7):
+        spin: Matrix3 = Rotation.from_rotvec(angle * axis_mesh).as_matrix()
+        distance, _ = shape.tree.query(sample @ spin.T + middle)
+        worst = max(worst, float(np.quantile(distance, 0.9)))
+    return worst < 0.2 * radius  # a square's corners move by 0.3
 
 
 def manhattan_axes(normals: Points, rng: np.random.Generator) -> tuple[Matrix3, float]:
@@ -102,41 +131,6 @@ def least_volume_axes(points: Points) -> list[Matrix3]:
             turn = np.array([[c[k], s[k], 0.0], [-s[k], c[k], 0.0], [0.0, 0.0, 1.0]])
             best_volume, best = volume, (turn @ to_plan).T
     return [] if best is None else [best]
-
-
-def hull_directions(points: Points, count: int) -> list[np.ndarray]:
-    """Outward normals of the largest flat sides of the convex hull, largest first, at least 5 degrees apart."""
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return []
-    corners = points[hull.simplices]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    normals = hull.equations[:, :3]
-    left = area.copy()
-    found: list[np.ndarray] = []
-    together = normals @ normals.T > np.cos(np.radians(5))
-    while len(found) < count:
-        gathered = together @ left
-        k = int(np.argmax(gathered))
-        if gathered[k] < 0.01 * area.sum():
-            break
-        direction = (normals * (left * together[k])[:, None]).sum(axis=0)
-        found.append(direction / np.linalg.norm(direction))
-        left = np.where(together[k], 0.0, left)
-    return found
-
-
-def _standing_directions(points: Points, frames: tuple[Matrix3, ...]) -> tuple[np.ndarray, ...]:
-    """Directions that may point up: along the first box's axes, away from flat sides of the hull, along other boxes' axes."""
-    ups: list[np.ndarray] = []
-    candidates = [sign * frames[0][:, k] for k in range(3) for sign in (1.0, -1.0)]
-    candidates += [-n for n in hull_directions(points, 8)]  # a mug's base is among its smaller sides
-    candidates += [sign * f[:, k] for f in frames[1:] for k in range(3) for sign in (1.0, -1.0)]
-    for direction in candidates:
-        if all(direction @ u < np.cos(np.radians(10)) for u in ups):
-            ups.append(direction)
-    return tuple(ups[:14])
 
 
 def _polish_axes(normals: Points, axes: Matrix3) -> Matrix3:
@@ -203,3 +197,9 @@ def _lighten(mesh: TexturedMesh, face_limit: int) -> tuple[Points, Faces]:
     if not len(light_faces):
         return merged, faces
     return np.asarray(light, dtype=np.float64), np.asarray(light_faces, dtype=np.int64)
+
+
+def _spacing(shape: Shape) -> float:
+    """Typical distance between neighbouring samples, in the mesh's unit."""
+    distance, _ = shape.tree.query(shape.points[:: max(len(shape.points) // 300, 1)], k=2)
+    return float(np.median(distance[:, 1]) * 2.0)

@@ -9,7 +9,7 @@ from r2c2r_core.align.protocol import Features, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.geometry.descriptors import mutual_pairs
 
-_MARGIN_PX = 12  # kept around the mask: of a small keypoint at its rim, most of what its descriptor looks at
+_MARGIN_PX = 12  # kept around the mask: beyond it is background, of which the renders have none
 
 
 class SiftMatcher:
@@ -17,10 +17,11 @@ class SiftMatcher:
 
     def __init__(self, *, keypoints: int = 250, ratio: float = 0.85, contrast: float = 0.02) -> None:
         self._ratio = ratio
-        self._sift = cv2.SIFT_create(nfeatures=keypoints, contrastThreshold=contrast)  # type: ignore[attr-defined]
+        self._keypoints = keypoints
+        self._sift = cv2.SIFT_create(contrastThreshold=contrast)  # type: ignore[attr-defined]
 
     def describe(self, image: Image, mask: Mask) -> Features:
-        """Keypoints of `image` inside `mask`."""
+        """The strongest keypoints of `image` inside `mask`."""
         left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
         low, high = np.maximum([left - _MARGIN_PX, top - _MARGIN_PX], 0), [left + width + _MARGIN_PX, top + height + _MARGIN_PX]
         part = slice(low[1], high[1]), slice(low[0], high[0])
@@ -28,8 +29,11 @@ class SiftMatcher:
         found, descriptors = self._sift.detectAndCompute(grey, mask[part].astype(np.uint8) * 255)
         if descriptors is None or not len(found):
             return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
-        root = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-6))
-        return Features(np.array([k.pt for k in found], dtype=np.float64) + low + 0.5, root.astype(np.float32))
+        # OpenCV's own limit counts keypoints beside the mask.
+        strongest = np.argsort([-k.response for k in found], kind="stable")[: self._keypoints]
+        uv = np.array([found[k].pt for k in strongest], dtype=np.float64) + low + 0.5
+        chosen = descriptors[strongest]
+        return Features(uv, np.sqrt(chosen / np.maximum(chosen.sum(axis=1, keepdims=True), 1e-6)).astype(np.float32))
 
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that are each other's best and clearly better than the second best."""

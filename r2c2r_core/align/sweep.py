@@ -7,7 +7,8 @@ import numpy as np
 from r2c2r_core.align.judge import judge
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation
-from r2c2r_core.align.refine import Anchors, loosest_motion, moved, pivot_of
+from r2c2r_core.align.refine import loosest_motion, moved
+from r2c2r_core.align.residuals import Anchors, pivot_of
 from r2c2r_core.align.shape import Shape
 from r2c2r_core.geometry.transforms import Similarity3
 

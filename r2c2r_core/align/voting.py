@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.align.lift import Lifted, depth_at, lift_render
-from r2c2r_core.align.observe import View, depth_noise
+from r2c2r_core.align.observe import depth_noise
 from r2c2r_core.align.protocol import Features, Matcher
 from r2c2r_core.align.render import MeshView
+from r2c2r_core.align.view import View
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.geometry.consensus import similarity_consensus

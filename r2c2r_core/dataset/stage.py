@@ -7,7 +7,7 @@ DIR/
 ├── images/<frame:06d>.jpg           colour, byte for byte as recorded
 ├── depth/<frame:06d>.png            16 bit, steps of 0.25 mm, 0 unknown, at the sensor's resolution, never filled
 └── objects/<name>/
-    ├── object.json                  category, candidates, the chosen one, its pose and the evidence for it
+    ├── object.json                  category, candidates, the chosen one, its pose, how firmly it is held and by what
     ├── masks/<frame:06d>.png        0 or 255, at colour resolution
     ├── candidates/<id>.glb          closed textured meshes, each in an arbitrary frame and unit of its own (`mesh`)
     ├── matches.npz                  n keypoint matches of photos with renders of the chosen candidate: frame_index (n,),
@@ -39,7 +39,7 @@ from r2c2r_core.geometry.glb import glb_bytes
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset
-from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.placement import Placement, Spread
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 
@@ -182,6 +182,7 @@ def _placement_entry(placement: Placement) -> dict[str, Any]:
         "condition",
         "unsure",
         "runner_up",
+        "runner_up_turn_deg",
         "method",
         "warnings",
     )
@@ -189,7 +190,13 @@ def _placement_entry(placement: Placement) -> dict[str, Any]:
         "world_from_mesh": placement.world_from_mesh.matrix.tolist(),
         "scale": placement.world_from_mesh.scale,
         **{name: getattr(placement, name) for name in names},
+        "spread": _spread_entry(placement.spread) if placement.spread is not None else None,
     }
+
+
+def _spread_entry(spread: Spread) -> dict[str, Any]:
+    """One standard deviation of turn (degrees), shift (metres) and scale (share), and the axes they are largest along."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(spread).items()}
 
 
 def _manifest(capture: Capture, objects: Sequence[LabelledObject], folder: Path) -> dict[str, Any]:

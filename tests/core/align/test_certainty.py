@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from r2c2r_core.align.certainty import loose_ends, spins_alike, spread_of
+from r2c2r_core.align.certainty import loose_ends, spread_of
 from r2c2r_core.align.observe import Observation, observe
-from r2c2r_core.align.refine import Anchors
-from r2c2r_core.align.shape import Shape, prepare_shape
+from r2c2r_core.align.residuals import Anchors
+from r2c2r_core.align.shape import Shape, prepare_shape, spins_alike
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel

@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import observe
-from r2c2r_core.align.refine import Anchors, loosest_motion, refine
+from r2c2r_core.align.refine import loosest_motion, refine
+from r2c2r_core.align.residuals import Anchors
 from r2c2r_core.align.shape import prepare_shape
 from r2c2r_core.align.sweep import sweep_loosest
 from r2c2r_core.geometry.transforms import Similarity3

@@ -18,7 +18,7 @@ from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z
 from r2c2r_core.ingest.store import write_depth, write_rgb
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
-from r2c2r_core.model.placement import MatchedPoints, Placement
+from r2c2r_core.model.placement import MatchedPoints, Placement, Spread
 from r2c2r_core.workspace import Workspace
 from tests.core.generate import scenes
 
@@ -57,9 +57,17 @@ def placement(pose=POSE, candidate_id="c0"):
         mask_iou=0.95,
         condition=100.0,
         unsure=False,
-        runner_up=None,
+        runner_up=0.9,
+        runner_up_turn_deg=180.0,
         method="test",
         warnings=(),
+        spread=Spread(
+            turn_deg=0.4,
+            turn_axis_world=np.array([0.0, 0.0, 1.0]),
+            shift_m=0.003,
+            shift_axis_world=np.array([1.0, 0.0, 0.0]),
+            scale=0.006,
+        ),
         matched=MatchedPoints(
             frame_index=np.array([0, 0, 3, 3]),
             points_mesh=pairs,
@@ -151,6 +159,10 @@ def test_the_folder_holds_what_its_page_says(scene, stored, tmp_path):
     assert [c["candidate_id"] for c in entry["candidates"]] == ["c0", "c1"]
     assert entry["candidates"][0]["metrics"] == {"mask_iou": 0.9, "odd": None}  # JSON has no NaN
     assert np.allclose(entry["placement"]["world_from_mesh"], POSE.matrix)
+    assert entry["placement"]["runner_up_turn_deg"] == 180.0
+    spread = entry["placement"]["spread"]
+    assert (spread["turn_deg"], spread["shift_m"], spread["scale"]) == (0.4, 0.003, 0.006)
+    assert (spread["turn_axis_world"], spread["shift_axis_world"]) == ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
     assert json.loads((folder / "objects/lost_1/object.json").read_text())["placement"] is None
     assert not (folder / "objects/lost_1/aligned.glb").exists()
     with np.load(folder / "objects/microwave_1/matches.npz", allow_pickle=False) as pairs:

@@ -1,0 +1,58 @@
+"""Which of the points inside the masks are the object's, and fewer of them."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from r2c2r_core.arrays import Points
+
+_CROWD = 40  # points looked at for each that is kept: a long recording has a million
+
+
+def main_body(points: Points) -> np.ndarray:
+    """Which points belong to the object's connected body, rather than to what shows through slats or behind edges."""
+    if len(points) < 30:
+        return np.ones(len(points), dtype=bool)
+    spread = np.quantile(points, 0.95, axis=0) - np.quantile(points, 0.05, axis=0)
+    voxel = float(np.clip(np.linalg.norm(spread) / 20, 0.01, 0.04))
+    _, first, member, filled = np.unique(_cell_keys(points, voxel), return_index=True, return_inverse=True, return_counts=True)
+    cells = np.floor(points[first] / voxel).astype(np.int64)
+    dense = filled >= 2
+    label = np.full(len(cells), -1)
+    label[dense], sizes = _components(cells[dense], filled[dense])
+    big = np.flatnonzero(sizes >= 0.25 * sizes.max(initial=0))
+    keep = np.isin(label, big)[member.ravel()]
+    return keep if keep.sum() >= 0.4 * len(points) else np.ones(len(points), dtype=bool)
+
+
+def thin_out(points: Points, count: int) -> np.ndarray:
+    """Indices of about `count` points spread evenly: one in each cell of a grid, of no frame in particular."""
+    if len(points) <= count:
+        return np.arange(len(points))
+    shuffled = np.random.default_rng(0).permutation(len(points))  # frames disagree by a centimetre: none may be first
+    shuffled = shuffled[: _CROWD * count]
+    voxel = 0.002
+    while True:
+        _, first = np.unique(_cell_keys(points[shuffled], voxel), return_index=True)
+        if len(first) <= count:
+            return np.sort(shuffled[first])
+        voxel *= 1.25
+
+
+def _cell_keys(points: Points, voxel: float) -> np.ndarray:
+    """One number for the cell of a grid that a point lies in: far quicker to compare than its three."""
+    cells = np.floor(points / voxel).astype(np.int64)
+    cells -= cells.min(axis=0)
+    shape = cells.max(axis=0) + 1
+    return np.asarray((cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2])
+
+
+def _components(cells: np.ndarray, filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Label of each cell and the points in each label, cells touching by a corner being one body."""
+    if not len(cells):
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
+    pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
+    count, label = connected_components(graph, directed=False)
+    return label, np.bincount(label, filled, minlength=count)

@@ -1,0 +1,100 @@
+"""The record of a chosen pose: the evidence for it, and the doubts about it in words."""
+
+import numpy as np
+
+from r2c2r_core.align.certainty import loose_ends, spread_of, ties
+from r2c2r_core.align.refine import point_condition
+from r2c2r_core.align.residuals import anchors_for
+from r2c2r_core.align.search import Case, Trial, angle_deg, lean_deg, resized, turned_otherwise
+from r2c2r_core.align.shape import surface_distance
+from r2c2r_core.align.voting import Votes, inliers_of
+from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement, Spread
+
+_TRUSTED_IOU = 0.6
+
+
+def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes, asset: MeshAsset, matcher: str) -> Placement:
+    """The placement of `asset` in the best pose; `others` were finished like it and lost, ordered by score."""
+    rival = next((t for t in others if turned_otherwise(t, best, case.shape)), None)
+    other_size = next((t for t in others if resized(t, best)), None)
+    matched = _matched(case, best.pose)
+    anchors = anchors_for(case.track, case.shape, best.hypothesis.up_mesh)
+    spread = spread_of(best.pose, case.shape, case.observation, anchors, case.lifted)
+    rms_m, condition = _rms(best.pose, case), point_condition(best.pose, case.shape, case.observation)
+    doubts = _doubts(best, rival, other_size, spread, case)
+    return Placement(
+        object_name=asset.object_name,
+        candidate_id=asset.candidate_id,
+        world_from_mesh=best.pose,
+        matches=len(matched.inlier),
+        inliers=int(np.count_nonzero(matched.inlier)),
+        votes=votes.by_frame,
+        rms_m=rms_m,
+        mask_iou=best.judgement.iou,
+        condition=condition,
+        unsure=bool(doubts),
+        runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
+        method=f"{best.hypothesis.source} + {matcher}",
+        warnings=(*doubts, *_warnings(best.pose, rms_m, condition, case)),
+        spread=spread,
+        runner_up_turn_deg=None if rival is None else angle_deg(best.pose, rival.pose),
+        matched=matched,
+    )
+
+
+def _matched(case: Case, pose: Similarity3) -> MatchedPoints:
+    """All matches as one list of pairs, and which of them the pose explains."""
+    lifted = case.lifted
+    if not lifted:
+        return NO_MATCHES
+    mesh, world = np.concatenate([m.points_mesh for m in lifted]), np.concatenate([m.points_world for m in lifted])
+    noise_m = np.concatenate([m.noise_m for m in lifted])
+    return MatchedPoints(
+        frame_index=np.repeat([m.frame_index for m in lifted], [len(m.points_mesh) for m in lifted]).astype(np.int64),
+        points_mesh=mesh,
+        points_world=world,
+        noise_m=noise_m,
+        inlier=inliers_of(pose, mesh, world, 3.0 * noise_m, case.shape.diameter),
+    )
+
+
+def _rms(pose: Similarity3, case: Case) -> float:
+    """Root mean square distance of the observed points to the placed mesh, without the farthest tenth (mask leaks)."""
+    if not len(case.observation.points_world):
+        return float("nan")
+    distance = np.sort(surface_distance(pose, case.shape, case.observation.points_world))
+    return float(np.sqrt((distance[: max(int(0.9 * len(distance)), 1)] ** 2).mean()))
+
+
+def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: Spread, case: Case) -> tuple[str, ...]:
+    """Why the pose may be wrong, a line each; none where it can be trusted."""
+    lines = []
+    if rival is not None and ties(best.judgement, rival.judgement):
+        turn = angle_deg(best.pose, rival.pose)
+        lines.append(f"another orientation ({turn:.0f} degrees) fits about as well: check which side is the front")
+    if other_size is not None and ties(best.judgement, other_size.judgement):
+        share = other_size.pose.scale / best.pose.scale - 1.0
+        lines.append(f"{abs(share):.0%} {'larger' if share > 0 else 'smaller'} it fits about as well: check its size")
+    if best.judgement.iou < _TRUSTED_IOU:
+        lines.append(f"the placed mesh covers the masks poorly (IoU {best.judgement.iou:.2f})")
+    if len(case.observation.views) < 2:
+        lines.append("one frame alone shows the object: nothing confirms its place and size")
+    return (*lines, *loose_ends(spread, case.track.front))
+
+
+def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> tuple[str, ...]:
+    """What else a person should know, a line each."""
+    lines = []
+    allowed = max(0.015, 0.03 * case.observation.size_m)
+    if not rms_m <= allowed:
+        lines.append(f"scan and mesh are {rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
+    if condition > 30000:
+        lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")
+    if len(case.observation.views) == 2:
+        lines.append("only 2 frames show the object")
+    lean = lean_deg(pose, case)
+    if lean > 0:
+        lines.append(f"it leans by {lean:.0f} degrees from any way it could stand")
+    return tuple(lines)

@@ -1,0 +1,174 @@
+"""The contest of poses: all are compared roughly, the best refined, and those that could win finished alike and compared."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.align.hypotheses import Hypothesis
+from r2c2r_core.align.judge import Judgement, judge
+from r2c2r_core.align.lift import Lifted
+from r2c2r_core.align.observe import Observation
+from r2c2r_core.align.refine import refine, turned_about_middle
+from r2c2r_core.align.residuals import anchors_for
+from r2c2r_core.align.shape import Shape, spins_alike
+from r2c2r_core.align.sweep import sweep_loosest
+from r2c2r_core.align.view import View
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Similarity3, rotation_between
+from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.progress import Progress
+
+_UP = np.array([0.0, 0.0, 1.0])
+_TURNED_DEG = 20.0  # from here on two poses are told apart by their turn
+_RESIZED = 0.04  # and from this share on by their size: twice what a placement may be off
+_UPRIGHT_DEG = 3.0  # what leans less is upright: bases of generated meshes are bumpy
+_SCATTER = 0.01  # by which scores of one pose, a pixel this way or that, differ
+_TOPPLED_DEG = 30.0  # what leans more does not stand there by mistake
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """What a pose has to explain."""
+
+    shape: Shape
+    observation: Observation
+    track: MaskTrack
+    lifted: list[Lifted]
+
+    @property
+    def front(self) -> FrontPanel | None:
+        """The measured panel of what is a front."""
+        return self.track.front if self.track.kind == "front" else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trial:
+    """A hypothesis with its score."""
+
+    hypothesis: Hypothesis
+    judgement: Judgement
+
+    @property
+    def pose(self) -> Similarity3:
+        """world_from_mesh."""
+        return self.hypothesis.pose
+
+
+def try_poses(
+    proposals: list[Hypothesis], case: Case, scale_range: tuple[float, float], refined: int, progress: Progress
+) -> list[Trial]:
+    """Render and compare all proposals in some views, refine the best different ones, and order them by score."""
+    views = case.observation.views
+    few = views[::2] if len(views) > 5 else views
+    rough = []
+    for k, proposal in enumerate(proposals):
+        progress.at(0.5 * k / max(len(proposals), 1), f"{case.track.name}: pose {k + 1}/{len(proposals)}")
+        if scale_range[0] <= proposal.pose.scale <= scale_range[1]:
+            rough.append(_judged(proposal, case, few))
+    rough.sort(key=lambda t: -t.judgement.score)
+    trials = []
+    for k, trial in enumerate(_different(rough)[:refined]):
+        progress.at(0.5 + 0.5 * k / refined, f"{case.track.name}: refining pose {k + 1}")
+        hypothesis = _refined(trial.hypothesis, case)
+        if scale_range[0] <= hypothesis.pose.scale <= scale_range[1]:
+            trials.append(_judged(hypothesis, case, views))
+    return sorted(trials, key=lambda t: -t.judgement.score)
+
+
+def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
+    """The best trial and those that could rival it (`trials` are ordered by score), all finished alike; the winner first.
+
+    A thing that would topple as it is placed wins only where it fits better than one that stands.
+    """
+    finished = [_finish(t, case) for t in _contenders(trials, case)]
+    return sorted(finished, key=lambda t: (lean_deg(t.pose, case) > 0) * _SCATTER - t.judgement.score)
+
+
+def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
+    """Whether it is turned differently; a turn about the axis of a round thing is no difference."""
+    if angle_deg(best.pose, trial.pose) < _TURNED_DEG:
+        return False
+    turn = trial.pose.rotation.T @ best.pose.rotation
+    return not spins_alike(shape, Rotation.from_matrix(turn).as_rotvec())
+
+
+def resized(trial: Trial, best: Trial) -> bool:
+    """Whether it is turned alike, but of another size."""
+    alike = angle_deg(best.pose, trial.pose) < _TURNED_DEG
+    return alike and abs(float(np.log(trial.pose.scale / best.pose.scale))) > _RESIZED
+
+
+def lean_deg(pose: Similarity3, case: Case) -> float:
+    """How far a thing is from the nearest way it could stand; 0 where it stands, and where no such way is known."""
+    if case.track.kind != "thing" or not case.shape.bases:
+        return 0.0
+    lean = _angle_to_base(pose, _nearest_base(pose, case.shape))
+    return lean if lean > _UPRIGHT_DEG else 0.0
+
+
+def angle_deg(a: Similarity3, b: Similarity3) -> float:
+    """Angle between the rotations of two poses."""
+    cosine = (np.trace(a.rotation.T @ b.rotation) - 1) / 2
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _contenders(trials: list[Trial], case: Case) -> list[Trial]:
+    """The best, the best turned otherwise, the best of another size; and of those that lean a little, them stood upright."""
+    best = trials[0]
+    different: tuple[Callable[[Trial], bool], ...] = (
+        lambda t: turned_otherwise(t, best, case.shape),
+        lambda t: resized(t, best),
+    )
+    rivals = [next(filter(differs, trials[1:]), None) for differs in different]
+    found = [best, *(t for t in rivals if t is not None)]
+    return found + [_stood_upright(t, case) for t in found if 0 < lean_deg(t.pose, case) < _TOPPLED_DEG]
+
+
+def _stood_upright(trial: Trial, case: Case) -> Trial:
+    """The trial turned the short way onto the nearest side it can stand on."""
+    base = _nearest_base(trial.pose, case.shape)
+    turn = rotation_between(trial.pose.rotation @ base, _UP)
+    upright = Hypothesis(turned_about_middle(trial.pose, turn, case.shape), base, trial.hypothesis.source)
+    return _judged(_refined(upright, case), case, case.observation.views)
+
+
+def _finish(trial: Trial, case: Case) -> Trial:
+    """Joint refit with scale free, closest points with scale frozen, and colours for what is still loose."""
+    evidence = (case.shape, case.observation, anchors_for(case.track, case.shape, trial.hypothesis.up_mesh), case.lifted)
+    pose = refine(trial.pose, *evidence, free_scale=True, iterations=10, loose=0.02)
+    pose = refine(pose, *evidence, free_scale=False, iterations=4, loose=0.012)
+    pose = sweep_loosest(pose, *evidence)
+    finished = _judged(trial.hypothesis._replace(pose=pose), case, case.observation.views)
+    return trial if finished.judgement.score < trial.judgement.score - _SCATTER else finished
+
+
+def _refined(hypothesis: Hypothesis, case: Case) -> Hypothesis:
+    anchors = anchors_for(case.track, case.shape, hypothesis.up_mesh)
+    pose = refine(
+        hypothesis.pose, case.shape, case.observation, anchors, case.lifted, free_scale=True, iterations=8, loose=0.06
+    )
+    return hypothesis._replace(pose=pose)
+
+
+def _judged(hypothesis: Hypothesis, case: Case, views: tuple[View, ...]) -> Trial:
+    return Trial(hypothesis=hypothesis, judgement=judge(hypothesis.pose, case.shape, views, case.front))
+
+
+def _different(trials: list[Trial]) -> list[Trial]:
+    """The best of each group of poses that agree in rotation and scale."""
+    kept: list[Trial] = []
+    for trial in trials:
+        if all(angle_deg(trial.pose, k.pose) > 10.0 or abs(np.log(trial.pose.scale / k.pose.scale)) > 0.1 for k in kept):
+            kept.append(trial)
+    return kept
+
+
+def _nearest_base(pose: Similarity3, shape: Shape) -> Vector3:
+    return min(shape.bases, key=lambda base: _angle_to_base(pose, base))
+
+
+def _angle_to_base(pose: Similarity3, base: Vector3) -> float:
+    """Degrees between a base's up and the vertical."""
+    return float(np.degrees(np.arccos(np.clip((pose.rotation @ base)[2], -1.0, 1.0))))
