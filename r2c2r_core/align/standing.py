@@ -6,6 +6,7 @@ from scipy.spatial import ConvexHull, QhullError
 from r2c2r_core.arrays import Matrix3, Points, Vector3
 
 _TOUCHING = (0.03, 0.02, 0.02)  # of the diameter counts as touching the support, pass by pass: generated bases are bumpy
+_FLAT = 1 / 9  # of a foot's width is the most that it is thick: on a round side a thing rocks
 _SETTLED_DEG = 12.0  # a direction farther from square to its base belongs to another base
 _MOST = 14  # directions tried
 
@@ -20,12 +21,14 @@ def standing_directions(
     """
     axes = [sign * frame[:, k] for frame in frames for k in range(3) for sign in (1.0, -1.0)]
     sides = [-n for n in hull_directions(points, 8)]  # a mug's base is among its smaller sides
+    own, others = (axes[:6], [*sides, *axes[6:]]) if boxiness > 0.5 else ([], [*sides, *axes])
     stable: list[Vector3] = []
     rest: list[Vector3] = []
-    for n, direction in enumerate([*axes[:6], *sides, *axes[6:]]):
+    for direction in own:
+        _add(stable if _carries(_foot(points, direction, _TOUCHING[-1]), points, direction) else rest, direction)
+    for direction in others:
         settled = settled_on_base(points, direction)
-        boxy = n < 6 and boxiness > 0.5
-        _add(rest if settled is None else stable, direction if settled is None or boxy else settled)
+        _add(rest if settled is None else stable, direction if settled is None else settled)
     ups = list(stable)
     for direction in rest:
         _add(ups, direction)
@@ -33,18 +36,17 @@ def standing_directions(
 
 
 def settled_on_base(points: Points, up: Vector3) -> Vector3 | None:
-    """`up` turned square to the side that `points` (an even sample) would rest on; None where they would topple."""
-    start, diameter = up, float(np.linalg.norm(np.ptp(points, axis=0)))
+    """`up` turned square to the side that `points` (an even sample) would rest on; None where they would topple or rock."""
+    start = up
     for touching in _TOUCHING:
-        height = points @ up
-        foot = points[height < np.quantile(height, 0.005) + touching * diameter]  # not of one spike: the lowest half percent
+        foot = _foot(points, up, touching)
         if len(foot) < 12:
             return None
-        normal = np.linalg.svd(foot - foot.mean(axis=0), full_matrices=False)[2][2]
-        up = normal * np.sign(normal @ up)
+        _, (_, width, thickness), axes = np.linalg.svd(foot - foot.mean(axis=0), full_matrices=False)
+        up = axes[2] * np.sign(axes[2] @ up)
         if up @ start < np.cos(np.radians(_SETTLED_DEG)):
             return None
-    return up if _carries(foot, points.mean(axis=0), up) else None
+    return up if thickness < _FLAT * width and _carries(foot, points, up) else None
 
 
 def hull_directions(points: Points, count: int) -> list[Vector3]:
@@ -70,14 +72,20 @@ def hull_directions(points: Points, count: int) -> list[Vector3]:
     return found
 
 
-def _carries(foot: Points, middle: Vector3, up: Vector3) -> bool:
-    """Whether the middle lies above the foot's outline."""
+def _foot(points: Points, up: Vector3, touching: float) -> Points:
+    """The lowest points, up to that share of the size above the lowest half percent (one spike is no foot)."""
+    height = points @ up
+    return points[height < np.quantile(height, 0.005) + touching * float(np.linalg.norm(np.ptp(points, axis=0)))]
+
+
+def _carries(foot: Points, points: Points, up: Vector3) -> bool:
+    """Whether the middle of the points lies above the foot's outline."""
     plan = np.linalg.svd(up[None])[2][1:]
     try:
         outline = ConvexHull(foot @ plan.T)
     except QhullError:
         return False
-    return bool((outline.equations[:, :2] @ (plan @ middle) + outline.equations[:, 2] < 0).all())
+    return bool((outline.equations[:, :2] @ (plan @ points.mean(axis=0)) + outline.equations[:, 2] < 0).all())
 
 
 def _add(directions: list[Vector3], new: Vector3) -> None:

@@ -1,7 +1,5 @@
 """Which ways up a thing can stand."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -38,7 +36,7 @@ def test_a_cup_stands_square_to_its_base_whatever_its_box_axes_say(seed: int) ->
     assert all(off_deg(a, b) > 10 for k, a in enumerate(ups) for b in ups[:k])
 
 
-def test_a_boxs_own_axes_count_for_more_than_its_base(bench: Any) -> None:
+def test_a_boxs_own_axes_count_for_more_than_its_base() -> None:
     points = cup(handle=False)
     axes = Rotation.from_euler("y", 2, degrees=True).as_matrix()
     _, bases = standing_directions(points, (axes,), 0.9)
@@ -51,6 +49,10 @@ def test_what_would_topple_does_not_stand(lean_deg: float) -> None:
     assert settled_on_base(cup(handle=False), leaning) is None
 
 
+def test_a_cup_on_its_round_side_rocks() -> None:
+    assert settled_on_base(cup(handle=False), np.array([1.0, 0.0, 0.0])) is None
+
+
 def test_four_legs_carry_and_three_on_one_side_do_not() -> None:
     rng = np.random.default_rng(1)
     seat = rng.uniform([-0.2, -0.2, 0.44], [0.2, 0.2, 0.47], (4000, 3))
@@ -61,6 +63,6 @@ def test_four_legs_carry_and_three_on_one_side_do_not() -> None:
     }
     settled = settled_on_base(np.concatenate([seat, *legs.values()]), UP)
     assert settled is not None
-    assert off_deg(settled, UP) < 0.5
+    assert off_deg(settled, UP) < 1.0  # some 40 points a leg touch the floor
     pair = [leg for (x, _), leg in legs.items() if x > 0]
     assert settled_on_base(np.concatenate([seat, *pair]), UP) is None
