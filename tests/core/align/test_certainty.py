@@ -52,6 +52,23 @@ def test_frames_that_disagree_loosen_a_pose(box: tuple[Shape, Observation]) -> N
     assert torn.shift_m > 1.5 * spread_of(IN_PLACE, shape, observation, NOTHING, []).shift_m
 
 
+def test_two_frames_that_agree_say_less_than_six(box: tuple[Shape, Observation]) -> None:
+    shape, observation = box
+    few = observation.views[:2]
+    own = np.isin(observation.frame_index, [view.frame_index for view in few])
+    part = replace(
+        observation,
+        views=few,
+        points_world=observation.points_world[own],
+        towards_camera=observation.towards_camera[own],
+        noise_m=observation.noise_m[own],
+        frame_index=observation.frame_index[own],
+    )
+    whole, pair = (spread_of(IN_PLACE, shape, o, NOTHING, []) for o in (observation, part))
+    assert pair.shift_m > 2.5 * whole.shift_m  # a third as many frames alone would make it 1.7
+    assert pair.turn_deg > 2.5 * whole.turn_deg
+
+
 def test_a_side_alone_holds_less_than_the_whole(box: tuple[Shape, Observation]) -> None:
     shape, observation = box
     view = observation.views[0]

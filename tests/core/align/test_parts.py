@@ -13,6 +13,7 @@ from r2c2r_core.align.observe import choose_frames, observe
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.align.render import fibonacci_sphere, render_views
 from r2c2r_core.align.shape import manhattan_axes, prepare_shape
+from r2c2r_core.align.sift import SiftMatcher
 from r2c2r_core.align.voting import vote
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.geometry.transforms import Similarity3
@@ -100,6 +101,16 @@ def test_sift_finds_the_same_spots_after_a_turn(bench: Any) -> None:
     u, v = first.uv_px[pairs.first].T
     turned = np.stack([v, 200 - u], axis=1)  # rot90 in coordinates with pixel centres at i + 0.5
     assert np.median(np.linalg.norm(turned - second.uv_px[pairs.second], axis=1)) < 0.7
+
+
+def test_keypoints_beside_the_mask_take_no_ones_place(bench: Any) -> None:
+    image = bench.blotches(np.random.default_rng(4), 200, 200)
+    mask = np.zeros((200, 200), dtype=bool)
+    mask[60:140, 60:140] = True
+    image[mask] = 128 + (image[mask].astype(int) - 128) // 2  # fainter than what lies around it
+    found = SiftMatcher(keypoints=20).describe(image, mask)
+    assert len(found.uv_px) == 20
+    assert mask[found.uv_px[:, 1].astype(int), found.uv_px[:, 0].astype(int)].all()
 
 
 def test_matches_of_few_and_no_keypoints_are_empty() -> None:

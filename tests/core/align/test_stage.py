@@ -116,6 +116,15 @@ def test_a_wrong_mesh_shows_in_its_evidence(bench: Any) -> None:
     assert placement.warnings
 
 
+def test_one_frame_alone_is_never_trusted(bench: Any) -> None:
+    thing, capture, track = bench.free_box(textured=True)
+    asset, _ = bench.as_candidate(thing, 9)
+    alone = replace(track, masks={3: track.masks[3]})
+    placement = place_mesh(capture, alone, asset, "sift", replace(CONFIG, match_views=30, settled=12, refined=3))
+    assert placement.unsure
+    assert any("one frame alone" in w for w in placement.warnings)
+
+
 def test_the_same_seed_gives_the_same_placement(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
