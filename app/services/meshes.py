@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree  # here, not where it is used: two first requests at once would meet it half imported
 
 from app.files import ProjectFiles
 from r2c2r_core.arrays import Matrix3
@@ -47,8 +48,6 @@ def upright(files: ProjectFiles, name: str, candidate: str) -> Matrix3:
 
 def turned_like(mesh: TexturedMesh, model: TexturedMesh) -> Matrix3:
     """The rotation that makes `mesh` look most like `model`, among those that lay its box onto the model's box."""
-    from scipy.spatial import cKDTree
-
     points, colours, axes = _sampled(mesh)
     model_points, model_colours, model_axes = _sampled(model)
     tree = cKDTree(model_points)
