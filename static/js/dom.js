@@ -58,6 +58,24 @@ export function numberField(text, value, options) {
 }
 
 /**
+ * Buttons of which one or some are pressed, as one control.
+ * @param {string} label
+ * @param {...HTMLElement} buttons
+ */
+export function segments(label, ...buttons) {
+  return h("div", { class: "segments", role: "group", "aria-label": label }, ...buttons);
+}
+
+/**
+ * A slider with its name before it, which goes where there is no room.
+ * @param {string} text
+ * @param {HTMLInputElement} input that has a label of its own
+ */
+export function slider(text, input) {
+  return h("label", { class: "slider", title: text }, h("span", {}, text), input);
+}
+
+/**
  * New children in the place of the old ones. Who was at one of them by keyboard stays where they were: at the one with the same
  * `data-at`, "what:which", else at the next of the same "what".
  * @param {HTMLElement} parent

@@ -1,6 +1,7 @@
 """Our pages on a finished project: nothing serious for axe-core, a small first load, and nothing lost without a connection."""
 
 import json
+import re
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,6 +106,45 @@ def test_a_change_made_without_a_connection_is_stored_when_it_is_back(browser: B
     context.set_offline(False)
     expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
     expect(page.locator(".banner")).to_be_hidden()
+    context.close()
+
+
+def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(browser: Browser, finished: tuple[str, str]) -> None:
+    address, project = finished
+    context = browser.new_context()
+    context.set_default_timeout(PATIENCE_MS)
+    first, second = context.new_page(), context.new_page()
+    first.goto(address)
+    first.route("**/api/projects/**", lambda route: route.abort() if route.request.method == "PATCH" else route.continue_())
+    first.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    first.locator(".object-list .pick").first.click()
+    first.get_by_label("Category of").last.fill("door")
+    first.get_by_label("Category of").last.press("Enter")
+    expect(first.locator(".banner")).to_contain_text("1 change not stored yet")
+    sent: list[str] = []
+    second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
+    second.goto(first.url)
+    second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
+    assert sent == []
+    first.close()
+    second.locator(".object-list .pick").first.click()
+    expect(second.get_by_label("Category of").last).to_have_value("door")
+    assert len(sent) == 1
+    context.close()
+
+
+def test_who_is_at_a_list_by_keyboard_stays_there(browser: Browser, finished: tuple[str, str]) -> None:
+    address, project = finished
+    context = browser.new_context()
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
+    hide.focus()
+    for button in (show, hide):
+        page.keyboard.press("Enter")
+        expect(button).to_be_focused()
     context.close()
 
 

@@ -2,70 +2,24 @@
 
 import json
 import re
-import socket
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
-from app.db.engine import open_engine
-from app.services import accounts
 from tests.app.nouns import finish
-from tests.browser.conftest import PATIENCE_MS
 from tests.browser.test_journey import picture
+from tests.browser.together import Server, signed_in
 
-ROOT = Path(__file__).parents[2]
-PASSWORD = "correct horse battery"
 FRAME = (160, 120)
 STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
 
 
-class Server:
-    """The app on a port of its own, to be stopped and started again on the same data."""
-
-    def __init__(self, data: Path) -> None:
-        self.data, self.port = data, free_port()
-        self.process: subprocess.Popen[str] | None = None
-
-    @property
-    def address(self) -> str:
-        return f"http://localhost:{self.port}"
-
-    def start(self) -> None:
-        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), "localhost"]
-        self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        assert self.process.stdout is not None
-        assert "http://localhost" in self.process.stdout.readline()
-
-    def kill(self) -> None:
-        assert self.process is not None
-        assert self.process.stdout is not None
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    data = tmp_path_factory.mktemp("together")
-    engine = open_engine(data / "r2c2r.db")
-    accounts.add(engine, "ann", "admin", PASSWORD)
-    accounts.add(engine, "bea", "reviewer", PASSWORD)
-    engine.dispose()
-    running = Server(data)
-    running.start()
-    yield running
-    running.kill()
+    with Server(tmp_path_factory.mktemp("together")) as running:
+        yield running
 
 
 @pytest.fixture
@@ -76,17 +30,6 @@ def people(browser: Browser, server: Server) -> Iterator[tuple[Page, Page]]:
     yield pages[0], pages[1]
     for context in contexts:
         context.close()
-
-
-def signed_in(context: BrowserContext, server: Server, name: str) -> Page:
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
-    page.goto(f"{server.address}/login")
-    page.get_by_label("Name").fill(name)
-    page.get_by_label("Password").fill(PASSWORD)
-    page.get_by_role("button", name="Sign in").click()
-    page.get_by_role("heading", name="Projects").wait_for()
-    return page
 
 
 def sample(page: Page) -> str:
@@ -236,6 +179,12 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     move(ann, "Send to review again", "one drawer")
     move(bea, "Start the review")
     bea.get_by_role("button", name="drawer_1").first.click()
+    bea.keyboard.press("v")
+    bea.keyboard.press("]")
+    expect(bea.get_by_label("Turn (°)")).to_have_value("1")
+    bea.keyboard.press("Escape")
+    expect(bea.get_by_label("Turn (°)")).to_have_value("0")
+    expect(bea.get_by_role("button", name="Use this place and size")).to_be_disabled()
     bea.keyboard.press("l")
     expect(bea.get_by_label("Right (mm)")).to_have_value("5")  # by a key, shown over the photo and not stored yet
     bea.keyboard.press("Enter")

@@ -1,14 +1,14 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { ago, bytes, counted, duration, jointValue } from "../../static/js/lib/format.js";
-import { actionOf, clashes, KEYMAP } from "../../static/js/lib/keymap.js";
+import { actionOf, clashes, KEYMAP, printed } from "../../static/js/lib/keymap.js";
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 import { strips } from "../../static/js/lib/strips.js";
 import { fit, pinch, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { clicksOfBox } from "../../static/js/lib/box.js";
 import { Gestures } from "../../static/js/lib/gestures.js";
 import { ranked } from "../../static/js/lib/commands.js";
-import { nextDoubtful, worstFirst } from "../../static/js/lib/lanes.js";
+import { nextDoubtful, runs, worstFirst } from "../../static/js/lib/lanes.js";
 import { disagreements } from "../../static/js/lib/merge.js";
 import { project } from "../../static/js/lib/points.js";
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
@@ -291,4 +291,18 @@ test("a press that stays is a click, one that wanders a box, a click under it is
   assert.equal(gestures.move(2, at(30, 10), 3).kind, "pinch");
   assert.equal(gestures.release(2, at(30, 10)), null);
   assert.equal(gestures.release(1, at(10, 10)), null);
+});
+
+test("a lane is drawn in as few bars as it has stretches", () => {
+  assert.deepEqual(runs([0.9, 0.8, undefined, 0.9, 0.2, 0.1]), [
+    { from: 0, to: 2, doubtful: false },
+    { from: 3, to: 4, doubtful: false },
+    { from: 4, to: 6, doubtful: true },
+  ]);
+});
+
+test("keys are printed as they stand on a keyboard, and none twice", () => {
+  assert.deepEqual(printed(["Shift+ArrowRight", "v"]), ["Shift →", "V"]);
+  assert.deepEqual(printed(["1", "2", "3"]), ["1 – 3"]);
+  assert.deepEqual(printed(["j", "l", "Shift+j", "Shift+l"]), ["J", "L"]);
 });

@@ -3,7 +3,7 @@
  * way to depth, shape and comments. Says "opacity", "sign" and "evidence" when they are changed.
  */
 
-import { h } from "../dom.js";
+import { h, segments, slider } from "../dom.js";
 import { SegmenterChip } from "./segmenter-chip.js";
 
 export class StageTools extends EventTarget {
@@ -21,8 +21,8 @@ export class StageTools extends EventTarget {
     this.segmenter.element,
     this.#saved,
     h("span", { class: "spring" }),
-    h("div", { class: "signs", role: "group", "aria-label": "What a click does" }, this.#adds, this.#takes),
-    h("label", { class: "row" }, "Masks", this.#opacity),
+    segments("What a click does", this.#adds, this.#takes),
+    slider("Masks", this.#opacity),
     this.#evidence,
   );
 

@@ -35,7 +35,7 @@ const TABS = [
 export class AppShell extends LiveElement {
   #where = h("span", { class: "where muted" });
   #tabs = h("nav", { class: "tabs", "aria-label": "Project" });
-  #state = h("span", { hidden: true });
+  #state = h("span", { class: "state", hidden: true });
   #online = h("div", { class: "banner", role: "status", hidden: true });
   #main = h("main", { id: "main", tabIndex: -1 });
   #help = new HelpOverlay();

@@ -2,6 +2,7 @@
 
 import { h } from "../dom.js";
 import { ranked } from "../lib/commands.js";
+import { printed } from "../lib/keymap.js";
 
 /** @typedef {import("../lib/commands.js").Command} Command */
 
@@ -55,7 +56,7 @@ export class CommandPalette extends HTMLElement {
         "li",
         { role: "option", id: `palette-${k}`, "aria-selected": String(k === this.#at) },
         h("span", {}, command.text),
-        command.keys ? h("kbd", {}, command.keys) : null,
+        command.keys ? h("kbd", {}, ...printed([command.keys])) : null,
       );
       option.addEventListener("click", () => this.#run(command));
       return option;

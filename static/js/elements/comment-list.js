@@ -66,7 +66,9 @@ export class CommentList extends LiveElement {
     this.#showSettled.hidden = this.open.length === this.#all.length;
     renew(
       this.#list,
-      ...(shown.length ? shown.map((comment) => this.#item(comment)) : [h("li", { class: "muted" }, "None open.")]),
+      ...(shown.length
+        ? shown.map((comment) => this.#item(comment))
+        : [h("li", { class: "muted none" }, "None open.")]),
     );
   }
 

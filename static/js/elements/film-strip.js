@@ -1,7 +1,7 @@
 /** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
-import { DOUBTFUL } from "../lib/lanes.js";
+import { runs } from "../lib/lanes.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
 /** @typedef {{ id: number, number: number, colour: string, name: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView */
@@ -134,13 +134,11 @@ export class FilmStrip extends LiveElement {
     context.globalAlpha = 0.18;
     context.fillStyle = lane.colour;
     context.fillRect(0, 5, canvas.width, 2);
-    this.#frames.forEach((frame, k) => {
-      const confidence = lane.frames.get(frame.index);
-      if (confidence === undefined) return;
-      context.globalAlpha = lane.current ? 1 : 0.75;
-      context.fillStyle = confidence < DOUBTFUL ? hatched : lane.colour;
-      context.fillRect(k * step, 2, Math.max(step, 1), 8);
-    });
+    context.globalAlpha = lane.current ? 1 : 0.75;
+    for (const { from, to, doubtful } of runs(this.#frames.map((frame) => lane.frames.get(frame.index)))) {
+      context.fillStyle = doubtful ? hatched : lane.colour;
+      context.fillRect(from * step, 2, Math.max((to - from) * step, 1), 8);
+    }
     context.globalAlpha = 1;
     this.#frames.forEach((frame, k) => {
       if (!lane.prompts.has(frame.index)) return;

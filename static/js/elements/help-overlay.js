@@ -1,13 +1,17 @@
 /** The `?` overlay, printed from the keymap the code uses. */
 
-import { h } from "../dom.js";
+import { h, icon } from "../dom.js";
 import { plainKeys, setPlainKeys } from "../keyboard.js";
-import { KEYMAP } from "../lib/keymap.js";
+import { KEYMAP, printed } from "../lib/keymap.js";
 
-const TITLES = { all: "Everywhere", annotate: "Annotate", review: "Review" };
+const TITLES = { annotate: "Annotate", review: "Review", all: "Everywhere" };
+const MOUSE =
+  "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
+  "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans; two fingers do both, and " +
+  "Take away makes a tap do what the right button does. Hold Ctrl to place several clicks before the mask is computed.";
 
 export class HelpOverlay extends HTMLElement {
-  #dialog = h("dialog", { "aria-label": "Keyboard and mouse" });
+  #dialog = h("dialog", { class: "help", "aria-label": "Keyboard and mouse" });
 
   connectedCallback() {
     this.append(this.#dialog);
@@ -24,33 +28,24 @@ export class HelpOverlay extends HTMLElement {
 
 /** @param {() => void} close */
 function content(close) {
-  const sections = /** @type {const} */ (["annotate", "review", "all"]).flatMap((page) => [
-    h("h2", {}, TITLES[page]),
-    h(
-      "table",
-      {},
-      h(
-        "tbody",
-        {},
-        ...KEYMAP.filter((binding) => binding.page === page).map((binding) =>
-          h("tr", {}, h("td", {}, ...binding.keys.map((key) => h("kbd", {}, key))), h("td", {}, binding.text)),
-        ),
-      ),
-    ),
-  ]);
-  const mouse = h(
-    "p",
-    {},
-    "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
-      "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans; two fingers do both, and Take away makes a tap do what the right button does. Hold Ctrl to place several clicks before the mask is computed.",
-  );
   const plain = h("input", { type: "checkbox", checked: plainKeys() });
   plain.addEventListener("change", () => setPlainKeys(plain.checked));
+  const shut = h("button", { type: "button", class: "quiet", "aria-label": "Close", onClick: close }, icon("cross"));
   return [
-    h("h1", {}, "Keyboard and mouse"),
-    mouse,
+    h("div", { class: "row" }, h("h1", { class: "grow" }, "Keyboard and mouse"), shut),
+    h("p", { class: "muted" }, MOUSE),
     h("label", { class: "row" }, plain, "Letters alone are commands (the palette, Ctrl+K, works without)"),
-    ...sections,
-    h("p", {}, h("button", { type: "button", onClick: close }, "Close")),
+    h("div", { class: "keys" }, ...Object.entries(TITLES).map(([page, title]) => section(page, title))),
   ];
+}
+
+/**
+ * @param {string} page
+ * @param {string} title
+ */
+function section(page, title) {
+  const lines = KEYMAP.filter((binding) => binding.page === page).map(({ keys, text }) =>
+    h("tr", {}, h("td", {}, ...printed(keys).map((key) => h("kbd", {}, key))), h("td", {}, text)),
+  );
+  return h("section", {}, h("h2", {}, title), h("table", {}, h("tbody", {}, ...lines)));
 }

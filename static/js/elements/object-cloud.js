@@ -6,6 +6,7 @@ import { decodePoints, project } from "../lib/points.js";
 import { sayError } from "./toasts.js";
 
 const SOON_MS = 700;
+const NONE = "Choose an object to see its points.";
 
 export class ObjectCloud extends LiveElement {
   project = "";
@@ -16,7 +17,7 @@ export class ObjectCloud extends LiveElement {
     role: "img",
     "aria-label": "The object's points in 3D",
   });
-  #text = h("p", { class: "muted", role: "status" });
+  #text = h("p", { class: "muted", role: "status" }, NONE);
   /** @type {number | null} */
   #object = null;
   /** @type {import("../lib/points.js").Cloud | null} */
@@ -26,6 +27,7 @@ export class ObjectCloud extends LiveElement {
 
   connected() {
     this.replaceChildren(this.#canvas, this.#text);
+    this.#canvas.hidden = true;
     const { signal } = this;
     this.#canvas.addEventListener("pointerdown", (event) => this.#canvas.setPointerCapture(event.pointerId), {
       signal,
@@ -44,7 +46,7 @@ export class ObjectCloud extends LiveElement {
     if (object === this.#object) return;
     this.#object = object;
     this.#cloud = null;
-    this.#text.textContent = object === null ? "Choose an object to see its points." : "";
+    this.#text.textContent = object === null ? NONE : "Looking…";
     this.#draw();
     this.refresh();
   }
@@ -98,6 +100,7 @@ export class ObjectCloud extends LiveElement {
   #draw() {
     const context = this.#canvas.getContext("2d");
     if (!context) return;
+    this.#canvas.hidden = this.#cloud === null;
     const { width, height } = this.#canvas;
     const picture = context.createImageData(width, height);
     if (this.#cloud) project(this.#cloud, this.#turn, picture);

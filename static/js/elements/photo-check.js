@@ -4,7 +4,7 @@
  */
 
 import { getPhotos } from "../api.js";
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, renew, segments, slider } from "../dom.js";
 import { boxEdges } from "../lib/box-view.js";
 import { sayError } from "./toasts.js";
 
@@ -14,7 +14,7 @@ import { sayError } from "./toasts.js";
 /** @typedef {"ghost" | "outline" | "residual"} Look */
 
 /** @type {Record<Of, string>} */
-const OF = { placed: "As placed", primitive: "Boxes", fitted: "Fitted" };
+const OF = { placed: "Placed", primitive: "Boxes", fitted: "Fitted" };
 /** @type {Record<Look, string>} */
 const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance" };
 
@@ -132,16 +132,18 @@ export class PhotoCheck extends LiveElement {
     /** @type {(text: string, on: boolean, act: () => void) => HTMLElement} */
     const button = (text, on, act) => {
       const made = h("button", { type: "button", "aria-pressed": String(on) }, text);
+      made.dataset.at = `look:${text}`;
       made.addEventListener("click", () => (act(), this.#draw()));
       return made;
     };
     const looks = /** @type {Look[]} */ (Object.keys(LOOKS));
-    this.#tools.replaceChildren(
-      ...all.of.map((of) => button(OF[of], of === this.#of, () => (this.#of = of))),
+    renew(
+      this.#tools,
+      segments("Stage", ...all.of.map((of) => button(OF[of], of === this.#of, () => (this.#of = of)))),
+      segments("Look", ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look)))),
       h("span", { class: "spring" }),
-      ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look))),
-      h("label", { class: "row" }, "Opacity", this.#opacity),
-      ...(this.#under.hidden ? [] : [h("label", { class: "row" }, `${OF[before]} ↔ ${OF[this.#of]}`, this.#split)]),
+      slider("Opacity", this.#opacity),
+      this.#under.hidden ? "" : slider(`${OF[before]} ↔`, this.#split),
     );
   }
 

@@ -57,11 +57,22 @@ function row(item) {
       { class: "whole", title: `sources: ${item.dimension_sources.join(", ")}` },
       `${width} × ${depth} × ${height}`,
     ),
-    h("td", {}, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
+    h("td", { class: "whole" }, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
     h("td", { class: "number" }, String(item.mask_frames)),
     h("td", { class: "number" }, rms),
     h("td", { class: "muted" }, item.warnings.join("; ")),
   );
+}
+
+/**
+ * What the certificate says about places of the scene.
+ * @param {Certificate["findings"]} findings
+ */
+export function findingList(findings) {
+  const lines = findings.map(({ severity, where, message }) =>
+    h("li", { class: severity === "error" ? "bad" : "warn", title: severity }, h("strong", {}, where), ` ${message}`),
+  );
+  return h("ul", { class: "findings", "aria-label": "Findings of the certificate" }, ...lines);
 }
 
 /** @param {Certificate} certificate */
@@ -91,8 +102,6 @@ export function certificateCard(certificate) {
         return h("span", { class: `chip ${tone}`, title: loader.detail }, `${loader.loader}: ${loader.state}`);
       }),
     ),
-    certificate.findings.length
-      ? h("ul", {}, ...certificate.findings.map((f) => h("li", {}, `${f.severity}: ${f.where}: ${f.message}`)))
-      : null,
+    certificate.findings.length ? findingList(certificate.findings) : null,
   );
 }

@@ -116,6 +116,25 @@ function nameOf(event) {
   return control + shift + key;
 }
 
+/** @type {Record<string, string>} */
+const SIGNS = { ArrowRight: "→", ArrowLeft: "←", ArrowUp: "↑", ArrowDown: "↓", Escape: "Esc", Delete: "Del" };
+
+/**
+ * A binding's keys as they are printed: arrows as arrows, a row of digits as its ends, a key that only does more with Shift once.
+ * @param {string[]} keys
+ */
+export function printed(keys) {
+  if (keys.length > 2 && keys.every((key) => /^\d$/.test(key))) return [`${keys[0]} – ${keys.at(-1)}`];
+  return keys
+    .filter((key) => !(key.startsWith("Shift+") && keys.includes(key.slice("Shift+".length))))
+    .map((key) =>
+      key
+        .split("+")
+        .map((part) => SIGNS[part] ?? (part.length === 1 ? part.toUpperCase() : part))
+        .join(" "),
+    );
+}
+
 /** Keys that two actions of one page claim. */
 export function clashes() {
   /** @type {string[]} */

@@ -34,3 +34,20 @@ export function worstFirst(confidence, count) {
   );
   return [...doubtful.slice(0, count), ...spread.toSorted((a, b) => a.confidence - b.confidence)];
 }
+
+/**
+ * Frames that follow each other with a mask, and are all sure or all doubtful.
+ * @param {(number | undefined)[]} confidences by position; undefined where there is no mask
+ */
+export function runs(confidences) {
+  /** @type {{ from: number, to: number, doubtful: boolean }[]} */
+  const found = [];
+  confidences.forEach((confidence, k) => {
+    if (confidence === undefined) return;
+    const doubtful = confidence < DOUBTFUL;
+    const last = found.at(-1);
+    if (last?.to === k && last.doubtful === doubtful) last.to = k + 1;
+    else found.push({ from: k, to: k + 1, doubtful });
+  });
+  return found;
+}

@@ -135,7 +135,7 @@ export class ProjectsPage extends LiveElement {
         h("div", { class: "muted" }, what.filter(Boolean).join(" · "), h("br"), line.filter(Boolean).join(" · ")),
         h(
           "div",
-          { class: "row" },
+          { class: "row acts" },
           h("button", { type: "button", class: "quiet", onClick: () => this.#rename(project) }, "Rename"),
           this.#admin
             ? h(

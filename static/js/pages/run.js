@@ -90,7 +90,7 @@ export class RunPage extends LiveElement {
         h(
           "div",
           { class: "row" },
-          h("h2", {}, "Result"),
+          h("h2", { class: "grow" }, "Result"),
           h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
           h("a", { class: "button", href: `/p/${this.project}/download` }, "Download"),
         ),

@@ -1,4 +1,4 @@
-/** Candidates side by side from the same camera, each with its evidence; the one that is used says why. */
+/** Candidates from the same camera, each with its evidence; the one that is used says why. */
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -6,13 +6,16 @@ import { counted } from "../lib/format.js";
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Candidate} Candidate */
 
+/** @typedef {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void }} Told */
+
 /**
+ * A card of each, the one that is used first.
  * @param {CandidateGroup} group
  * @param {string} current the one shown in 3D
- * @param {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void }} told
+ * @param {Told} told
  */
-export function gallery(group, current, told) {
-  return h("div", { class: "candidates" }, ...ranked(group).map((candidate) => card(group, candidate, current, told)));
+export function cards(group, current, told) {
+  return ranked(group).map((candidate) => card(group, candidate, current, told));
 }
 
 /**
@@ -23,7 +26,7 @@ export function choice(group) {
   const second = group.ranking.find((id) => id !== group.chosen);
   return h(
     "p",
-    {},
+    { class: "why" },
     group.chosen_by === "person" ? "Chosen by a person: " : "Chosen automatically: ",
     h("span", { class: "muted" }, group.reason),
     second ? h("span", { class: "muted" }, ` Runner-up: ${second}.`) : "",
@@ -42,7 +45,7 @@ function ranked(group) {
  * @param {CandidateGroup} group
  * @param {Candidate} candidate
  * @param {string} current
- * @param {Parameters<typeof gallery>[2]} told
+ * @param {Told} told
  */
 function card(group, candidate, current, told) {
   const show = h("button", { type: "button", class: "show", "aria-label": `Show ${candidate.id} in 3D` });
@@ -55,7 +58,7 @@ function card(group, candidate, current, told) {
     : "";
   return h(
     "article",
-    { class: candidate.id === current ? "current" : "" },
+    { class: `candidate ${candidate.id === current ? "current" : ""}` },
     show,
     h(
       "div",
@@ -67,7 +70,7 @@ function card(group, candidate, current, told) {
         candidate.id === group.chosen ? h("span", { class: "chip good" }, "★ used") : "",
         second ? h("span", { class: "chip" }, "runner-up") : "",
       ),
-      h("div", { class: "chips" }, ...evidence(candidate)),
+      evidence(candidate),
       said ? h("div", { class: "muted" }, said) : "",
       ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
       h(
@@ -80,37 +83,44 @@ function card(group, candidate, current, told) {
   );
 }
 
-/** @param {Candidate} candidate */
+/** The figures in a line; those that are doubtful stand out. @param {Candidate} candidate */
 function evidence({ metrics, watertight, faces, generator }) {
   /** @type {[string, boolean][]} text, and whether it is a warning */
-  const chips = [];
+  const figures = [];
   if (metrics.mask_iou !== undefined)
-    chips.push([`mask ${(100 * metrics.mask_iou).toFixed(0)} %`, metrics.mask_iou < 0.8]);
+    figures.push([`mask ${(100 * metrics.mask_iou).toFixed(0)} %`, metrics.mask_iou < 0.8]);
   if (metrics.depth_residual_m !== undefined) {
-    chips.push([`depth ${(1000 * metrics.depth_residual_m).toFixed(0)} mm`, metrics.depth_residual_m > 0.02]);
+    figures.push([`depth ${(1000 * metrics.depth_residual_m).toFixed(0)} mm`, metrics.depth_residual_m > 0.02]);
   }
-  if (metrics.seen_fraction !== undefined) chips.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
+  if (metrics.seen_fraction !== undefined) figures.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
   if (metrics.extent_middle !== undefined && metrics.extent_short !== undefined) {
-    chips.push([`1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
+    figures.push([`1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
   }
-  chips.push(
+  figures.push(
     [watertight ? "watertight" : "not watertight", !watertight],
     [counted(faces, "face"), false],
     [generator, false],
   );
-  return chips.map(([text, bad]) => h("span", { class: bad ? "chip warn" : "chip" }, text));
+  const fine = figures.filter(([, bad]) => !bad).map(([text]) => text);
+  const doubtful = figures.filter(([, bad]) => bad).map(([text]) => h("span", { class: "chip warn" }, text));
+  return h(
+    "div",
+    { class: "figures" },
+    h("p", { class: "muted" }, fine.join(" · ")),
+    doubtful.length ? h("div", { class: "chips" }, ...doubtful) : "",
+  );
 }
 
 /**
  * @param {Candidate} candidate
  * @param {"accepted" | "rejected"} said
- * @param {Parameters<typeof gallery>[2]["verdict"]} told
+ * @param {Told["verdict"]} told
  */
 function verdict(candidate, said, told) {
   const [name, text] = said === "accepted" ? ["check", "Accept"] : ["cross", "Reject"];
   const button = h(
     "button",
-    { type: "button", "aria-pressed": String(candidate.verdict === said) },
+    { type: "button", value: said, "aria-pressed": String(candidate.verdict === said) },
     icon(name ?? ""),
     text,
   );

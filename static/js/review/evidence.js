@@ -1,6 +1,7 @@
 /** What speaks for and against an object's place: figures of the alignment and the fit, findings of the certificate. */
 
 import { h } from "../dom.js";
+import { findingList } from "../elements/results.js";
 import { centimetres } from "../lib/format.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
@@ -16,15 +17,15 @@ export function placement(placement, item) {
   /** @type {[string, string][]} */
   const rows = [
     ["Placed by", placement.method],
-    ["Distance to the scan", `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
-    ["Silhouette overlap", `${(100 * placement.mask_iou).toFixed(0)} %`],
+    ["To the scan", `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
+    ["Silhouette", `${(100 * placement.mask_iou).toFixed(0)} % overlap`],
     ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
     ["Held to", held(placement.spread)],
     ["Runner-up", runnerUp(placement)],
   ];
   if (item) rows.push(["W × D × H", `${item.dimensions_m.map(centimetres).join(" × ")} cm`]);
   if (item?.warp_residual_m)
-    rows.push(["Front corners", `${(1000 * item.warp_residual_m).toFixed(1)} mm off after the fit`]);
+    rows.push(["Front corners", `${(1000 * item.warp_residual_m).toFixed(1)} mm off once fitted`]);
   return h(
     "div",
     { class: "stack" },
@@ -39,14 +40,14 @@ export function placement(placement, item) {
 function held(spread) {
   if (!spread) return "not measured";
   const { shift_m, turn_deg, scale } = spread;
-  return `± ${(2000 * shift_m).toFixed(0)} mm, ± ${(2 * turn_deg).toFixed(1)}°, size ± ${(200 * scale).toFixed(1)} %`;
+  return `± ${(2000 * shift_m).toFixed(0)} mm, ± ${(2 * turn_deg).toFixed(1)}°, ± ${(200 * scale).toFixed(1)} %`;
 }
 
 /** How near the best other orientation came. @param {Placement} placement */
 function runnerUp({ runner_up, runner_up_turn_deg }) {
   if (runner_up === null) return "none";
-  const turned = runner_up_turn_deg === null ? "" : `, turned by ${runner_up_turn_deg.toFixed(0)}°`;
-  return `${(100 * runner_up).toFixed(0)} % of the winner's score${turned}`;
+  const turned = runner_up_turn_deg === null ? "" : `, turned ${runner_up_turn_deg.toFixed(0)}°`;
+  return `${(100 * runner_up).toFixed(0)} % as good${turned}`;
 }
 
 /** Each number of a joint with where it comes from. @param {SceneItem | undefined} item */
@@ -73,13 +74,7 @@ function joints(item) {
 export function findingsOf(certificate, name, names) {
   const mine = (certificate?.findings ?? []).filter(({ where }) => owner(where, names) === name);
   if (!mine.length) return "";
-  return h(
-    "ul",
-    { class: "findings", "aria-label": "Findings of the certificate" },
-    ...mine.map(({ severity, where, message }) =>
-      h("li", { class: severity === "error" ? "bad" : "warn" }, h("strong", {}, where), ` ${message}`),
-    ),
-  );
+  return findingList(mine);
 }
 
 /**

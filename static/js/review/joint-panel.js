@@ -115,7 +115,8 @@ export class JointPanel {
       { class: `chip ${check ? "warn" : ""}`, title: sources.map(([what, s]) => `${what} ${s}`).join(", ") },
       worst,
     );
-    const name = h("span", { class: "name", title: joint.name }, joint.name);
+    const alone = known?.item.joints.length === 1; // then the object's name says enough
+    const name = h("span", { class: "name", title: joint.name }, alone ? known.item.name : joint.name);
     return { joint, object: known?.item.name ?? "", set, check, element: h("label", {}, name, badge, input, value) };
   }
 }

@@ -15,7 +15,7 @@ export function objectNav(groups, { current, project, choose }) {
     const [text, tone] = standing(group);
     const button = h("button", { type: "button", "aria-pressed": String(group.object === current), title: group.name });
     button.dataset.at = `object:${group.object}`;
-    button.append(h("span", { class: "name" }, group.name), h("span", { class: `chip ${tone}` }, text));
+    button.append(h("span", { class: "name" }, group.name), text ? h("span", { class: `chip ${tone}` }, text) : "");
     button.addEventListener("click", () => choose(group.object));
     return h("li", {}, button);
   });
@@ -30,10 +30,10 @@ export function objectNav(groups, { current, project, choose }) {
 
 /**
  * @param {CandidateGroup} group
- * @returns {[string, string]} text and tone
+ * @returns {[string, string]} text and tone; nothing where it only waits to be looked at
  */
 function standing(group) {
   if (group.accepted) return ["accepted", "good"];
   if (!group.placement) return ["not placed", ""];
-  return group.placement.unsure ? ["unsure", "warn"] : ["to review", ""];
+  return group.placement.unsure ? ["unsure", "warn"] : ["", ""];
 }

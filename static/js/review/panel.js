@@ -2,7 +2,7 @@
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
-import { choice, gallery } from "./candidates.js";
+import { cards, choice } from "./candidates.js";
 import { corrections } from "./corrections.js";
 import { findingsOf, placement } from "./evidence.js";
 
@@ -28,14 +28,17 @@ export function panel(objects, decisions, asked, correcting) {
   const { group, item, groups, certificate, candidate } = objects;
   if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
   const names = groups.map(({ name }) => name);
+  const told = { show: asked.show, verdict: decisions.judge.bind(decisions) };
+  const [used, ...rest] = cards(group, candidate, told);
   return [
     heading(group, decisions),
+    used ?? "",
     choice(group),
     group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
     findingsOf(certificate, group.name, names),
     corrections(group, item, { move: asked.move, open: correcting }, (patch) => decisions.correct(patch)),
-    h("h3", {}, counted(group.candidates.length, "candidate")),
-    gallery(group, candidate, { show: asked.show, verdict: (one, said) => decisions.judge(one, said) }),
+    rest.length ? h("h3", {}, counted(rest.length, "other candidate")) : "",
+    ...rest,
     others(group, decisions, asked),
   ];
 }
@@ -48,7 +51,8 @@ function heading(group, decisions) {
   const undo = h("button", { class: "quiet", disabled: !group.can_undo, "aria-label": "Undo" }, icon("undo"));
   undo.dataset.at = "undo:";
   undo.addEventListener("click", () => decisions.undoRedo("undo"));
-  return h("div", { class: "row" }, h("h2", {}, group.name), h("span", { class: "chip" }, group.category), undo);
+  const category = h("span", { class: "chip" }, group.category);
+  return h("div", { class: "row name" }, h("h2", {}, group.name), category, h("span", { class: "grow" }), undo);
 }
 
 /**

@@ -1,6 +1,6 @@
 /** What the middle of the review shows, and how. Says "change" when the person wants another view or another setting of it. */
 
-import { h } from "../dom.js";
+import { h, segments, slider } from "../dom.js";
 
 /** @typedef {"candidate" | "aligned" | "photo" | "scene" | "cloud"} Mode */
 
@@ -28,7 +28,7 @@ export class ViewBar extends EventTarget {
   #modes = MODES.map(([mode, text]) => ({ mode, button: toggle(text, () => this.set(mode)) }));
   #move = toggle("Move it", () => this.move(!this.moving));
   #all = toggle("All points", () => ((this.full = !this.full), this.#say()));
-  #see = h("label", { class: "row" }, "Opacity", this.#opacity);
+  #see = slider("Opacity", this.#opacity);
   #inScene = [this.#collision, this.#scan].map((input, k) =>
     h("label", { class: "row" }, input, ["Colliders", "Scan"][k]),
   );
@@ -37,9 +37,9 @@ export class ViewBar extends EventTarget {
     super();
     for (const input of [this.#opacity, this.#collision, this.#scan])
       input.addEventListener("change", () => this.#say());
-    const modes = this.#modes.map(({ button }) => button);
+    const modes = segments("View", ...this.#modes.map(({ button }) => button));
     const spring = h("span", { class: "spring" });
-    this.element.append(...modes, spring, this.#move, this.#see, ...this.#inScene, this.#all, this.job);
+    this.element.append(modes, spring, this.job, this.#move, this.#all, this.#see, ...this.#inScene);
     this.#draw();
   }
 

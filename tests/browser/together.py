@@ -1,0 +1,71 @@
+"""An app with accounts and stand-ins for its slow parts, to be stopped and started again, and people who sign in to it."""
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Self
+
+from playwright.sync_api import BrowserContext, Page
+
+from app.db.engine import open_engine
+from app.services import accounts
+from tests.browser.conftest import PATIENCE_MS
+
+ROOT = Path(__file__).parents[2]
+PASSWORD = "correct horse battery"
+PEOPLE = {"ann": "admin", "bea": "reviewer"}
+
+
+class Server:
+    """The app on a port of its own, to be stopped and started again on the same data; Ann and Bea have accounts."""
+
+    def __init__(self, data: Path) -> None:
+        self.data, self.port = data, free_port()
+        self.process: subprocess.Popen[str] | None = None
+        engine = open_engine(data / "r2c2r.db")
+        for name, role in PEOPLE.items():
+            accounts.add(engine, name, role, PASSWORD)
+        engine.dispose()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+
+    @property
+    def address(self) -> str:
+        return f"http://localhost:{self.port}"
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), "localhost"]
+        self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        assert self.process.stdout is not None
+        assert "http://localhost" in self.process.stdout.readline()
+
+    def kill(self) -> None:
+        assert self.process is not None
+        assert self.process.stdout is not None
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def signed_in(context: BrowserContext, server: Server, name: str, password: str = PASSWORD) -> Page:
+    """A page of theirs, at the projects."""
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{server.address}/login")
+    page.get_by_label("Name").fill(name)
+    page.get_by_label("Password").fill(password)
+    page.get_by_role("button", name="Sign in").click()
+    page.get_by_role("heading", name="Projects").wait_for()
+    return page
