@@ -68,6 +68,7 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
                 wrong.append(f"{name} ({number}): {problem}")
             if number % max(count // 4, 1) == 0:
                 memory.append(_memory_mb())
+                sys.stderr.write(f"{number} of {count} in {time.monotonic() - began:.0f} s, wrong: {wrong}\n")
         memory.append(_memory_mb())
     return {
         "count": count,

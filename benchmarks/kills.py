@@ -6,8 +6,9 @@ One person (kill_journey.py) uploads a recording, clicks, names, undoes, judges,
 runs and downloads, one request after the other; SIGKILL comes at moments drawn from a seed and hits the server, all its
 workers with it, a job's process, or the live segmenter. The request whose answer was lost is sent again under its key. Then
 what is stored must be what was acknowledged: no more, no less. By default the stages are stand-ins that take a moment each;
-with --real (a folder with scan.r3d and prompts.json, as `r2c2r sample` writes) they are the real ones, the moments are further
-apart, and what a finished stage stored must stay what it was, byte by byte.
+with --real (a folder with scan.r3d and prompts.json, as `r2c2r sample` writes) they are the real ones, and the moments are
+spread over them: every second and third kill waits until one or two more stages have finished. What a finished stage stored
+must stay what it was, byte by byte.
 """
 
 import argparse
@@ -51,6 +52,8 @@ settings = Settings(data_dir=data, launch_token="key", min_free_bytes=0, job_mem
 uvicorn.run(create_app(settings, commands=commands), host="127.0.0.1", port=port, log_level="critical")
 """
 MOST_ACTS = 16
+MOST_STAGES = 2  # that are waited for before a kill
+PATIENCE_S = 240.0
 HITS = ("server", "server and workers", "a job's process", "the live segmenter")
 
 
@@ -130,7 +133,7 @@ def kill_often(data: Path, *, kills: int, seed: int, real: Path | None = None) -
     rng = random.Random(seed)
     server = Server(data, real is not None)
     began, restarts = time.monotonic(), []
-    latest, pause = (40.0, 0.5) if real else (1.2, 0.02)
+    latest, pause = (15.0, 0.5) if real else (1.2, 0.02)
     server.start()
     journey = Journey(server.address, data, random.Random(seed + 1), real)
     stages = FinishedStages(journey)
@@ -139,6 +142,8 @@ def kill_often(data: Path, *, kills: int, seed: int, real: Path | None = None) -
         for kill in range(kills):
             for _ in range(rng.randrange(MOST_ACTS)):  # moments are counted in what was done: a slow machine gets as far
                 _live(journey, stages, pause)
+            if real:  # a stage takes as long as many acts: some kills come after one or two more of them have finished
+                _live_through(journey, stages, pause, kill % (MOST_STAGES + 1))
             timer = threading.Timer(rng.uniform(0.0, latest), server.kill, (rng.choice(HITS),))
             timer.start()
             while timer.is_alive():
@@ -178,6 +183,13 @@ def _live(journey: Journey, stages: FinishedStages, pause: float) -> None:
         journey.act()
         stages.look()
     time.sleep(pause)
+
+
+def _live_through(journey: Journey, stages: FinishedStages, pause: float, count: int) -> None:
+    """Live until so many more stages have finished."""
+    wanted, deadline = len(stages.seen) + count, time.monotonic() + PATIENCE_S
+    while len(stages.seen) < wanted and time.monotonic() < deadline:
+        _live(journey, stages, pause)
 
 
 def _words(process: psutil.Process) -> list[str]:
