@@ -7,6 +7,7 @@ import { strips } from "../../static/js/lib/strips.js";
 import { fit, pinch, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 import { clicksOfBox } from "../../static/js/lib/box.js";
 import { Gestures } from "../../static/js/lib/gestures.js";
+import { inkOn } from "../../static/js/lib/colour.js";
 import { ranked } from "../../static/js/lib/commands.js";
 import { nextDoubtful, runs, worstFirst } from "../../static/js/lib/lanes.js";
 import { disagreements } from "../../static/js/lib/merge.js";
@@ -305,4 +306,8 @@ test("keys are printed as they stand on a keyboard, and none twice", () => {
   assert.deepEqual(printed(["Shift+ArrowRight", "v"]), ["Shift →", "V"]);
   assert.deepEqual(printed(["1", "2", "3"]), ["1 – 3"]);
   assert.deepEqual(printed(["j", "l", "Shift+j", "Shift+l"]), ["J", "L"]);
+});
+
+test("a number is read on every colour of the palette", () => {
+  assert.deepEqual(["#0072b2", "#f0e442", "#000000", "#e69f00"].map(inkOn), ["#ffffff", "#10131a", "#ffffff", "#10131a"]);
 });

@@ -1,10 +1,10 @@
 /** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
-import { runs } from "../lib/lanes.js";
+import { drawLane } from "../lib/lane-view.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
-/** @typedef {{ id: number, number: number, colour: string, name: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView */
+/** @typedef {import("../lib/lane-view.js").LaneView & { id: number, name: string }} LaneView */
 
 const THUMBS = 18;
 
@@ -12,6 +12,9 @@ export class FilmStrip extends LiveElement {
   /** @type {FrameInfo[]} */
   #frames = [];
   #position = 0;
+  /** @type {Map<HTMLCanvasElement, LaneView>} */
+  #drawn = new Map();
+  #size = { width: 0, height: 0 };
   #thumbs = h("div", { class: "thumbs" });
   #lanes = h("div", { class: "lanes" });
   #slider = h("input", { type: "range", min: "0", max: "0", value: "0", "aria-label": "Frame" });
@@ -26,6 +29,9 @@ export class FilmStrip extends LiveElement {
       this.#thumbs.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), this.#thumbs), {
         signal,
       });
+    const observer = new ResizeObserver(() => this.#measure());
+    observer.observe(this);
+    signal.addEventListener("abort", () => observer.disconnect());
     this.replaceChildren(
       h("div", { class: "transport" }, this.#play, this.#slider, this.#text),
       this.#thumbs,
@@ -67,7 +73,7 @@ export class FilmStrip extends LiveElement {
     const buttons = [...this.#thumbs.querySelectorAll("button")];
     const near = buttons.toSorted((a, b) => distance(a, position) - distance(b, position))[0];
     for (const button of buttons) button.setAttribute("aria-current", String(button === near));
-    for (const canvas of this.#lanes.querySelectorAll("canvas")) canvas.dispatchEvent(new Event("redraw"));
+    this.#drawLanes();
   }
 
   /**
@@ -89,18 +95,31 @@ export class FilmStrip extends LiveElement {
     this.#play.setAttribute("aria-pressed", String(playing));
   }
 
+  /** All lanes are as large as the first. */
+  #measure() {
+    const { clientWidth: width = 0, clientHeight: height = 0 } = this.#drawn.keys().next().value ?? {};
+    this.#size = { width, height };
+    this.#drawLanes();
+  }
+
+  #drawLanes() {
+    const indices = this.#frames.map((frame) => frame.index);
+    const ink = getComputedStyle(this).color;
+    for (const [canvas, lane] of this.#drawn) drawLane(canvas, this.#size, lane, indices, this.#position, ink);
+  }
+
   /** @param {LaneView[]} lanes */
   setLanes(lanes) {
+    /** @type {Map<HTMLCanvasElement, LaneView>} */
+    const drawn = new Map();
     renew(
       this.#lanes,
       ...lanes.map((lane) => {
         const label = `${lane.name}: seen in ${lane.frames.size} frames`;
-        const canvas = h("canvas", { role: "img", "aria-label": label, title: label, width: 1200, height: 12 });
-        const draw = () => this.#drawLane(canvas, lane);
-        canvas.addEventListener("redraw", draw);
+        const canvas = h("canvas", { role: "img", "aria-label": label, title: label });
+        drawn.set(canvas, lane);
         for (const type of ["pointerdown", "pointermove"])
           canvas.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), canvas));
-        draw();
         const name = h(
           "button",
           {
@@ -116,45 +135,10 @@ export class FilmStrip extends LiveElement {
         return h("div", { class: lane.current ? "lane current" : "lane" }, name, canvas);
       }),
     );
+    this.#drawn = drawn;
+    this.#measure();
     const current = /** @type {HTMLElement | null} */ (this.#lanes.querySelector(".current"));
     if (current) this.#lanes.scrollTop = current.offsetTop - this.#lanes.offsetTop - this.#lanes.clientHeight / 2;
-  }
-
-  /**
-   * A bar where the mask is present, hatched where it is doubtful, a diamond at each click.
-   * @param {HTMLCanvasElement} canvas
-   * @param {LaneView} lane
-   */
-  #drawLane(canvas, lane) {
-    const context = canvas.getContext("2d");
-    if (!context) return;
-    const step = canvas.width / Math.max(this.#frames.length, 1);
-    context.clearRect(0, 0, canvas.width, canvas.height);
-    const hatched = hatch(context, lane.colour);
-    context.globalAlpha = 0.18;
-    context.fillStyle = lane.colour;
-    context.fillRect(0, 5, canvas.width, 2);
-    context.globalAlpha = lane.current ? 1 : 0.75;
-    for (const { from, to, doubtful } of runs(this.#frames.map((frame) => lane.frames.get(frame.index)))) {
-      context.fillStyle = doubtful ? hatched : lane.colour;
-      context.fillRect(from * step, 2, Math.max((to - from) * step, 1), 8);
-    }
-    context.globalAlpha = 1;
-    this.#frames.forEach((frame, k) => {
-      if (!lane.prompts.has(frame.index)) return;
-      const x = (k + 0.5) * step;
-      context.beginPath();
-      context.moveTo(x, 0);
-      context.lineTo(x + 6, 6);
-      context.lineTo(x, 12);
-      context.lineTo(x - 6, 6);
-      context.fillStyle = "#ffffff";
-      context.fill();
-      context.strokeStyle = "#10131a";
-      context.stroke();
-    });
-    context.fillStyle = getComputedStyle(this).getPropertyValue("color");
-    context.fillRect((this.#position + 0.5) * step - 1, 0, 2, canvas.height);
   }
 }
 
@@ -164,24 +148,4 @@ export class FilmStrip extends LiveElement {
  */
 function distance(button, position) {
   return Math.abs(Number(button.dataset.position) - position);
-}
-
-/**
- * Slanted lines in a colour.
- * @param {CanvasRenderingContext2D} context
- * @param {string} colour
- */
-function hatch(context, colour) {
-  const tile = new OffscreenCanvas(6, 6);
-  const drawn = tile.getContext("2d");
-  if (!drawn) return colour;
-  drawn.strokeStyle = colour;
-  drawn.lineWidth = 2;
-  for (const x of [-3, 3]) {
-    drawn.beginPath();
-    drawn.moveTo(x, 6);
-    drawn.lineTo(x + 6, 0);
-    drawn.stroke();
-  }
-  return context.createPattern(tile, "repeat") ?? colour;
 }

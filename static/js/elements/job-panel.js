@@ -43,7 +43,7 @@ export class JobPanel extends LiveElement {
       "div",
       { class: "row" },
       h("span", { class: `chip ${tone}` }, STATES[job.state]),
-      h("span", { class: "muted" }, [job.message, left || queue].filter(Boolean).join(" · ")),
+      h("span", { class: "muted" }, [job.error ? "" : job.message, left || queue].filter(Boolean).join(" · ")),
     );
     this.replaceChildren(
       h(
@@ -66,12 +66,12 @@ export class JobPanel extends LiveElement {
   #stage(job, stage) {
     const value = stage.state === "done" ? 1 : stage.name === job.stage ? job.stage_fraction : 0;
     const bar = h("progress", { value, max: 1, "aria-label": stage.name });
-    return h("li", {}, h("span", {}, stage.name), bar, h("span", { class: "muted" }, stage.state));
+    return h("li", { class: stage.state }, h("span", {}, stage.name), bar, h("span", { class: "state" }, stage.state));
   }
 
   /** @param {NonNullable<Job["error"]>} error */
   #error(error) {
-    return h("p", { role: "alert" }, h("strong", {}, error.message), error.hint ? ` — ${error.hint}` : "");
+    return h("p", { role: "alert", class: "failure" }, h("strong", {}, error.message), h("span", {}, error.hint ?? ""));
   }
 
   /**
@@ -80,10 +80,12 @@ export class JobPanel extends LiveElement {
    */
   #buttons(job, running) {
     const row = h("div", { class: "row" });
-    /** @type {(text: string, act: () => Promise<unknown>) => void} */
-    const add = (text, act) => row.append(h("button", { type: "button", onClick: () => act().catch(sayError) }, text));
+    /** @type {(text: string, act: () => Promise<unknown>, tone?: string) => void} */
+    const add = (text, act, tone = "") =>
+      row.append(h("button", { type: "button", class: tone, onClick: () => act().catch(sayError) }, text));
     if (running) add("Cancel", async () => (this.job = await cancelJob(job.id)));
-    if (["failed", "cancelled"].includes(job.state)) add("Try again", async () => (this.job = await retryJob(job.id)));
+    if (["failed", "cancelled"].includes(job.state))
+      add("Try again", async () => (this.job = await retryJob(job.id)), "primary");
     if (job.has_log) {
       add(this.#log.hidden ? "Show the log" : "Hide the log", async () => {
         this.#log.hidden = !this.#log.hidden;

@@ -4,6 +4,7 @@
  */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
+import { inkOn } from "../lib/colour.js";
 import { counted } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
@@ -84,6 +85,7 @@ export class ObjectList extends LiveElement {
       button.addEventListener("click", () => this.emit(type, id));
     }
     const badge = h("span", { class: "badge" }, String(number));
+    badge.style.color = inkOn(colourOf(object));
     const item = h(
       "li",
       { class: current ? "current" : "" },

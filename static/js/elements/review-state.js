@@ -13,6 +13,8 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").Figures} Figures */
 
 const TONES = { draft: "", ready: "", "in review": "warn", "changes requested": "bad", approved: "good" };
+/** How far on the way to approval each is. */
+const PLACES = { draft: 0, "changes requested": 0, ready: 1, "in review": 2, approved: 3 };
 
 /** @param {ReviewStatus["state"]} state */
 export function stateChip(state) {
@@ -59,7 +61,8 @@ export class ReviewState extends LiveElement {
    * @param {ReviewMove} move
    */
   #move(status, move) {
-    const button = h("button", { type: "button", class: move.unmet.length ? "" : "primary" }, move.text);
+    const onward = PLACES[move.to] > PLACES[status.state] && !move.unmet.length;
+    const button = h("button", { type: "button", class: onward ? "primary" : "" }, move.text);
     button.addEventListener("click", () => this.#step(status, move));
     const unmet = move.unmet.length
       ? h("ul", { class: "muted unmet" }, ...move.unmet.map((line) => h("li", {}, line)))

@@ -1,0 +1,29 @@
+/** Which of a light and a dark text is the better to read on a colour. */
+
+import { rgbOf } from "./masks.js";
+
+const DARK = "#10131a";
+const LIGHT = "#ffffff";
+
+/** @param {string} colour #rrggbb */
+export function inkOn(colour) {
+  const ground = luminance(colour);
+  return contrast(ground, luminance(LIGHT)) > contrast(ground, luminance(DARK)) ? LIGHT : DARK;
+}
+
+/** Relative luminance, 0 to 1 (WCAG 2.2). @param {string} colour */
+function luminance(colour) {
+  const [red = 0, green = 0, blue = 0] = rgbOf(colour).map((level) => {
+    const share = level / 255;
+    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+  });
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+}
+
+/**
+ * @param {number} a
+ * @param {number} b
+ */
+function contrast(a, b) {
+  return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+}

@@ -1,0 +1,76 @@
+/** A lane, drawn: a bar where an object has a mask, hatched where that is doubtful, a diamond at each click, a line where one is. */
+
+import { runs } from "./lanes.js";
+
+/** @typedef {{ colour: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView frames are confidences by index */
+
+const DIAMOND = 5;
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {{ width: number, height: number }} size it is shown at; asked once for all lanes, as a scrub draws them again and again
+ * @param {LaneView} lane
+ * @param {number[]} indices of the recording's frames
+ * @param {number} position of the frame that is shown
+ * @param {string} ink
+ */
+export function drawLane(canvas, { width, height }, lane, indices, position, ink) {
+  const context = canvas.getContext("2d");
+  if (!context || !width) return;
+  canvas.width = Math.round(width * devicePixelRatio);
+  canvas.height = Math.round(height * devicePixelRatio);
+  context.scale(devicePixelRatio, devicePixelRatio);
+  const step = width / Math.max(indices.length, 1);
+  const middle = height / 2;
+  context.globalAlpha = 0.18;
+  context.fillStyle = lane.colour;
+  context.fillRect(0, middle - 1, width, 2);
+  context.globalAlpha = lane.current ? 1 : 0.75;
+  const hatched = hatch(context, lane.colour);
+  for (const { from, to, doubtful } of runs(indices.map((index) => lane.frames.get(index)))) {
+    context.fillStyle = doubtful ? hatched : lane.colour;
+    context.fillRect(from * step, 2, Math.max((to - from) * step, 1), height - 4);
+  }
+  context.globalAlpha = 1;
+  indices.forEach((index, k) => lane.prompts.has(index) && drawDiamond(context, (k + 0.5) * step, middle));
+  context.fillStyle = ink;
+  context.fillRect((position + 0.5) * step - 1, 0, 2, height);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} x
+ * @param {number} y
+ */
+function drawDiamond(context, x, y) {
+  context.beginPath();
+  context.moveTo(x, y - DIAMOND);
+  context.lineTo(x + DIAMOND, y);
+  context.lineTo(x, y + DIAMOND);
+  context.lineTo(x - DIAMOND, y);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.fill();
+  context.strokeStyle = "#10131a";
+  context.stroke();
+}
+
+/**
+ * Slanted lines in a colour.
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} colour
+ */
+function hatch(context, colour) {
+  const tile = new OffscreenCanvas(6, 6);
+  const drawn = tile.getContext("2d");
+  if (!drawn) return colour;
+  drawn.strokeStyle = colour;
+  drawn.lineWidth = 2;
+  for (const x of [-3, 3]) {
+    drawn.beginPath();
+    drawn.moveTo(x, 6);
+    drawn.lineTo(x + 6, 0);
+    drawn.stroke();
+  }
+  return context.createPattern(tile, "repeat") ?? colour;
+}
