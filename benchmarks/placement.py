@@ -97,7 +97,8 @@ def merged(result: Path, new: list[Trial], views: dict[str, object] | None = Non
         held = json.loads(result.read_text()) if result.exists() else {}
         code = source_key("align", "geometry", "model")
         known = held.get("trials", []) if held.get("code") == code else []
-        trials = sorted([*(Trial(**t) for t in known), *new], key=lambda t: t.number)
+        by_number = {t.number: t for t in [*(Trial(**t) for t in known), *new]}  # parts may overlap
+        trials = [by_number[number] for number in sorted(by_number)]
         if new or views:
             summary = {"code": code, "views": views or held.get("views"), **summarise(trials)}
             written = result.with_suffix(".part")
