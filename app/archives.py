@@ -32,10 +32,6 @@ def check_archive(path: Path, name: str, *, max_bytes: int, max_files: int) -> N
 def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, max_files: int) -> None:
     if not members:
         raise CaptureError("the archive is empty", hint="pack the recording's folder")
-    if len(members) > max_files:
-        raise CaptureError(
-            f"the archive holds {len(members)} files, at most {max_files} expected", hint="pack one recording only"
-        )
     total = sum(member.file_size for member in members)
     if total > max_bytes:
         raise CaptureError(
@@ -87,3 +83,17 @@ def _refuse_large_directory(path: Path, max_files: int) -> None:
         directory_bytes = int.from_bytes(tail[record + 40 : record + 48], "little") if record >= 0 else 0
     if directory_bytes > min(MAX_DIRECTORY_BYTES, max_files * 400):
         raise CaptureError("the archive's table of contents is implausibly large", hint="pack one recording only")
+    entries = _entries_at_most(path, max(size - directory_bytes - len(tail), 0))
+    if entries > max_files:
+        raise CaptureError(f"the archive holds {entries} files, at most {max_files} expected", hint="pack one recording only")
+
+
+def _entries_at_most(path: Path, start: int) -> int:
+    """How many entries a table of contents in the file's bytes from `start` on can have: each begins with its mark."""
+    mark, found, kept = b"PK\x01\x02", 0, b""
+    with path.open("rb") as handle:
+        handle.seek(start)
+        while piece := handle.read(1 << 20):
+            found += (kept + piece).count(mark)
+            kept = (kept + piece)[-3:]  # a mark that is cut in two; too short for one that was counted
+    return found

@@ -192,7 +192,7 @@ def huge_depth(good: Members, rng: random.Random) -> bytes:
     others = [
         some[: len(some) // 2],
         rng.randbytes(400),
-        lzfse.compress(bytes(64 << 20)),
+        _depth_bomb(),
         lzfse.compress(b"\0" * 7),
         b"bvx2" + b"\xff" * 60,
         b"bvx-" + struct.pack("<I", 2**32 - 1) + b"x" * 50,
@@ -200,6 +200,12 @@ def huge_depth(good: Members, rng: random.Random) -> bytes:
     ]
     chosen = rng.choice(others)
     return packed({name: chosen if name.endswith(".depth") else content for name, content in good.items()})
+
+
+@cache
+def _depth_bomb() -> bytes:
+    """64 MB of zeros in 40 kB of LZFSE."""
+    return lzfse.compress(bytes(64 << 20))
 
 
 def lying_table(good: Members, rng: random.Random) -> bytes:

@@ -140,16 +140,13 @@ class JobRows:
             session.add(row)
         self._tell_end(job_id)
 
-    def queue_again(self, job_id: int, why: str) -> bool:
-        """Wait for another try after its process vanished; False when that happened too often at the same place."""
+    def queue_again(self, job_id: int, why: str) -> None:
+        """Wait for another try after its process vanished."""
         with writing(self.engine) as session:
             row = job_row(session, job_id)
-            if row.attempts >= self.settings.job_attempts:
-                return False
             _set_waiting(session, row, "taken up again after its process ended early")
             _note(session, row, "state", f"{why}; taken up again")
         self.tell(job_id)
-        return True
 
     def give_back(self, job_id: int) -> None:
         """Wait for the next server: this one stops, and that is no failed try."""

@@ -8,6 +8,7 @@ import errno
 import logging
 import threading
 import time
+from collections import Counter
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ class Runner:
         self._threads: list[threading.Thread] = []
         self._workers: dict[int, Worker] = {}
         self._cancelled: set[int] = set()
+        self._deaths: Counter[int] = Counter()  # of a job's processes, since it last got further
         self._lock = threading.Lock()
 
     def start(self) -> None:
@@ -120,6 +122,7 @@ class Runner:
                     self._failed(job_id, failure)
                     return
                 self.rows.got_further(job_id, number + 1)
+                del self._deaths[job_id]
             self.rows.finish(job_id)
             self._forget(job_id)
         except ServerStops:
@@ -169,14 +172,13 @@ class Runner:
 
     def _failed(self, job_id: int, failure: dict[str, Any]) -> None:
         """Try again when its process vanished, unless that happened too often at the same place."""
-        if (
-            failure["kind"] == VANISHED
-            and not self._was_cancelled(job_id)
-            and self.rows.queue_again(job_id, failure["message"])
-        ):
-            self._wake.set()
-        else:
-            self._end(job_id, failure)
+        if failure["kind"] == VANISHED and not self._was_cancelled(job_id):
+            self._deaths[job_id] += 1  # a server that vanished is none of them
+            if self._deaths[job_id] < self.settings.job_attempts:
+                self.rows.queue_again(job_id, failure["message"])
+                self._wake.set()
+                return
+        self._end(job_id, failure)
 
     def _end(self, job_id: int, failure: dict[str, Any]) -> None:
         self.rows.end(job_id, "cancelled" if self._was_cancelled(job_id) else "failed", failure)
@@ -184,6 +186,7 @@ class Runner:
 
     def _forget(self, job_id: int) -> None:
         self._cancelled.discard(job_id)
+        del self._deaths[job_id]
 
     def _was_cancelled(self, job_id: int) -> bool:
         return job_id in self._cancelled

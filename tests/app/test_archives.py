@@ -24,6 +24,19 @@ def test_too_many_bytes_or_files_are_refused(tmp_path: Path) -> None:
         check_archive(write(tmp_path / "many.zip", *((f"{n}", b"") for n in range(101))), "it", **LIMITS)
 
 
+def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def list_them(_: Path) -> None:
+        raise AssertionError("each entry takes memory")
+
+    names = [f"{number:0{length}}" for number, length in enumerate([3, 200] * 300)]  # marks anywhere in what is read at once
+    path = write(tmp_path / "many.zip", *((name, b"") for name in names))
+    monkeypatch.setattr("app.archives.zipfile.ZipFile", list_them)
+    with pytest.raises(CaptureError, match="600 files, at most 599"):
+        check_archive(path, "it", max_bytes=1 << 20, max_files=599)
+    with pytest.raises(AssertionError, match="each entry"):
+        check_archive(path, "it", max_bytes=1 << 20, max_files=600)
+
+
 def test_an_encrypted_archive_is_refused(tmp_path: Path) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:

@@ -243,6 +243,24 @@ def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Calla
         assert (job["state"], job["error"]["kind"]) == ("failed", "interrupted")
 
 
+def test_a_job_that_lost_servers_survives_the_loss_of_a_process_too(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        folder = behave(web, project, segment="hang")
+        settings: Settings = web.settings
+    engine = open_engine(settings.database)
+    with writing(engine) as session:
+        session.add(Job(project_id=project, kind="run", state="running", created=time.time(), attempts=5))
+    engine.dispose()
+    with start() as web:
+        web.until(lambda: (folder / "hanging").exists())
+        (folder / "behave.json").unlink()
+        with reading(web.context.engine) as session:
+            (job,) = session.exec(select(Job).where(Job.kind == "run"))
+        os.killpg(job.worker_pid or 0, signal.SIGKILL)
+        assert web.job(job.id or 0, "done", "failed")["state"] == "done"
+
+
 SERVER = """
 import sys, uvicorn
 from pathlib import Path
