@@ -44,13 +44,14 @@ from app.services.context import Context
 from app.services.people import People
 from app.services.prompts import tell_object
 from app.services.uploads import forget_stopped
-from app.settings import Settings, shipped
+from app.settings import MEBIBYTE, Settings, shipped
 from app.viewer.client import Viewer
 from r2c2r_core.errors import R2C2RError
 
 _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
+MOST_BODY_BYTES = 16 * MEBIBYTE  # of what is read at once; routes that store a stream count its bytes themselves
 ROUTERS = (system, people, projects, uploads, prompts, proposals, jobs, reviews, states, scenes, media, viewer, live, pages)
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
@@ -77,6 +78,7 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
+        max_body_size=MOST_BODY_BYTES,
         responses={code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422, 429)},
     )
     for module in ROUTERS:

@@ -109,13 +109,15 @@ class JobRows:
             _set_progress(session, row, stage, fraction, progress, eta_s)
         self.tell(job_id)
 
-    def got_further(self, job_id: int, stages: int) -> None:
-        """So many stages are finished: what was tried in vain before does not count any more."""
+    def got_further(self, job_id: int, stages: int) -> bool:
+        """So many stages are finished; whether that is more than ever: what was tried in vain does not count any more."""
         with writing(self.engine) as session:
             row = job_row(session, job_id)
-            if stages > row.reached:
+            further = stages > row.reached
+            if further:
                 row.reached, row.attempts = stages, 1
                 session.add(row)
+        return further
 
     def finish(self, job_id: int) -> None:
         """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""

@@ -121,8 +121,8 @@ class Runner:
                 if failure is not None:
                     self._failed(job_id, failure)
                     return
-                self.rows.got_further(job_id, number + 1)
-                del self._deaths[job_id]
+                if self.rows.got_further(job_id, number + 1):
+                    del self._deaths[job_id]
             self.rows.finish(job_id)
             self._forget(job_id)
         except ServerStops:

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Request
 
 from app import schemas
 from app.deps import AdminCtx, Ctx
-from app.routes.numbers import Count, OptionalId
+from app.routes.numbers import STREAMED, Count, OptionalId
 from app.services import imports, projects, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
@@ -16,7 +16,7 @@ def list_projects(context: Ctx) -> list[schemas.Project]:
     return projects.list_projects(context)
 
 
-@router.post("/upload", operation_id="uploadProject", status_code=202)
+@router.post("/upload", operation_id="uploadProject", status_code=202, max_body_size=STREAMED)
 async def upload_project(context: Ctx, request: Request, filename: str, name: str | None = None) -> schemas.Project:
     """A new project from the request's body (the raw bytes of an .r3d or a zip); starts the import."""
     length = request.headers.get("content-length")

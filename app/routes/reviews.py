@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Request
 
 from app import schemas
 from app.deps import Ctx, ReviewerCtx
-from app.routes.numbers import RowId
+from app.routes.numbers import STREAMED, RowId
 from app.services import mesh_uploads, overlays, reviews
 
 Version = Annotated[int | None, Query(ge=0)]
@@ -26,7 +26,7 @@ def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.Candida
     return reviews.group(context, project, object)
 
 
-@router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201)
+@router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201, max_body_size=STREAMED)
 async def upload_candidate(
     context: ReviewerCtx,
     request: Request,

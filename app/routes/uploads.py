@@ -6,6 +6,7 @@ from fastapi import APIRouter, Header, Request, Response
 
 from app import schemas
 from app.deps import Ctx
+from app.routes.numbers import STREAMED
 from app.services import uploads
 
 router = APIRouter(prefix="/api/uploads", tags=["uploads"])
@@ -34,7 +35,7 @@ def upload_offset(context: Ctx, upload: str) -> Response:
     return Response(headers={"upload-offset": str(found.offset), "upload-length": str(found.size)})
 
 
-@router.patch("/{upload}", operation_id="continueUpload", status_code=204)
+@router.patch("/{upload}", operation_id="continueUpload", status_code=204, max_body_size=STREAMED)
 async def continue_upload(context: Ctx, request: Request, upload: str, offset: Offset) -> Response:
     """Bytes from Upload-Offset on; 409 with the right offset in `current` when they do not fit."""
     reached = await uploads.append(context, upload, offset, request.stream())

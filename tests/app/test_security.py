@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -136,6 +136,20 @@ def test_every_answer_carries_the_safe_headers(web: Running) -> None:
         assert "script-src 'self';" in policy
         assert "unsafe" not in policy
         assert "frame-ancestors 'self'" in policy
+
+
+def test_what_is_read_at_once_is_bounded_also_for_strangers(web: Running) -> None:
+    def pieces() -> Iterator[bytes]:
+        yield from (b"x" * (1 << 20) for _ in range(20))
+
+    known = {"content-type": "application/json"}
+    stranger = fresh(web, headers={"X-Requested-With": "tests"})
+    for client, path in ((stranger, "/api/login"), (web.client, "/api/projects/sample"), (web.client, "/api/uploads")):
+        for content in (pieces(), b"x" * (20 << 20)):  # without and with an announced length
+            assert client.post(path, content=content, headers=known).status_code == 413, path
+    upload = web.post("/api/uploads", {"file_name": "a", "size": 40 << 20}, 201)["id"]
+    sent = web.client.patch(f"/api/uploads/{upload}", content=b"x" * (20 << 20), headers={"Upload-Offset": "0"})
+    assert sent.headers["upload-offset"] == str(20 << 20)
 
 
 ESCAPES = (
