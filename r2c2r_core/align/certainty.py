@@ -18,6 +18,8 @@ from r2c2r_core.model.track import FrontPanel
 
 _SIGMAS = 2.0
 _CONFIDENCE = 0.975  # one-sided, of two standard deviations
+_FULL_FRAMES = 9  # the weights of points and outlines count as many independent readings as so many frames give
+_KNOWN_FRAMES = 3  # by how much frames differ is known from other objects as well as from so many frames of this one
 _LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
 
 
@@ -50,8 +52,9 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
 
     A mask's outline and a depth frame are wrong over whole stretches, so their pixels are no independent readings. What
     that makes of the pose is seen by leaving out one frame at a time (the jackknife, one Newton step for each), and is
-    widened by Student's t: two frames that agree by chance say little. The normal matrix is inverted as a whole: a turn
-    that a shift makes up for counts as free.
+    widened by Student's t: two frames that agree by chance say little. What all frames are wrong by alike is not seen so;
+    the fewer they are, the more of it there is. The normal matrix is inverted as a whole: a turn that a shift makes up for
+    counts as free.
     """
     joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
     jacobian = joined.jacobian * unit
@@ -63,11 +66,11 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
         own = joined.frame_index == frame
         rest = normal - weighted[own].T @ jacobian[own]
         steps.append(-np.linalg.solve(rest, pull - weighted[own].T @ joined.residual[own]))
-    noise = np.linalg.inv(normal)
+    noise = np.linalg.inv(normal) * max(1.0, _FULL_FRAMES / max(len(steps), 1))
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)
-    widened = float(stdtrit(len(steps) - 1, _CONFIDENCE) / ndtri(_CONFIDENCE))
+    widened = float(stdtrit(len(steps) - 1 + _KNOWN_FRAMES, _CONFIDENCE) / ndtri(_CONFIDENCE))
     return np.asarray(noise + widened**2 * (len(steps) - 1) / len(steps) * apart.T @ apart)
 
 
