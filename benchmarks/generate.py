@@ -190,13 +190,14 @@ def _ranked(kitchen: Kitchen) -> list[dict[str, Any]]:
 
 def _judged(capture: Capture, track: MaskTrack, solid: Any) -> dict[str, Any]:
     evidence = gather_evidence(capture, track, GenerateConfig().pool_frames)
+    generator = Completion()
     assets, overlaps, errors = [], [], []
     for k in range(COUNT):
         try:
-            shape, metrics = Completion().measured(evidence, f"c{k}", 0)
+            shape, metrics, assumes = generator.measured(evidence, f"c{k}", 0)
         except R2C2RError:
             continue
-        assets.append(_asset(track.name, f"c{k}", metrics))
+        assets.append(_asset(track.name, f"c{k}", metrics, assumes))
         overlaps.append(overlap(solid.recentred(shape.vertices_world), shape.faces, solid))
         errors.append(100 * solid.extents_error(shape.vertices_world))
     by_id = {asset.candidate_id: k for k, asset in enumerate(assets)}
@@ -213,6 +214,7 @@ def _judged(capture: Capture, track: MaskTrack, solid: Any) -> dict[str, Any]:
     for rule, k in picks.items():
         row |= {rule: overlaps[k], f"{rule}_error": errors[k]}
     row["correlation"] = _rank_correlation(order, overlaps)
+    row["ranked"] = [(assets[k].assumes, overlaps[k]) for k in order]
     return row
 
 
@@ -225,7 +227,7 @@ def _rank_correlation(order: list[int], overlaps: list[float]) -> float:
     return float(np.corrcoef(place, true_place)[0, 1])
 
 
-def _asset(name: str, candidate_id: str, metrics: dict[str, float]) -> MeshAsset:
+def _asset(name: str, candidate_id: str, metrics: dict[str, float], assumes: str = "") -> MeshAsset:
     """What the choice reads of a candidate; its picture is not needed to judge its shape."""
     nothing = TexturedMesh(
         vertices=np.zeros((0, 3)),
@@ -244,11 +246,12 @@ def _asset(name: str, candidate_id: str, metrics: dict[str, float]) -> MeshAsset
         metrics=metrics,
         parameters={},
         warnings=(),
+        assumes=assumes,
     )
 
 
 def _shape_only(asset: MeshAsset) -> MeshAsset:
-    shape = {name: value for name, value in asset.metrics.items() if name not in ("mask_iou", "depth_residual_m")}
+    shape = {name: asset.metrics[name] for name in ("extent_middle", "extent_short", "volume_ratio")}
     return _asset(asset.object_name, asset.candidate_id, shape)
 
 

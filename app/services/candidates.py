@@ -1,5 +1,6 @@
 """What was made for each object: candidates with their evidence, the choice, and what people said about them."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services.context import Context
 from r2c2r_core.overrides import MOST_BATCHES
+from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.workspace import Workspace
 
 
@@ -26,7 +28,7 @@ def group_of(context: Context, session: Session, project: Project, item: SceneOb
     verdicts = {v.candidate: v for v in session.exec(select(Verdict).where(col(Verdict.object_id) == item.id))}
     accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
     stacks = history.stacks_of(session, project.id, item.id, "review")
-    placement = _placement_facts(files, item.name)
+    placement = _facts(files, "align", item.name, plain)
     by_person: str | None = override.get("candidate")
     known = {c["candidate_id"] for c in facts["candidates"]}
     chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
@@ -88,30 +90,32 @@ def override_shape(data: dict[str, Any]) -> schemas.OverrideData:
 
 def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:
     """The candidates as JSON, without their meshes."""
-    path = files.work / "nouns" / "generate" / f"{name}.noun"
-    return _candidates_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
+    return _facts(files, "generate", name, _candidate_facts)
 
 
-@lru_cache(maxsize=128)
-def _candidates_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
-    found = Workspace(work).load_latest("generate", name)
-    if found is None:
-        return None
+def _candidate_facts(found: CandidateSet) -> dict[str, Any]:
     kept = ("candidate_id", "generator", "seed", "watertight", "frames", "metrics", "parameters", "warnings")
     candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
     about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
     return {**about, "candidates": candidates}
 
 
-def _placement_facts(files: ProjectFiles, name: str) -> dict[str, Any] | None:
-    path = files.work / "nouns" / "align" / f"{name}.noun"
-    return _placement_at(path, path.stat().st_mtime_ns, files.work, name) if path.is_file() else None
+def _facts(files: ProjectFiles, stage: str, name: str, told: Callable[[Any], dict[str, Any]]) -> dict[str, Any] | None:
+    """What `told` says of an object's noun, read once for every version of its file; None where it has none."""
+    path = Workspace(files.work).noun_path(stage, name)
+    try:
+        changed = path.stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+    return _facts_at(path, changed, files.work, stage, name, told)
 
 
 @lru_cache(maxsize=256)
-def _placement_at(path: Path, _changed: int, work: Path, name: str) -> dict[str, Any] | None:
-    found = Workspace(work).load_latest("align", name)
-    return plain(found) if found is not None else None
+def _facts_at(
+    _path: Path, _changed: int, work: Path, stage: str, name: str, told: Callable[[Any], dict[str, Any]]
+) -> dict[str, Any] | None:
+    found = Workspace(work).load_latest(stage, name)
+    return None if found is None else told(found)
 
 
 def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
@@ -125,5 +129,5 @@ def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
 
 def generate_key(files: ProjectFiles, name: str) -> str:
     """Changes whenever the object's candidates do."""
-    path = files.work / "nouns" / "generate" / f"{name}.noun"
+    path = Workspace(files.work).noun_path("generate", name)
     return f"{path.stat().st_mtime_ns:x}" if path.is_file() else "0"

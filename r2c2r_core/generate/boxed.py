@@ -1,103 +1,143 @@
 """Furniture fronts and appliances: a box with flat faces, its front on the measured plane, with handle and relief."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
+from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, View, masked_points
-from r2c2r_core.generate.priors import DepthBehind, category_depth, depth_behind
+from r2c2r_core.generate.hypothesis import Hypothesis
+from r2c2r_core.generate.priors import DepthBehind, DepthSource, category_depth, depths_behind, distinct, next_sizes
 from r2c2r_core.generate.rear_edge import rear_edge
-from r2c2r_core.generate.relief import BoxPart, find_steps, handle_parts, measure_heights, measured_protrusion
+from r2c2r_core.generate.relief import NO_RELIEF, BoxPart, Relief, handle_parts, measure_relief
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.model.track import FrontHandle, FrontPanel, ThingBox
+from r2c2r_core.model.track import FrontPanel, ThingBox
 
+HandleStyle = Literal["bar", "block", "none"]
+
+_TOLD: dict[DepthSource, str] = {
+    "seen": "{:.2f} m deep, as its sides show",
+    "points": "{:.2f} m deep, as far as its points reach",
+    "wall": "{:.2f} m deep, to the wall behind it",
+    "worktop": "{:.2f} m deep, as the worktop on it",
+    "category": "{:.2f} m deep, as its kind usually is",
+    "catalogue": "{:.2f} m deep, the next size sold",
+}
+_HANDLE_ERROR: dict[HandleStyle, float] = {"bar": 0.0, "block": 0.25, "none": 1.0}  # of its protrusion
 _FRONT_ZONE_M = 0.03  # faces this near to the outer face belong to the front
 _LEAST_FACE_POINTS = 200
+_MOST_HIDDEN = 0.6  # of a category's depth: sides that end before it are seen in part only
 _LOOKED_AT = 0.3  # cosine: a face seen at a flatter angle is not measured
 
 
-def front_shape(evidence: Evidence, variation: Variation) -> Shape:
-    """A front's panel extruded to the wall or its category's depth; frame `front`."""
+def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
+    """A front's panel extruded to each depth it may have, with its handle and without; frame `front`."""
     track, front = evidence.track, evidence.track.front
     if front is None:
         raise GenerationFailed(f"{track.name}: no front rectangle was measured", hint="add a click that faces it")
-    behind = depth_behind(evidence.capture, front.world_from_front, front.width_m, front.height_m, track.category)
-    depth = _assumed_depth(behind, variation)
-    low = np.array([-front.width_m / 2, 0.0, -front.height_m / 2])
-    high = np.array([front.width_m / 2, depth, front.height_m / 2])
-    shape = _box_with_front(BoxPart(low, high), front.world_from_front, front, variation)
-    centres_y = shape.vertices_local[shape.faces][:, :, 1].max(axis=1)
-    return replace(shape, maskable=centres_y < _FRONT_ZONE_M, parameters={**shape.parameters, "depth_m": depth})
+    known = depths_behind(evidence.capture, front.world_from_front, front.width_m, front.height_m, track.category)
+    depths = distinct([*known, *next_sizes(known[0].depth_m)])
+    relief = cache(partial(measure_relief, front))  # the guesses of one draw share it
+
+    def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
+        depth = _varied(behind, variation)
+        low = np.array([-front.width_m / 2, 0.0, -front.height_m / 2])
+        high = np.array([front.width_m / 2, depth, front.height_m / 2])
+        made = _box_with_relief(BoxPart(low, high), front.world_from_front, np.zeros(3), relief(variation), handle)
+        at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < _FRONT_ZONE_M
+        error = abs(depth - depths[0].depth_m) + _handle_error(relief(variation), handle)
+        return replace(made, maskable=at_front, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
+
+    return _depths_and_handles(depths, front, shape)
 
 
-def appliance_shape(evidence: Evidence, variation: Variation) -> Shape:
-    """An appliance's box, its seen faces measured again on these frames; frame `object`."""
+def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
+    """An appliance's box, its seen faces measured again, with each depth it may have; frame `object`."""
     track, box = evidence.track, evidence.track.box
     if box is None:
         raise GenerationFailed(f"{track.name}: no box was measured", hint="add a click on a frame that shows it whole")
-    world_from_local = box.world_from_object
-    low, high = _measured_box(box, variation)
-    if track.front is not None:
-        low[1] = float(world_from_local.inverse.apply(track.front.world_from_front.translation[None])[0, 1])
-    high[1] = rear_edge(low, high, evidence.pool, world_from_local)
-    high[1] = low[1] + _appliance_depth(evidence, variation, box, float(high[1] - low[1]))
-    return _box_with_front(BoxPart(low, high), world_from_local, _local_front(track.front, box), variation)
+    front = _local_front(track.front, box)
+    corners = cache(partial(_measured_box, evidence, box))
+    relief = cache(partial(measure_relief, front)) if front is not None else None
+    depths = _appliance_depths(evidence, box, *corners(everything))
+
+    def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
+        low, high = (corner.copy() for corner in corners(variation))
+        high[1] = low[1] + _varied(behind, variation)
+        found = relief(variation) if relief is not None else NO_RELIEF
+        at = box.world_from_object.inverse.apply(front.world_from_front.translation[None])[0] if front is not None else low
+        made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
+        return replace(made, unseen_error_m=abs(float(high[1] - low[1]) - depths[0].depth_m) + _handle_error(found, handle))
+
+    return _depths_and_handles(depths, front, shape)
 
 
-def _box_with_front(box: BoxPart, world_from_local: Rigid3, front: FrontPanel | None, variation: Variation) -> Shape:
-    """The box, with the handle and the steps of `front`; the front's own frame must be parallel to the local frame."""
-    added, removed = [box], []
-    parameters = {}
-    if front is not None:
-        points = [front.world_from_front.inverse.apply(masked_points(v, variation.erosion_px)) for v in variation.views]
-        footprint = _depth_footprint(variation.views, front.world_from_front.translation)
-        heights = measure_heights(points, front.width_m, front.height_m, max(0.006, 1.5 * footprint))
-        raised, sunk = find_steps(heights, front.handle)
-        pieces = raised
-        if front.handle is not None:
-            handle = replace(front.handle, protrusion_m=measured_protrusion(heights, front.handle, footprint))
-            pieces = [*raised, *handle_parts(_plausible(handle), as_bar=variation.carve_votes > 1)]
-        offset = world_from_local.inverse.apply(front.world_from_front.translation[None])[0]
-        added += [BoxPart(part.low + offset, part.high + offset) for part in pieces]
-        removed = [BoxPart(part.low + offset, part.high + offset) for part in sunk]
-        parameters = {"raised_steps": float(len(raised)), "sunk_steps": float(len(sunk))}
-    vertices, faces = unite([box_mesh(*part) for part in added], [box_mesh(*part) for part in removed])
+def _depths_and_handles(
+    depths: Sequence[DepthBehind], front: FrontPanel | None, shape: Callable[[DepthBehind, HandleStyle, Variation], Shape]
+) -> tuple[Hypothesis, ...]:
+    """The most trusted depth with each style of handle, and the other depths, by turns."""
+    style: HandleStyle = "bar" if front is not None and front.handle is not None else "none"
+    others = [Hypothesis(_TOLD[b.source].format(b.depth_m), partial(shape, b, style)) for b in depths]
+    if style == "none":
+        return tuple(others)
+    best = depths[0]
+    styles: tuple[tuple[str, HandleStyle], ...] = (("its handle apart", "none"), ("its handle a block", "block"))
+    handles = [Hypothesis(told, partial(shape, best, other)) for told, other in styles]
+    return (*others[:2], handles[0], *others[2:], handles[1])
+
+
+def _box_with_relief(box: BoxPart, world_from_local: Rigid3, at: Vector3, relief: Relief, handle: HandleStyle) -> Shape:
+    """The box, with the handle and the steps of a front whose middle is `at`; its frame must be parallel to the local one."""
+    added = [
+        *relief.raised,
+        *(handle_parts(relief.handle, as_bar=handle == "bar") if relief.handle and handle != "none" else ()),
+    ]
+    parts = [box, *(BoxPart(part.low + at, part.high + at) for part in added)]
+    removed = [box_mesh(part.low + at, part.high + at) for part in relief.sunk]
+    vertices, faces = unite([box_mesh(*part) for part in parts], removed)
     return Shape(
         vertices_local=vertices,
         faces=faces,
         world_from_local=world_from_local,
         front_y_m=float(box.low[1]),
         maskable=np.ones(len(faces), dtype=bool),
-        parameters=parameters,
+        parameters={"raised_steps": float(len(relief.raised)), "sunk_steps": float(len(relief.sunk))},
         warnings=(),
     )
 
 
-def _assumed_depth(behind: DepthBehind, variation: Variation) -> float:
-    """A measured wall is varied little, a category's depth by its full spread."""
-    spread = 0.2 if behind.source == "wall" else 1.0
+def _handle_error(relief: Relief, style: HandleStyle) -> float:
+    """How far a handle in that style is from a usual one of what was seen: hands reach behind it."""
+    return 0.0 if relief.handle is None else _HANDLE_ERROR[style] * relief.handle.protrusion_m
+
+
+def _varied(behind: DepthBehind, variation: Variation) -> float:
+    """A depth that the scan shows is varied little, a usual one by its full spread."""
+    spread = {"seen": 0.0, "points": 0.0, "wall": 0.2}.get(behind.source, 1.0)
     return behind.depth_m * (1.0 + spread * (variation.depth_scale - 1.0))
 
 
-def _appliance_depth(evidence: Evidence, variation: Variation, box: ThingBox, measured_m: float) -> float:
-    """The measured depth where a side shows it; the category's or the wall's where only the front was seen."""
-    usual = category_depth(evidence.track.category)
-    if measured_m > 0.6 * usual and _side_seen(box, variation.views):
-        return measured_m
-    rear = Rigid3(
-        box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, -float(box.dimensions_m[1]) / 2, 0.0]]))[0]
-    )
-    width, _, height = (float(v) for v in box.dimensions_m)
-    behind = depth_behind(evidence.capture, rear, width, height, evidence.track.category)
-    return max(_assumed_depth(behind, variation), measured_m)
+def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[DepthBehind, ...]:
+    """The depth its sides show, where they were seen; else what furniture may have, but no less than was seen."""
+    category = evidence.track.category
+    width, thought, height = (float(v) for v in box.dimensions_m)
+    end = rear_edge(low, high, evidence.pool, box.world_from_object)
+    measured = end - float(low[1])
+    front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, float(low[1]), 0.0]]))[0])
+    assumed = depths_behind(evidence.capture, front, width, height, category)
+    if measured > _MOST_HIDDEN * category_depth(category) and _side_seen(box, evidence.pool):
+        return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "points"), *assumed])
+    return distinct([b._replace(depth_m=max(b.depth_m, measured)) for b in assumed])
 
 
-def _measured_box(box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:
+def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:
     """Corners of the box in its own frame, each face that cameras look at moved to the median of its points."""
     half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
     low, high = -half, half.copy()
@@ -108,6 +148,8 @@ def _measured_box(box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3
             if len(points) >= _LEAST_FACE_POINTS:
                 limit = 0.04 * 2 * half[axis]
                 corner[axis] += float(np.clip(np.median(points) - corner[axis], -limit, limit))
+    if evidence.track.front is not None:
+        low[1] = float(box.world_from_object.inverse.apply(evidence.track.front.world_from_front.translation[None])[0, 1])
     return low, high
 
 
@@ -142,14 +184,3 @@ def _local_front(front: FrontPanel | None, box: ThingBox) -> FrontPanel | None:
     if turn[1, 1] < np.cos(np.radians(15.0)):
         return None
     return replace(front, world_from_front=Rigid3(box.world_from_object.rotation, front.world_from_front.translation))
-
-
-def _depth_footprint(views: tuple[View, ...], target_world: Vector3) -> float:
-    """Size of a depth pixel on the object, metres, at the median distance."""
-    sizes = [float(np.linalg.norm(v.eye_world - target_world)) / v.depth_camera.fx for v in views]
-    return float(np.median(sizes))
-
-
-def _plausible(handle: FrontHandle) -> FrontHandle:
-    """Hands need 1 cm to 9 cm."""
-    return replace(handle, protrusion_m=float(np.clip(handle.protrusion_m, 0.01, 0.09)))

@@ -1,19 +1,22 @@
 """The weight-free generator: what was seen, at LiDAR noise, completed by symmetry, to the wall or to the category's depth."""
 
 import zlib
+from typing import NamedTuple
 
 import numpy as np
 
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.asset import shape_metrics, unposed
 from r2c2r_core.generate.bake import bake
-from r2c2r_core.generate.boxed import appliance_shape, front_shape
+from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import Evidence
+from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.shape import Shape
-from r2c2r_core.generate.things import thing_shape
-from r2c2r_core.generate.variation import Variation, draw_variation
+from r2c2r_core.generate.standing import stands
+from r2c2r_core.generate.things import thing_hypotheses
+from r2c2r_core.generate.variation import Variation, draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.model.mesh import MeshAsset
 
@@ -24,21 +27,24 @@ _JUDGES = 8  # views that judge every candidate of an object alike
 
 
 class Completion:
-    """Boxes for furniture, carved solids for things."""
+    """Boxes for furniture, clean solids or carved ones for things."""
+
+    def __init__(self) -> None:
+        self._known: _Known | None = None
 
     def make(self, evidence: Evidence, candidate_id: str, seed: int) -> MeshAsset:
-        """One candidate from a random subset of the good frames and random parameters."""
-        rng = _generator(evidence, candidate_id, seed)
-        variation = draw_variation(evidence, rng)
-        shape = _solid_shape(evidence, variation, candidate_id)
-        atlas = _cut_open(shape)
+        """One candidate: one of the hypotheses about what nobody saw, from all good frames; once these are told, from some."""
+        guess = self._guess(evidence, candidate_id, seed)
+        atlas = _cut_open(guess.shape)
+        shape, variation = guess.shape, guess.variation
         # a bare side may show in a few frames only, so furniture is pictured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
+        turned = _generator(evidence, candidate_id, seed)
         picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m)
         return MeshAsset(
             object_name=evidence.track.name,
             candidate_id=candidate_id,
-            mesh=unposed(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture, rng),
+            mesh=unposed(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture, turned),
             generator="completion",
             seed=seed,
             watertight=True,
@@ -46,42 +52,76 @@ class Completion:
             metrics={**_metrics(shape, evidence), "seen_fraction": picture.seen_fraction},
             parameters={**variation.parameters, **shape.parameters},
             warnings=shape.warnings,
+            assumes=guess.assumes,
         )
 
-    def measured(self, evidence: Evidence, candidate_id: str, seed: int) -> tuple[Shape, dict[str, float]]:
-        """The same candidate where it stands, without a picture, and its measures."""
-        variation = draw_variation(evidence, _generator(evidence, candidate_id, seed))
-        shape = _solid_shape(evidence, variation, candidate_id)
-        return shape, _metrics(shape, evidence)
+    def measured(self, evidence: Evidence, candidate_id: str, seed: int) -> tuple[Shape, dict[str, float], str]:
+        """The same candidate where it stands, without a picture, its measures, and what it assumes."""
+        guess = self._guess(evidence, candidate_id, seed)
+        return guess.shape, _metrics(guess.shape, evidence), guess.assumes
+
+    def _guess(self, evidence: Evidence, candidate_id: str, seed: int) -> "_Guess":
+        """The candidate's shape, closed; raises GenerationFailed."""
+        known = self._hypotheses(evidence)
+        turn, place = divmod(int(candidate_id.removeprefix("c")), len(known.hypotheses))
+        hypothesis = known.hypotheses[place]
+        variation = known.draw(turn, seed)
+        shape = hypothesis.shape(variation)
+        if not _is_solid(shape):
+            raise GenerationFailed(f"{evidence.track.name}: candidate {candidate_id} did not close")
+        return _Guess(shape, variation, hypothesis.assumes)
+
+    def _hypotheses(self, evidence: Evidence) -> "_Known":
+        """Found once for all candidates of an object, and kept until the next object's turn."""
+        if self._known is None or self._known.evidence is not evidence:
+            everything = whole_pool(evidence)
+            self._known = _Known(evidence, everything, _hypotheses_of(evidence, everything), {})
+        return self._known
 
 
-def _generator(evidence: Evidence, candidate_id: str, seed: int) -> np.random.Generator:
-    """Randomness of one candidate of one object."""
-    return np.random.default_rng([seed, zlib.crc32(evidence.track.name.encode()), zlib.crc32(candidate_id.encode())])
+class _Known(NamedTuple):
+    evidence: Evidence
+    everything: Variation  # every good frame, and the middle of each range
+    hypotheses: tuple[Hypothesis, ...]
+    draws: dict[tuple[int, int], Variation]
+
+    def draw(self, turn: int, seed: int) -> Variation:
+        """The frames and settings that all hypotheses share in one turn: at first every good frame, later some."""
+        if turn == 0 and seed == 0:
+            return self.everything
+        if (turn, seed) not in self.draws:
+            self.draws[turn, seed] = draw_variation(self.evidence, _generator(self.evidence, f"turn {turn}", seed))
+        return self.draws[turn, seed]
 
 
-def _solid_shape(evidence: Evidence, variation: Variation, candidate_id: str) -> Shape:
-    """The shape, closed; raises GenerationFailed."""
-    shape = _make_shape(evidence, variation)
-    if not _is_solid(shape):
-        raise GenerationFailed(f"{evidence.track.name}: candidate {candidate_id} did not close")
-    return shape
+class _Guess(NamedTuple):
+    shape: Shape
+    variation: Variation
+    assumes: str
+
+
+def _generator(evidence: Evidence, purpose: str, seed: int) -> np.random.Generator:
+    """Randomness for one purpose of one object."""
+    return np.random.default_rng([seed, zlib.crc32(evidence.track.name.encode()), zlib.crc32(purpose.encode())])
 
 
 def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
-    """Scale-free measures, and how the shape fits the masks and depth of the frames that judge all candidates alike."""
+    """Scale-free measures, and how the shape fits what is known: masks and depth of the frames that judge all alike."""
     fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
-    return {**shape_metrics(shape.vertices_local, shape.faces), **fit}
+    unseen = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
+    if evidence.track.kind == "thing":  # furniture hangs on its wall
+        unseen["stands"] = float(stands(shape.vertices_world, shape.faces))
+    return {**shape_metrics(shape.vertices_local, shape.faces), **fit, **unseen}
 
 
-def _make_shape(evidence: Evidence, variation: Variation) -> Shape:
-    """The shape by what the segmenter found; a front or appliance without its measures is treated as a thing."""
+def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
+    """By what the segmenter found; a front or appliance without its measures is treated as a thing."""
     track = evidence.track
     if track.kind == "front" and track.front is not None:
-        return front_shape(evidence, variation)
+        return front_hypotheses(evidence)
     if track.kind == "appliance" and track.box is not None:
-        return appliance_shape(evidence, variation)
-    return thing_shape(evidence, variation)
+        return appliance_hypotheses(evidence, everything)
+    return thing_hypotheses(evidence, everything)
 
 
 def _cut_open(shape: Shape) -> Atlas:

@@ -5,9 +5,13 @@ backends.md §2.6: the candidates come in frames and units of their own, so the 
 longest, filled share of the box); and the mean follows outliers (solid IoU 0.734, no better than a random pick), so the
 default is the medoid (0.780), joined with the candidates' own consistency with masks and depth (0.783).
 
-Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m, faces. Masks and
-depth are unknown for a mesh whose generator does not know its place, until it was placed (pipeline.py does that); without
-them it is judged by its shape alone. An open mesh, or one with more faces than a simulator likes, has to fit better to win.
+A candidate that says what it assumes differs from the others on purpose: being odd does not count against it, only what the
+scan says does; of a side that nobody saw that is the wall behind it, the worktop on it or what is usual.
+
+Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m, unseen_error_m,
+stands, faces. Masks and depth are unknown for a mesh whose generator does not know its place, until it was placed
+(pipeline.py does that); without them it is judged by its shape alone. What would fall over, an open mesh, or one with more
+faces than a simulator likes, has to fit better to win.
 """
 
 from collections.abc import Sequence
@@ -23,7 +27,9 @@ Rule = Literal["medoid", "mean"]
 
 _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
 _DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
+_UNSEEN_WEIGHT = 1.0  # per metre: half of an error that was seen
 _OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
+_FALLS_COST = 0.1  # what would tip over was not found standing
 _MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
 
 
@@ -35,7 +41,8 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
         raise GenerationFailed(f"{name}: every candidate was rejected", hint="take one back, upload a mesh or change the seed")
     oddness = _oddness(candidates, allowed, rule)
     doubt = _doubt(candidates)
-    cost = oddness + doubt + _flaws(candidates)
+    by_chance = np.array([not c.assumes or rule == "mean" for c in candidates])
+    cost = np.where(by_chance, oddness, 0.0) + doubt + _flaws(candidates)
     order = sorted(range(len(candidates)), key=lambda i: (i not in allowed, round(float(cost[i]), 12), i))
     best = order[0]
     return CandidateSet(
@@ -71,7 +78,10 @@ def _oddness(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule
 def _doubt(candidates: Sequence[MeshAsset]) -> np.ndarray:
     """Disagreement with masks and depth; where unknown, the median of the candidates that know theirs."""
     known = [
-        1.0 - c.metrics["mask_iou"] + _DEPTH_WEIGHT * c.metrics.get("depth_residual_m", 0.0)
+        1.0
+        - c.metrics["mask_iou"]
+        + _DEPTH_WEIGHT * c.metrics.get("depth_residual_m", 0.0)
+        + _UNSEEN_WEIGHT * c.metrics.get("unseen_error_m", 0.0)
         if "mask_iou" in c.metrics
         else np.nan
         for c in candidates
@@ -82,10 +92,11 @@ def _doubt(candidates: Sequence[MeshAsset]) -> np.ndarray:
 
 
 def _flaws(candidates: Sequence[MeshAsset]) -> np.ndarray:
-    """What a mesh costs that later stages can use less well."""
+    """What a mesh costs that cannot be as it is, or that later stages can use less well."""
     faces = np.array([c.metrics.get("faces", 0.0) for c in candidates])
     heavy = _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0))
-    return np.asarray(heavy + [0.0 if c.watertight else _OPEN_COST for c in candidates])
+    falls = np.array([_FALLS_COST if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates])
+    return np.asarray(heavy + falls + [0.0 if c.watertight else _OPEN_COST for c in candidates])
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
@@ -110,10 +121,11 @@ def _reason(
     beside = _papers_choice(candidates, best, allowed, rule)
     middle = "mean" if rule == "mean" else "others"
     shape = f"its proportions differ {100 * oddness[best]:.1f} % from the {middle} of {count}{skipped}"
+    name = f"{chosen.candidate_id} ({chosen.assumes})" if chosen.assumes else chosen.candidate_id
     if "mask_iou" not in chosen.metrics:
-        return f"{chosen.candidate_id}: {shape}; its fit to masks and depth is known only after alignment{beside}."
+        return f"{name}: {shape}; its fit to masks and depth is known only after alignment{beside}."
     place = 1 + sum(1 for i in allowed if doubt[i] < doubt[best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
     fit = f"mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count})"
-    return f"{chosen.candidate_id}: {shape}, with {fit}{beside}."
+    return f"{name}: {shape}, with {fit}{beside}."

@@ -9,7 +9,6 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.generate.evidence import View
 from r2c2r_core.generate.symmetry import Revolution
-from r2c2r_core.generate.unmasked import with_unmasked_top, without_flared_foot
 from r2c2r_core.geometry.camera import project, sample_nearest, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 
@@ -43,7 +42,7 @@ def fit_lathe(
             return None
         profile, balance = measured
         current = profile._replace(centre=_balanced_centre(points, profile, balance, scale_m))
-    return with_unmasked_top(without_flared_foot(current, points), whole, world_from_local)
+    return current
 
 
 def is_round(points: Points, revolution: Revolution) -> bool:

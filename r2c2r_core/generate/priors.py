@@ -1,6 +1,7 @@
 """How deep furniture is when nobody sees it: the wall behind, else what its category usually measures."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -25,16 +26,26 @@ CATEGORY_DEPTH_M = {
 }
 """Outer face of the front to the back (EU catalogues, backends.md §2.6: carcass 0.56 + front 0.02; wall units 0.30-0.35)."""
 
+_DEPTHS_SOLD_M = (0.30, 0.37, 0.48, 0.58, 0.62, 0.75)
+"""Of cabinets with their fronts: carcasses of 28, 35, 46, 56, 60 and 73 cm are what most makers list."""
+
 _DEFAULT_DEPTH_M = 0.5
+_ALIKE_M = 0.015  # depths nearer to each other than this are one guess
 _WALL_RANGE = (0.75, 1.35)  # of the category's depth: a wall outside is another room's, or the front of the next run
 _WALL_GAP_M = 0.005
+_WORKTOP_ABOVE_M = 0.75  # a worktop lies this far at most above the middle drawer of its unit
+_ALONG_M, _LEVEL_M = 0.02, 0.01
+_GAP_BINS, _SHEET_FILL = 6, 0.7  # what stands on a worktop hides less of it
+
+
+DepthSource = Literal["seen", "points", "wall", "worktop", "category", "catalogue"]
 
 
 class DepthBehind(NamedTuple):
     """How far a front reaches back, and how that is known."""
 
     depth_m: float
-    source: str  # "wall" or "category"
+    source: DepthSource
 
 
 def category_depth(category: str) -> float:
@@ -45,14 +56,34 @@ def category_depth(category: str) -> float:
     return next((depth for name, depth in CATEGORY_DEPTH_M.items() if name in key), _DEFAULT_DEPTH_M)
 
 
-def depth_behind(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: str) -> DepthBehind:
-    """Depth from a front to the wall behind it where one stands at a plausible distance, else the category's depth."""
+def depths_behind(
+    capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: str
+) -> tuple[DepthBehind, ...]:
+    """The different depths a front may have, most trusted first.
+
+    To the wall behind it where one stands at a plausible distance; to where the worktop on it ends; as deep as its category
+    usually is; and the next depths that cabinets are sold in.
+    """
     usual = category_depth(category)
-    distances = [*_wall_distances(capture, world_from_front), *_surface_distances(capture, world_from_front, width_m, height_m)]
-    plausible = [d for d in distances if _WALL_RANGE[0] * usual <= d <= _WALL_RANGE[1] * usual]
-    if plausible:
-        return DepthBehind(min(plausible, key=lambda d: abs(d - usual)) - _WALL_GAP_M, "wall")
-    return DepthBehind(usual, "category")
+    near, far = (share * usual for share in _WALL_RANGE)
+    walls = [*_wall_distances(capture, world_from_front), *_surface_distances(capture, world_from_front, width_m, height_m)]
+    found = [DepthBehind(d - _WALL_GAP_M, "wall") for d in sorted(walls, key=lambda d: abs(d - usual))[:1] if near <= d <= far]
+    worktop = _worktop_end(capture, world_from_front, width_m, height_m, near)
+    if worktop is not None and worktop <= far:
+        found.append(DepthBehind(worktop, "worktop"))
+    return distinct([*found, DepthBehind(usual, "category")])
+
+
+def next_sizes(depth_m: float) -> tuple[DepthBehind, ...]:
+    """The next smaller and the next larger depth that cabinets are sold in."""
+    smaller = max((d for d in _DEPTHS_SOLD_M if d < depth_m - _ALIKE_M), default=None)
+    larger = min((d for d in _DEPTHS_SOLD_M if d > depth_m + _ALIKE_M), default=None)
+    return tuple(DepthBehind(d, "catalogue") for d in (smaller, larger) if d is not None)
+
+
+def distinct(depths: Sequence[DepthBehind]) -> tuple[DepthBehind, ...]:
+    """Without those that are about as deep as one before them."""
+    return tuple(b for k, b in enumerate(depths) if all(abs(b.depth_m - other.depth_m) > _ALIKE_M for other in depths[:k]))
 
 
 def _wall_distances(capture: Capture, world_from_front: Rigid3) -> list[float]:
@@ -80,3 +111,19 @@ def _surface_distances(capture: Capture, world_from_front: Rigid3, width_m: floa
     if len(at_peak) < 50 or np.ptp(at_peak[:, 2]) < 0.15 or np.ptp(at_peak[:, 0]) < 0.5 * width_m:
         return []
     return [float(np.median(at_peak[:, 1]))]
+
+
+def _worktop_end(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, least_m: float) -> float | None:
+    """Where the lowest level sheet above a front ends that begins over it, as a worktop does; None where none is seen."""
+    points = world_from_front.inverse.apply(capture.surface.vertices_world)
+    above = points[(points[:, 2] > height_m / 2 - 0.01) & (points[:, 2] < height_m / 2 + _WORKTOP_ABOVE_M)]
+    above = above[(np.abs(above[:, 0]) < width_m / 2) & (above[:, 1] > 0.0) & (above[:, 1] < 1.2)]
+    if len(above) < 50:
+        return None
+    cell = np.floor(above[:, 1:] / [_ALONG_M, _LEVEL_M]).astype(int)
+    for level in np.unique(cell[:, 1]):
+        bins = np.unique(cell[np.abs(cell[:, 1] - level) <= 1, 0])
+        end = int(bins[np.argmax(np.append(np.diff(bins) > _GAP_BINS, True))]) + 1
+        if bins[0] <= 1 and end * _ALONG_M >= least_m and np.count_nonzero(bins < end) > _SHEET_FILL * end:
+            return end * _ALONG_M
+    return None

@@ -4,13 +4,16 @@ Everything here is in a `front`-like frame: +X right, +Y into the furniture, +Z 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.model.track import FrontHandle
+from r2c2r_core.generate.evidence import View, masked_points
+from r2c2r_core.generate.variation import Variation
+from r2c2r_core.model.track import FrontHandle, FrontPanel
 
 _OVERLAP_M = 0.002  # pieces reach this far into the panel, so that the union is one solid
 _LEAST_STEP_M = 0.005
@@ -19,6 +22,7 @@ _DEEPEST_STEP_M = 0.04
 _BORDER_M = 0.015
 _LEAST_FILL = 0.75  # of its bounding rectangle that a step must cover
 _SIGMAS = 4.0
+_HAND_M = (0.01, 0.09)  # what hands need behind a handle, and what would be in the way
 
 
 class BoxPart(NamedTuple):
@@ -35,6 +39,29 @@ class HeightMap(NamedTuple):
     cell_m: float
     left_m: float
     bottom_m: float
+
+
+class Relief(NamedTuple):
+    """What stands out of a front or lies back in it, and its handle as depth has it."""
+
+    raised: Sequence[BoxPart]
+    sunk: Sequence[BoxPart]
+    handle: FrontHandle | None
+
+
+NO_RELIEF = Relief((), (), None)
+
+
+def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
+    """The relief of a front by the views of one draw, in the front's frame."""
+    points = [front.world_from_front.inverse.apply(masked_points(v, variation.erosion_px)) for v in variation.views]
+    footprint = _depth_footprint(variation.views, front.world_from_front.translation)
+    heights = measure_heights(points, front.width_m, front.height_m, max(0.006, 1.5 * footprint))
+    raised, sunk = find_steps(heights, front.handle)
+    if front.handle is None:
+        return Relief(raised, sunk, None)
+    protrusion = float(np.clip(measured_protrusion(heights, front.handle, footprint), *_HAND_M))
+    return Relief(raised, sunk, replace(front.handle, protrusion_m=protrusion))
 
 
 def measure_heights(views_points: Sequence[Points], width_m: float, height_m: float, cell_m: float) -> HeightMap:
@@ -185,3 +212,9 @@ def _handle_cells(heights: HeightMap, handle: FrontHandle | None, grow_m: float 
         return np.zeros(heights.height_m.shape, dtype=bool)
     beside = (x > handle.left_m - grow_m) & (x < handle.right_m + grow_m)
     return np.asarray(beside & (z > handle.bottom_m - grow_m) & (z < handle.top_m + grow_m))
+
+
+def _depth_footprint(views: Sequence[View], target_world: Vector3) -> float:
+    """Size of a depth pixel on the object, metres, at the median distance."""
+    sizes = [float(np.linalg.norm(v.eye_world - target_world)) / v.depth_camera.fx for v in views]
+    return float(np.median(sizes))

@@ -24,6 +24,12 @@ _FOOT, _BODY = 0.12, 0.35  # of the height: the foot, and the body above it
 _FLARE = 1.06
 
 
+def with_true_ends(revolution: Revolution, points: Points, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
+    """The body with its top and foot where depth has them: the very same one where depth says nothing else."""
+    whole = tuple(view for view in views if not view.is_cropped)
+    return with_unmasked_top(without_flared_foot(revolution, points), whole, world_from_local)
+
+
 def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
     """The body continued upwards for as long as most depth pixels on its axis are as near as the body."""
     bottom, top, widest = revolution.heights_m[0], revolution.heights_m[-1], float(revolution.radii_m.max())

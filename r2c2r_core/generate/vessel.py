@@ -27,7 +27,7 @@ _REACHES_M = np.arange(0.008, 0.06, 0.004)  # beyond the body: where a handle is
 _SPREAD = 4  # azimuths to either side of the clearest that are averaged
 _BESIDE = 1.08  # of the radius: a place that a frame sees past the body
 _LEAST_VIEWS, _SHOWN = 3, 0.5
-_BAR_M = 0.009
+_BAR_M, _BAR_SHARE = 0.009, 0.5  # how thick a handle's ring is; never more than this share of its radius
 _TALLEST = 0.36  # of the height: the radius of a handle's ring
 
 
@@ -113,12 +113,16 @@ def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
     middle = 0.55 * top + 0.45 * bottom
     radius = float(np.interp(middle, revolution.heights_m, revolution.radii_m))
     outer = min(_TALLEST * (top - bottom), radius)  # of a tall jug, a larger ring would come out on the other side
-    centre = radius + max(handle.reach_m - outer, -0.4 * outer)
+    bar = min(_BAR_M, _BAR_SHARE * outer)
+    stretch = max(1.0, (handle.reach_m / 2 + bar) / outer)  # of a flat pan, a round one would not touch the body
+    centre = radius + max(handle.reach_m - stretch * outer, -0.4 * outer)
     disc, hole = (
         lathe_mesh(Revolution(np.zeros(2), np.array([-half, half]), np.full(2, size)))
-        for half, size in ((_BAR_M / 2, outer), (_BAR_M, outer - _BAR_M))
+        for half, size in ((bar / 2, outer), (bar, outer - bar))
     )
     vertices, faces = unite([disc], [hole])
-    upright = np.column_stack([vertices[:, 0] + centre, -vertices[:, 2], vertices[:, 1]])  # its axis along the tangent
+    upright = np.column_stack(
+        [stretch * vertices[:, 0] + centre, -vertices[:, 2], vertices[:, 1]]
+    )  # its axis along the tangent
     turned = upright @ rotation_about_z(handle.azimuth_rad).T
     return turned + np.append(revolution.centre, middle), faces

@@ -20,6 +20,7 @@ class Votes(NamedTuple):
 
     distance_m: np.ndarray  # mean truncated distance to the seen surface; nan where none
     free_m: np.ndarray  # the k-th largest distance into free space; -inf where fewer than k frames see it free
+    surfaces: np.ndarray  # how many frames see a surface within the truncation
     outside_m: np.ndarray  # least distance outside any frame's mask, at most the truncation; positive: in no mask at all
 
 
@@ -46,7 +47,7 @@ def collect_votes(centres_world: Points, variation: Variation, truncation: float
         distance = np.where(weight > 0, total / weight, np.nan)
     # a few frames whose mask misses a part must not carve what most frames see as surface
     outvoted = free_count < 0.4 * (free_count.astype(np.float32) + solid)
-    return Votes(distance, np.where(outvoted, -np.inf, largest[-1]), outside)
+    return Votes(distance, np.where(outvoted, -np.inf, largest[-1]), solid, outside)
 
 
 def grid_votes(
@@ -68,7 +69,7 @@ def grid_votes(
         away = np.repeat(away, _BLOCK, axis=axis)
     near = np.flatnonzero(~away[: shape[0], : shape[1], : shape[2]])
     known = collect_votes(world_from_local.apply(centres_local[near]), variation, truncation)
-    votes = Votes(*(np.full(len(centres_local), value, np.float32) for value in (np.nan, truncation, truncation)))
+    votes = Votes(*(np.full(len(centres_local), value, np.float32) for value in (np.nan, truncation, 0.0, truncation)))
     for values, found in zip(votes, known, strict=True):
         values[near] = found
     return votes

@@ -29,6 +29,7 @@ class MeshAsset:
     metrics: dict[str, float]  # see generate/consensus.py
     parameters: dict[str, float]
     warnings: tuple[str, ...]
+    assumes: str = ""  # what it takes for true of what nobody saw, in a few words; empty: a sample of a generator's own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

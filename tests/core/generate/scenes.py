@@ -5,8 +5,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.lathe import lathe_mesh
 from r2c2r_core.generate.symmetry import Revolution
+from r2c2r_core.generate.things import thing_hypotheses
+from r2c2r_core.generate.variation import whole_pool
 from r2c2r_core.generate.vessel import VesselHandle, vessel_mesh
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import pack_mask
@@ -152,6 +155,20 @@ def carton_scene(size, *, arc_deg, elevation_deg, yaw_rad, wall_gap_m=0.05, seed
         support_z_m=0.9,
     )
     return capture, track("carton_1", "box", "thing", masks, box=thing)
+
+
+def front_shape(evidence, variation):
+    return front_hypotheses(evidence)[0].shape(variation)
+
+
+def appliance_shape(evidence, variation):
+    return appliance_hypotheses(evidence, whole_pool(evidence))[0].shape(variation)
+
+
+def best_thing(evidence, variation=None):
+    """The shape of the likeliest hypothesis about a thing, by all frames or those of a draw."""
+    everything = whole_pool(evidence)
+    return thing_hypotheses(evidence, everything)[0].shape(variation or everything)
 
 
 def track(name, category, kind, masks, *, front=None, box=None):

@@ -2,14 +2,13 @@ import numpy as np
 import pytest
 
 from r2c2r_core.generate.bake import bake
-from r2c2r_core.generate.boxed import appliance_shape, front_shape
 from r2c2r_core.generate.charts import planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.evidence import gather_evidence
-from r2c2r_core.generate.things import thing_shape
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import render_textured
 from r2c2r_core.geometry.transforms import Rigid3
+from tests.core.generate.scenes import appliance_shape, best_thing, front_shape
 
 FACING = Rigid3(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), np.array([0.0, -2.0, 0.0]))  # looks along +Y from 2 m
 CAMERA = Intrinsics(fx=800.0, fy=800.0, cx=200.0, cy=200.0, width=400, height=400)
@@ -68,7 +67,7 @@ def test_a_dark_side_that_was_seen_keeps_its_own_colour(appliance_scene):
 
 
 def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
-    shape, atlas, picture = pictured(chair_scene, thing_shape, lambda v, f: unwrapped_atlas(v, f, 512))
+    shape, atlas, picture = pictured(chair_scene, best_thing, lambda v, f: unwrapped_atlas(v, f, 512))
     image, depth = seen_from(shape, atlas, picture, FACING)
     back, seat_edge = image[200 - round(0.3 * 800 / 2.2), 200], image[200 + 1, 200]
     assert depth[200 + 1, 200] > 0

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import GenerationFailed
-from r2c2r_core.generate.boxed import appliance_shape, front_shape
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
+from tests.core.generate.scenes import appliance_shape, front_shape
 
 
 def shape_of(make, scene, seed=0):

@@ -116,3 +116,20 @@ def test_an_open_or_very_heavy_mesh_has_to_fit_better_to_win():
     assert choose_candidate(heavy).ranking == ("c1", "c2", "c0")
     better = [replace(opened[0], metrics={**opened[0].metrics, "mask_iou": 0.9 + 0.11}), *alike[1:]]
     assert choose_candidate(better).chosen_id == "c0"
+
+
+def test_being_odd_on_purpose_is_no_fault_and_is_said():
+    """Two hypotheses of one depth and one of another: what the scan says of the unseen side decides."""
+    guesses = [replace(candidate(f"c{k}", 0.6, 0.5, 0.8), assumes="to the wall") for k in range(3)]
+    guesses[2] = replace(candidate("c2", 1.0, 0.9, 0.3), assumes="shallower")
+    far = [
+        replace(c, metrics={**c.metrics, "unseen_error_m": error}) for c, error in zip(guesses, (0.2, 0.1, 0.0), strict=True)
+    ]
+    chosen = choose_candidate(far)
+    assert chosen.ranking == ("c2", "c1", "c0")
+    assert chosen.reason.startswith("c2 (shallower): ")
+
+
+def test_what_would_fall_over_has_to_fit_better_to_win():
+    alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
+    assert choose_candidate([replace(alike[0], metrics={**alike[0].metrics, "stands": 0.0}), *alike[1:]]).chosen_id == "c1"

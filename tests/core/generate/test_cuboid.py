@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from r2c2r_core.generate.evidence import gather_evidence
-from r2c2r_core.generate.things import thing_shape
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight
-from tests.core.generate.scenes import carton_scene
+from tests.core.generate.scenes import best_thing, carton_scene
 
 SIZE = np.array([0.19, 0.075, 0.29])
 
 
 def shape_of(scene):
     evidence = gather_evidence(*scene, 12)
-    return thing_shape(evidence, whole_pool(evidence))
+    return best_thing(evidence)
 
 
 @pytest.mark.parametrize(("arc_deg", "elevation_deg"), [(0.0, 35.0), (35.0, 10.0), (60.0, 30.0), (120.0, 15.0)])
@@ -44,7 +43,7 @@ def test_an_open_depth_is_not_carried_through_the_wall():
 
 def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
     evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=10.0, yaw_rad=0.3), 12)
-    shapes = [thing_shape(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(4)]
+    shapes = [best_thing(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(4)]
     depths = [np.ptp(shape.vertices_local[:, 1]) for shape in shapes]
     assert np.std(depths) > 0.2 * shapes[0].parameters["depth_sigma_m"]
     assert all(is_watertight(s.vertices_local, s.faces) and is_manifold(s.vertices_local, s.faces) for s in shapes)
@@ -54,7 +53,7 @@ def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
     scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0)
     evidence = gather_evidence(*scene, 12)
     for draw in (-1.5, 0.5, 1.5):
-        shape = thing_shape(evidence, replace(whole_pool(evidence), depth_draw=draw))
+        shape = best_thing(evidence, replace(whole_pool(evidence), depth_draw=draw))
         assert shape.parameters["boxed"] == 1.0
         assert np.ptp(shape.vertices_local[:, 1]) < SIZE[0]
         assert shape.vertices_world[:, 1].max() < SIZE[1] + 0.05 + 0.01  # the wall is 5 cm behind, found within 1 cm

@@ -67,10 +67,10 @@ def test_a_candidate_tells_what_was_varied_and_how_it_fits(bottles):
     for asset in bottles.candidates:
         assert {"frames", "erosion_px", "bbox_percentile", "carve_votes", "voxel_m", "depth_scale"} <= set(asset.parameters)
         assert {"extent_middle", "extent_short", "volume_ratio", "faces", "seen_fraction", "mask_iou"} <= set(asset.metrics)
-        assert 6 <= len(asset.frames) <= 14
-        assert asset.metrics["mask_iou"] > 0.85
+        assert asset.metrics["mask_iou"] > 0.6
         json.dumps([asset.parameters, asset.metrics])  # plain numbers
-    assert len({asset.frames for asset in bottles.candidates}) > 1
+    assert bottles.chosen.metrics["mask_iou"] > 0.85
+    assert len({asset.assumes for asset in bottles.candidates}) > 1
 
 
 def test_the_choice_has_a_reason_in_one_sentence_and_ranks_all(bottles):

@@ -5,18 +5,16 @@ import pytest
 
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.symmetry import Revolution
-from r2c2r_core.generate.things import thing_shape
-from r2c2r_core.generate.variation import whole_pool
 from r2c2r_core.generate.vessel import VesselHandle, is_open_vessel, vessel_mesh
 from r2c2r_core.geometry.hollows import find_hollow
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
-from tests.core.generate.scenes import mug_scene
+from tests.core.generate.scenes import best_thing, mug_scene
 
 
 @pytest.mark.parametrize("azimuth", [0.4, 3.6])
 def test_a_mug_is_hollow_and_has_its_handle_where_it_was_seen(azimuth):
     evidence = gather_evidence(*mug_scene(azimuth), 10)
-    shape = thing_shape(evidence, whole_pool(evidence))
+    shape = best_thing(evidence)
     assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 1.0)
     world = shape.vertices_world
     assert np.ptp(world[:, 2]) == pytest.approx(0.09, abs=0.004)
@@ -28,7 +26,7 @@ def test_a_mug_is_hollow_and_has_its_handle_where_it_was_seen(azimuth):
 
 def test_a_cup_without_a_handle_gets_none():
     evidence = gather_evidence(*mug_scene(None), 10)
-    shape = thing_shape(evidence, whole_pool(evidence))
+    shape = best_thing(evidence)
     assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 0.0)
 
 
@@ -55,3 +53,12 @@ def test_the_handle_of_a_tall_jug_stays_on_its_side(azimuth):
     assert (vertices[:, :2] @ -out).max() == pytest.approx(0.05, abs=0.001)
     assert (vertices[:, :2] @ out).max() == pytest.approx(0.10, abs=0.001)
     assert is_watertight(vertices, faces)
+
+
+@pytest.mark.parametrize("height", [0.008, 0.02, 0.03])
+def test_a_flat_pan_has_its_handle_too(height):
+    pan = Revolution(np.zeros(2), np.array([0.0, height]), np.full(2, 0.1))
+    vertices, faces = vessel_mesh(pan, VesselHandle(0.0, 0.05))
+    assert vertices[:, 0].max() == pytest.approx(0.15, abs=0.001)
+    assert is_watertight(vertices, faces)
+    assert is_manifold(vertices, faces)

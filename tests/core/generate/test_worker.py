@@ -31,9 +31,9 @@ def remote(address, **options):
 
 
 def test_a_candidate_made_far_away_is_the_one_made_here(evidence):
-    here = Completion().make(evidence, "c1", 4)
+    here = Completion().make(evidence, "c0", 4)
     with worker(lambda wish, progress: Completion().make(*wish)) as address:
-        there = remote(address).make(evidence, "c1", 4)
+        there = remote(address).make(evidence, "c0", 4)
     assert there.generator == "remote:completion"
     assert there.frames == here.frames
     assert there.warnings == here.warnings

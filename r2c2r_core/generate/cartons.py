@@ -1,0 +1,45 @@
+"""Flat-sided boxes in the depths that outlines, walls and what is usual let them have."""
+
+from functools import partial
+
+import numpy as np
+
+from r2c2r_core.generate.cuboid import Cuboid, fit_cuboid, room_behind, surface_distance
+from r2c2r_core.generate.evidence import Evidence
+from r2c2r_core.generate.hypothesis import Hypothesis
+from r2c2r_core.generate.seen import Seen
+from r2c2r_core.generate.shape import Shape, thing_model
+from r2c2r_core.generate.variation import Variation
+from r2c2r_core.geometry.meshes import box_mesh
+
+_BOX_M, _FAR_SHARE = 0.006, 0.1  # median distance of a box's points from it, and the share that may be far from it
+_FAR_M = 0.015
+_OPEN_M = 0.004  # a depth that the scan leaves open by more than this is guessed in several ways
+
+
+def carton_family(evidence: Evidence, seen: Seen) -> tuple[Hypothesis, ...]:
+    """A flat-sided box where the points lie on one, as deep as outlines, walls and what is usual let it be."""
+    walls = evidence.capture.room.walls
+    found = fit_cuboid(seen.points, seen.low, seen.high, evidence.pool, seen.world_from_local, walls)
+    if found is None:
+        return ()
+    off = np.abs(surface_distance(found, seen.world_from_local.apply(seen.points)))
+    if np.median(off) > _BOX_M or (off > _FAR_M).mean() > _FAR_SHARE:
+        return ()
+    room = room_behind(found, walls)
+    family = [Hypothesis("a box", partial(_cuboid_shape, found, room, 0.0))]
+    if found.depth_spread_m > _OPEN_M:
+        family.append(Hypothesis("a box, shallower than likely", partial(_cuboid_shape, found, room, -1.0)))
+        if room > _OPEN_M:
+            family.append(Hypothesis("a box, deeper than likely", partial(_cuboid_shape, found, room, 1.0)))
+    return tuple(family)
+
+
+def _cuboid_shape(found: Cuboid, room_m: float, sigmas: float, variation: Variation) -> Shape:
+    """The box with another depth, so many standard deviations off, but not in a wall."""
+    size = np.array(found.size_m)
+    low = -size / 2  # the front, which was seen, stays
+    deeper = min(found.depth_spread_m * (sigmas + variation.depth_draw), room_m)
+    size[1] = max(size[1] + deeper, 0.3 * size[1])
+    parameters = {"boxed": 1.0, "depth_sigma_m": float(found.sigma_m[1])}
+    return thing_model(box_mesh(low, low + size), found.world_from_cuboid, parameters)

@@ -1,0 +1,103 @@
+"""Carved things in their variants: what nobody saw solid, mirrored, empty, or on legs."""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.generate.carved import SHEET_M, Carving, above, carve, sheet_field, solid_field, volume_below
+from r2c2r_core.generate.evidence import Evidence
+from r2c2r_core.generate.hypothesis import Hypothesis
+from r2c2r_core.generate.legs import Support, find_support, stands_on_legs
+from r2c2r_core.generate.level_set import best_level, surface_at
+from r2c2r_core.generate.shape import Shape, thing_model
+from r2c2r_core.generate.symmetry import fit_revolution
+from r2c2r_core.generate.variation import Variation
+from r2c2r_core.geometry.meshes import box_mesh, unite
+
+_LEAST_SHEETS = 3.0  # a thing less wide than this many boards is solid in any case
+
+
+def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) -> tuple[Hypothesis, ...]:
+    """What masks and free space leave, completed in several ways; raises GenerationFailed where there is too little depth."""
+    is_legged = stands_on_legs(evidence.track.category)
+
+    @lru_cache(maxsize=1)  # the variants of one draw share it
+    def carved(variation: Variation) -> _Carved:
+        carving = carve(evidence, variation)
+        seen = carving.seen
+        field, mirrored = solid_field(carving, None, mirror=True)
+        level = best_level(carving.grid, field, seen.floor, variation, seen.world_from_local)
+        return _Carved(carving, field, mirrored, level)
+
+    known = carved(everything)
+    support = find_support(known.carving, everything.views) if is_legged else None
+
+    def hull(variation: Variation) -> Shape:
+        known = carved(variation)
+        return _less_likely(_surfaced(known, known.field, mirrored=float(known.mirrored)), known, known.field, support)
+
+    def unmirrored(variation: Variation) -> Shape:
+        known = carved(variation)
+        field, _ = solid_field(known.carving, None, mirror=False)
+        return _less_likely(_surfaced(known, field), known, field, support)
+
+    def turned(variation: Variation) -> Shape:
+        known = carved(variation)
+        field, _ = solid_field(known.carving, fit_revolution(known.carving.seen.points), mirror=False)
+        return _less_likely(_surfaced(known, field, revolved=1.0), known, field, support)
+
+    def sheet(variation: Variation) -> Shape:
+        known = carved(variation)
+        field = sheet_field(known.carving, known.field)
+        return _less_likely(_surfaced(known, field, mirrored=float(known.mirrored)), known, field, support)
+
+    family = [Hypothesis("carved from free space", hull)]
+    if is_round:
+        family.insert(0, Hypothesis("carved, its back as round as its front", turned))
+    if known.mirrored:
+        family.append(Hypothesis("carved, not mirrored", unmirrored))
+    if np.ptp(known.carving.seen.points, axis=0).min() > _LEAST_SHEETS * SHEET_M:
+        family.append(Hypothesis("as thin as a board where nobody saw its back", sheet))
+    if support is not None:
+        family.insert(0, Hypothesis("a slab on four legs", lambda variation: _on_legs(carved(variation), support)))
+    return tuple(family)
+
+
+class _Carved(NamedTuple):
+    carving: Carving
+    field: np.ndarray  # solid where nobody saw it, mirrored where it is symmetric
+    mirrored: bool
+    level: float
+
+
+def _on_legs(known: _Carved, support: Support) -> Shape:
+    """What was carved above the slab's underside, the whole slab, and its posts."""
+    body = _surfaced(known, above(known.carving, known.field, float(support.slab.low[2])))
+    boxes = [box_mesh(*support.slab), *(post.surface() for post in support.posts)]
+    count, unseen = len(support.posts), sum(not post.is_seen for post in support.posts)
+    parameters = {"mirrored": float(known.mirrored), "legs": float(count), "legs_inferred": float(unseen)}
+    made = thing_model(
+        unite([(body.vertices_local, body.faces), *boxes]),
+        known.carving.seen.world_from_local,
+        {**body.parameters, **parameters},
+        (f"{unseen} of its {count} legs were not seen: inferred",) if unseen else (),
+    )
+    return replace(made, unseen_error_m=0.0)
+
+
+def _less_likely(shape: Shape, known: _Carved, field: np.ndarray, support: Support | None) -> Shape:
+    """A slab that was seen on posts has air under it: the mean height of what is there is an error that nobody saw."""
+    if support is None:
+        return shape
+    plan = (support.slab.high - support.slab.low)[:2]
+    below = volume_below(known.carving, field, float(support.slab.low[2]))
+    return replace(shape, unseen_error_m=below / float(np.prod(plan)))
+
+
+def _surfaced(known: _Carved, field: np.ndarray, **parameters: float) -> Shape:
+    """The field's closed surface at the level that suits the draw's masks."""
+    seen = known.carving.seen
+    surface = surface_at(known.carving.grid, field, known.level, seen.floor)
+    return thing_model(surface, seen.world_from_local, {**parameters, "level_m": known.level})

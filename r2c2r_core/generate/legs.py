@@ -1,0 +1,191 @@
+"""Chairs, stools and tables: a level slab on four posts, where a table or the slab itself hid what it stands on.
+
+From above, all that is under a seat is hidden, and carving leaves it solid. But a slab needs support down to the floor: the
+posts that depth shows say how thick they are and how they lean (masks often leave dark legs out), and the other corners get
+the same, mirrored, where free space lets one stand.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.generate.carved import Carving
+from r2c2r_core.generate.evidence import View
+from r2c2r_core.generate.relief import BoxPart
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.geometry.transforms import Rigid3
+
+_LEGGED = ("chair", "stool", "table", "desk", "bench")
+_CELL_M, _LEVEL_M = 0.02, 0.015
+_LEAST_AREA = 0.3  # of the thing's plan, that its slab covers
+_LOWEST, _HIGHEST_M = 0.3, 1.15  # a slab's height: share of the thing's, and metres
+_SLAB_M, _SLAB_RANGE_M = 0.05, (0.02, 0.12)
+_POST_M, _POST_RANGE_M = 0.045, (0.025, 0.08)
+_RIM_M, _LEAST_RIM = 0.03, 20  # of a slab's edge: how far in it reaches, and its points in a centimetre of height
+_CORNER_M = 0.10  # how far from a corner its post may stand
+_LEAN = 0.35  # a post's, at most: metres sideways a metre down
+_STEP_M, _LEAST_STEPS, _LEAST_POINTS = 0.03, 5, 8  # heights at which depth must show a post, and its points at each
+_TO_EDGE_M = 0.06  # a slab ends where the thing does, if it is seen to come this near
+_EMPTY = 0.7  # of a corner's height that is seen free: nothing stands there
+
+
+class Post(NamedTuple):
+    """A leg from the floor to a slab, local frame."""
+
+    top: Vector3  # the middle of its upper end
+    lean: np.ndarray  # (2,) metres sideways a metre up
+    width_m: float
+    floor_m: float
+    is_seen: bool
+
+    def surface(self) -> tuple[Points, Faces]:
+        """Its closed surface."""
+        half = np.array([self.width_m / 2, self.width_m / 2])
+        vertices, faces = box_mesh(np.append(self.top[:2] - half, self.floor_m), np.append(self.top[:2] + half, self.top[2]))
+        vertices[:, :2] += self.lean * (vertices[:, 2:] - self.top[2])
+        return vertices, faces
+
+
+class Support(NamedTuple):
+    """A level slab and the posts it stands on, local frame."""
+
+    slab: BoxPart
+    posts: tuple[Post, ...]
+
+
+def stands_on_legs(category: str) -> bool:
+    """Whether things of that name are a slab on posts."""
+    return any(word.rstrip("s") in _LEGGED for word in category.lower().replace("_", " ").split())
+
+
+def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
+    """The slab that was seen and its four posts; None without a floor, a slab, or where a corner is seen to be empty."""
+    seen, points = carving.seen, carving.seen.points
+    if seen.floor is None:
+        return None
+    level = _slab_level(points, seen.floor, float(seen.high[2]), np.ptp(points[:, :2], axis=0))
+    if level is None:
+        return None
+    on_slab = points[np.abs(points[:, 2] - level) < _LEVEL_M, :2]
+    low, high = np.percentile(on_slab, 1, axis=0), np.percentile(on_slab, 99, axis=0)
+    low = np.where(low - seen.low[:2] < _TO_EDGE_M, seen.low[:2], low)
+    high = np.where(seen.high[:2] - high < _TO_EDGE_M, seen.high[:2], high)
+    slab = BoxPart(np.append(low, level - _thickness(points, level, low, high)), np.append(high, level))
+    under = _points_under(slab, seen.floor, views, seen.world_from_local)
+    corners = [(x, y) for x in (0, 1) for y in (0, 1)]
+    seen_posts = {corner: _seen_post(under, slab, corner, seen.floor) for corner in corners}
+    posts = tuple(seen_posts[corner] or _likely_post(seen_posts, slab, corner, seen.floor) for corner in corners)
+    width = float(np.mean([post.width_m for post in posts]))  # each was seen from one side, and what was before it hides some
+    posts = tuple(post._replace(width_m=width) for post in posts)
+    if any(not post.is_seen and _is_empty(carving, post) for post in posts):
+        return None
+    return Support(slab, posts)
+
+
+def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> float | None:
+    """The height at which the points cover most of the plan."""
+    lowest, highest = floor + _LOWEST * (top - floor), min(top, floor + _HIGHEST_M)
+    best, level = _LEAST_AREA * float(np.prod(plan)), None
+    for z in np.arange(lowest, highest + _LEVEL_M, _LEVEL_M):
+        inside = points[np.abs(points[:, 2] - z) < _LEVEL_M]
+        cells = np.unique(np.floor(inside[:, :2] / _CELL_M).astype(int), axis=0)
+        area = len(cells) * _CELL_M**2
+        if area > best:
+            best, level = area, float(np.median(inside[:, 2]))
+    return level
+
+
+def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) -> float:
+    """How far down the points of the slab's own edge reach, between its corners."""
+    near = (points[:, :2] > low - _CELL_M).all(axis=1) & (points[:, :2] < high + _CELL_M).all(axis=1)
+    at_edge = ((points[:, :2] < low + _RIM_M) | (points[:, :2] > high - _RIM_M)).any(axis=1)
+    in_corner = ((points[:, :2] < low + _CORNER_M) | (points[:, :2] > high - _CORNER_M)).all(axis=1)
+    below = level - points[near & at_edge & ~in_corner, 2]
+    counts = np.histogram(below, bins=np.arange(0.02, 0.16, 0.01))[0]  # the first two centimetres may be its rounded edge
+    if counts[0] < _LEAST_RIM:
+        return _SLAB_M
+    ends = np.flatnonzero(counts < 0.3 * counts[0])
+    return float(np.clip(0.02 + 0.01 * (ends[0] if len(ends) else len(counts)), *_SLAB_RANGE_M))
+
+
+def _points_under(slab: BoxPart, floor: float, views: Sequence[View], world_from_local: Rigid3) -> list[tuple[Points, Vector3]]:
+    """Each view's depth points between slab and floor, whatever the mask says, and the camera's place."""
+    found = []
+    low, high = slab.low[:2] - _CORNER_M, slab.high[:2] + _CORNER_M
+    for view in views:
+        local_from_camera = world_from_local.inverse @ view.world_from_camera
+        points = local_from_camera.apply(depth_points(view.depth_m, view.depth_camera)[view.depth_m > 0])
+        inside = (points[:, 2] > floor + _STEP_M) & (points[:, 2] < slab.low[2])
+        inside &= (points[:, :2] > low).all(axis=1) & (points[:, :2] < high).all(axis=1)
+        found.append((points[inside], local_from_camera.translation))
+    return found
+
+
+def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post | None:
+    """The post at a corner, where depth shows a slender one over most of its height."""
+    outer = np.array([(slab.low, slab.high)[corner[k]][k] for k in (0, 1)])
+    middles, widths = [], []
+    for points, eye in under:
+        reach = _CORNER_M + _LEAN * (slab.low[2] - points[:, 2])
+        near = points[(np.abs(points[:, :2] - outer) < reach[:, None]).all(axis=1)]
+        away = outer - eye[:2]
+        away /= max(float(np.linalg.norm(away)), 1e-9)
+        across = near[:, :2] @ np.array([away[1], -away[0]])
+        for z in np.arange(floor + _STEP_M, slab.low[2], _STEP_M):
+            level = np.abs(near[:, 2] - z) < _STEP_M / 2
+            if np.count_nonzero(level) < _LEAST_POINTS:
+                continue
+            width = float(np.ptp(np.percentile(across[level], [5, 95])))
+            if width < _POST_RANGE_M[1]:
+                middles.append(np.append(np.median(near[level, :2], axis=0) + width / 2 * away, z))
+                widths.append(width)
+    line = _steady_line(np.array(middles).reshape(-1, 3))
+    if line is None:
+        return None
+    lean, offset = line
+    top = np.append(lean * slab.low[2] + offset, slab.low[2] + 0.002)
+    inside = (top[:2] > slab.low[:2] - 0.02).all() and (top[:2] < slab.high[:2] + 0.02).all()
+    width = float(np.clip(np.median(widths), *_POST_RANGE_M))
+    return Post(top, lean, width, floor, True) if inside and (np.abs(lean) < _LEAN).all() else None
+
+
+def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
+    """(x, y) as a line over z by reweighted least squares; None for too few heights or where the middles lie on no line."""
+    if len(np.unique(np.round(middles[:, 2] / _STEP_M))) < _LEAST_STEPS:
+        return None
+    system = np.column_stack([middles[:, 2], np.ones(len(middles))])
+    weight: np.ndarray = np.ones(len(middles))
+    solution: np.ndarray = np.zeros((2, 2))
+    for _ in range(10):
+        solution = np.linalg.lstsq(system * weight[:, None], middles[:, :2] * weight[:, None], rcond=None)[0]
+        off = np.linalg.norm(system @ solution - middles[:, :2], axis=1)
+        weight = 1.0 / np.sqrt(1.0 + (off / 0.01) ** 2)
+    return (solution[0], solution[1]) if np.median(off) < 0.02 else None
+
+
+def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post:
+    """A corner's post as the mirror image of a seen one, left-right before front-back; without one, upright."""
+    middle = (slab.low + slab.high)[:2] / 2
+    for flip in ((1, 0), (0, 1), (1, 1)):
+        twin = seen[(corner[0] ^ flip[0], corner[1] ^ flip[1])]
+        if twin is not None:
+            sign = 1.0 - 2.0 * np.array(flip)
+            return twin._replace(
+                top=np.append(middle + sign * (twin.top[:2] - middle), twin.top[2]), lean=sign * twin.lean, is_seen=False
+            )
+    inset = _POST_M / 2
+    at = [slab.high[k] - inset if corner[k] else slab.low[k] + inset for k in (0, 1)]
+    return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), _POST_M, floor, False)
+
+
+def _is_empty(carving: Carving, post: Post) -> bool:
+    """Whether most of the post's height was seen to be free."""
+    grid = carving.grid
+    z = np.arange(post.floor_m + _STEP_M, post.top[2], grid.voxel_m)
+    along = np.column_stack([post.top[:2] + post.lean * (z - post.top[2])[:, None], z])
+    index = np.clip(((along - grid.low) / grid.voxel_m).astype(int), 0, np.array(grid.shape) - 1)
+    free = (carving.votes.free_m > 0).reshape(grid.shape)[tuple(index.T)]
+    return bool(free.mean() > _EMPTY)

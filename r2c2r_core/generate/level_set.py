@@ -1,0 +1,86 @@
+"""Distance fields on a grid, and the closed surface of one that agrees best with the masks."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.errors import GenerationFailed
+from r2c2r_core.generate.consistency import silhouette_iou
+from r2c2r_core.generate.variation import Variation
+from r2c2r_core.geometry.meshes import largest_component, simplify, volume
+from r2c2r_core.geometry.transforms import Rigid3
+
+_MOST_VOXELS = 1_000_000
+_MOST_CELLS = 160  # along the longest side: 6 mm on a chair
+_OUTWARDS_M, _INWARDS_M = (0.002, 0.004), (-0.002, -0.004)
+_MOST_FACES = 6000
+_FLATTER = 0.35  # of a voxel: how far simplifying may move the surface
+
+
+class Grid(NamedTuple):
+    """Voxel centres low + (i + 0.5) * voxel in the local frame."""
+
+    low: Vector3
+    shape: tuple[int, int, int]
+    voxel_m: float
+
+    def centres(self) -> Points:
+        """All voxel centres (n, 3), last axis fastest."""
+        axes = [self.low[k] + (np.arange(self.shape[k]) + 0.5) * self.voxel_m for k in range(3)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def grid_round(low: Vector3, high: Vector3, voxel_m: float, margin_m: float) -> Grid:
+    """A grid over the box with a margin and two voxels of air."""
+    start, size = low - margin_m - 2 * voxel_m, high - low + 2 * margin_m + 4 * voxel_m
+    voxel_m = max(voxel_m, float(size.max()) / _MOST_CELLS, float(np.cbrt(np.prod(size) / _MOST_VOXELS)))
+    counts = np.ceil(size / voxel_m).astype(int) + 1
+    return Grid(start, (int(counts[0]), int(counts[1]), int(counts[2])), voxel_m)
+
+
+def best_level(grid: Grid, field: np.ndarray, floor: float | None, variation: Variation, world_from_local: Rigid3) -> float:
+    """The level of `field`, within ±4 mm, whose surface's silhouettes agree best with the masks: votes err to one side.
+
+    `field` has the grid's shape and is positive outside. `floor` is the height that the thing stands on, if it is known.
+    """
+    views = variation.views[:: max(len(variation.views) // 5, 1)]
+    best, best_score = 0.0, -1.0
+    for levels in ((0.0,), _OUTWARDS_M, _INWARDS_M):  # the agreement has one peak: climb it
+        for level in levels:
+            extracted = _extract(grid, field, level, floor)
+            score = -1.0 if extracted is None else silhouette_iou(world_from_local.apply(extracted[0]), extracted[1], views)
+            if score <= best_score:
+                break
+            best, best_score = level, score
+        if best > 0:
+            break
+    return best
+
+
+def surface_at(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces]:
+    """The closed surface field = level, in the local frame; raises GenerationFailed where there is none."""
+    extracted = _extract(grid, field, level, floor)
+    if extracted is None:
+        raise GenerationFailed("carving left nothing", hint="its masks disagree; add a click")
+    try:
+        return simplify(*extracted, _FLATTER * grid.voxel_m, _MOST_FACES)
+    except ValueError as error:
+        raise GenerationFailed(str(error), hint="its masks disagree; add a click") from error
+
+
+def _extract(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces] | None:
+    """Largest closed surface field = level, in the local frame; None where the field nowhere goes below it."""
+    from skimage.measure import marching_cubes
+
+    shifted = field - level
+    if floor is not None:  # the level must not lift the thing off its support
+        shifted = np.maximum(shifted, floor - (grid.low[2] + (np.arange(grid.shape[2]) + 0.5) * grid.voxel_m))
+    padded = np.pad(shifted, 1, constant_values=grid.voxel_m)
+    padded[np.abs(padded) < 1e-7] = 1e-7  # a vertex exactly on a voxel centre would be duplicated
+    if not (padded < 0).any():
+        return None
+    vertices, faces, _, _ = marching_cubes(padded, 0.0)
+    local = grid.low + (vertices.astype(np.float64) - 0.5) * grid.voxel_m
+    local, joined = largest_component(local, faces.astype(np.int64))
+    return local, joined if volume(local, joined) > 0 else joined[:, ::-1]
