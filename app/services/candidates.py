@@ -14,8 +14,8 @@ from app.errors import NotFound
 from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services.context import Context
-from r2c2r_core.overrides import MOST_BATCHES
 from r2c2r_core.model.mesh import CandidateSet
+from r2c2r_core.overrides import MOST_BATCHES
 from r2c2r_core.workspace import Workspace
 
 

@@ -108,10 +108,10 @@ def _generator(evidence: Evidence, purpose: str, seed: int) -> np.random.Generat
 def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
     """Scale-free measures, and how the shape fits what is known: masks and depth of the frames that judge all alike."""
     fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
-    unseen = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
+    more = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
     if evidence.track.kind == "thing":  # furniture hangs on its wall
-        unseen["stands"] = float(stands(shape.vertices_world, shape.faces))
-    return {**shape_metrics(shape.vertices_local, shape.faces), **fit, **unseen}
+        more |= {"stands": float(stands(shape.vertices_world, shape.faces)), "carved": shape.parameters.get("carved", 0.0)}
+    return {**shape_metrics(shape.vertices_local, shape.faces), **fit, **more}
 
 
 def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:

@@ -9,7 +9,7 @@ A candidate that says what it assumes differs from the others on purpose: being 
 scan says does; of a side that nobody saw that is the wall behind it, the worktop on it or what is usual.
 
 Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m, unseen_error_m,
-stands, faces. Masks and depth are unknown for a mesh whose generator does not know its place, until it was placed
+stands, carved, faces. Masks and depth are unknown for a mesh whose generator does not know its place, until it was placed
 (pipeline.py does that); without them it is judged by its shape alone. What would fall over, an open mesh, or one with more
 faces than a simulator likes, has to fit better to win.
 """
@@ -29,6 +29,7 @@ _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
 _DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
 _UNSEEN_WEIGHT = 1.0  # per metre: half of an error that was seen
 _OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
+_COPIED_COST = 0.05  # carving copies the masks' errors: it has to agree with them better than a clean shape
 _FALLS_COST = 0.1  # what would tip over was not found standing
 _MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
 
@@ -96,7 +97,8 @@ def _flaws(candidates: Sequence[MeshAsset]) -> np.ndarray:
     faces = np.array([c.metrics.get("faces", 0.0) for c in candidates])
     heavy = _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0))
     falls = np.array([_FALLS_COST if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates])
-    return np.asarray(heavy + falls + [0.0 if c.watertight else _OPEN_COST for c in candidates])
+    copied = np.array([_COPIED_COST * c.metrics.get("carved", 0.0) for c in candidates])
+    return np.asarray(heavy + falls + copied + [0.0 if c.watertight else _OPEN_COST for c in candidates])
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:

@@ -100,4 +100,4 @@ def _surfaced(known: _Carved, field: np.ndarray, **parameters: float) -> Shape:
     """The field's closed surface at the level that suits the draw's masks."""
     seen = known.carving.seen
     surface = surface_at(known.carving.grid, field, known.level, seen.floor)
-    return thing_model(surface, seen.world_from_local, {**parameters, "level_m": known.level})
+    return thing_model(surface, seen.world_from_local, {**parameters, "carved": 1.0, "level_m": known.level})

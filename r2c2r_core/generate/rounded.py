@@ -1,6 +1,9 @@
 """Round things in their variants: closed or hollow, with their handle or without."""
 
+from dataclasses import replace
 from functools import lru_cache, partial
+
+import numpy as np
 
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence
@@ -35,22 +38,25 @@ def round_family(evidence: Evidence, everything: Variation) -> tuple[tuple[Hypot
     def vessel(variation: Variation, with_handle: bool) -> Shape:
         seen, outline = measured(variation)
         outline = with_true_ends(outline, seen.points, variation.views, seen.world_from_local)
-        handle = find_handle(outline, evidence.pool, seen.world_from_local) if with_handle else None
+        shown = find_handle(outline, evidence.pool, seen.world_from_local)
+        handle = shown if with_handle else None
         parameters = {"revolved": 1.0, "hollow": 1.0, "handles": float(handle is not None)}
-        return thing_model(vessel_mesh(outline, handle), seen.world_from_local, parameters)
+        made = thing_model(vessel_mesh(outline, handle), seen.world_from_local, parameters)
+        return replace(made, unseen_error_m=0.0 if shown is None or with_handle else shown.reach_m)
+
+    def full(variation: Variation) -> Shape:
+        made = body(variation)
+        return replace(made, unseen_error_m=float(np.ptp(made.vertices_local[:, 2])))  # its inner floor is usually at its foot
 
     try:
         seen, outline = measured(everything)
     except GenerationFailed:
         return (), False
     true_ends = with_true_ends(outline, seen.points, everything.views, seen.world_from_local)
-    solid = Hypothesis("round, as wide as its outlines", body)
-    family: list[Hypothesis] = [solid]
+    family = [Hypothesis("round, as wide as its outlines", body)]
     if is_open_vessel(evidence.track.category):
-        has_handle = find_handle(true_ends, evidence.pool, seen.world_from_local) is not None
-        family = [Hypothesis("round and hollow", partial(vessel, with_handle=False)), solid._replace(assumes="round and full")]
-        if has_handle:
-            family.insert(
-                0, Hypothesis("round and hollow, with the handle its outlines show", partial(vessel, with_handle=True))
-            )
+        family = [Hypothesis("round and hollow", partial(vessel, with_handle=False)), Hypothesis("round and full", full)]
+        if find_handle(true_ends, evidence.pool, seen.world_from_local) is not None:
+            told = "round and hollow, with the handle its outlines show"
+            family.insert(0, Hypothesis(told, partial(vessel, with_handle=True)))
     return tuple(family), is_round(seen.points, true_ends)

@@ -133,3 +133,10 @@ def test_being_odd_on_purpose_is_no_fault_and_is_said():
 def test_what_would_fall_over_has_to_fit_better_to_win():
     alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
     assert choose_candidate([replace(alike[0], metrics={**alike[0].metrics, "stands": 0.0}), *alike[1:]]).chosen_id == "c1"
+
+
+def test_what_was_carved_along_the_masks_has_to_agree_with_them_better_than_a_clean_shape():
+    clean, carved = (replace(candidate(f"c{k}", 0.6, 0.5, 0.8, iou), assumes="a guess") for k, iou in enumerate((0.90, 0.93)))
+    carved = replace(carved, metrics={**carved.metrics, "carved": 1.0})
+    assert choose_candidate([carved, clean]).chosen_id == "c0"
+    assert choose_candidate([replace(carved, metrics={**carved.metrics, "mask_iou": 0.97}), clean]).chosen_id == "c1"
