@@ -43,7 +43,7 @@ export class JobPanel extends LiveElement {
       "div",
       { class: "row" },
       h("span", { class: `chip ${tone}` }, STATES[job.state]),
-      h("span", { class: "muted" }, [job.error ? "" : job.message, left || queue].filter(Boolean).join(" · ")),
+      h("span", { class: "muted" }, [running ? job.message : "", left || queue].filter(Boolean).join(" · ")),
     );
     this.replaceChildren(
       h(

@@ -66,7 +66,7 @@ export class ObjectCloud extends LiveElement {
     try {
       const found = await getObjectPoints(this.project, object, this.signal);
       if (object !== this.#object) return;
-      this.#cloud = decodePoints(found);
+      this.#cloud = found.count ? decodePoints(found) : null;
       this.#text.textContent = found.count
         ? `${found.size_m.map((side) => (100 * side).toFixed(0)).join(" × ")} cm, from ${found.frames} frames`
         : "No points yet.";
