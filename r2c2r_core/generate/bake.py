@@ -47,7 +47,8 @@ def bake(
     """
     eyes = world_from_local.inverse.apply(np.array([view.eye_world for view in views]))
     wanted = np.ones((len(views), 6), dtype=bool) if front_y_m is None else _best_views(atlas, eyes, views)
-    samples, weights = _gather(atlas, vertices_world, faces, world_from_local, views, wanted)
+    used = np.flatnonzero(wanted.any(axis=1))
+    samples, weights = _gather(atlas, vertices_world, faces, world_from_local, [views[k] for k in used], wanted[used])
     if front_y_m is not None:
         _prefer_best(weights, atlas.chart)
     colours, seen = _blend(samples, weights)
@@ -142,7 +143,7 @@ def _blend(samples: np.ndarray, weights: np.ndarray) -> tuple[Colours, np.ndarra
     seen = np.asarray((weights > 0).any(axis=0))
     if len(samples) == 0 or not seen.any():
         return np.zeros((weights.shape[1], 3), np.uint8), np.zeros(weights.shape[1], dtype=bool)
-    grey = samples.astype(np.float32).mean(axis=2)
+    grey = np.stack([_grey(sample) for sample in samples])
     shown = weights > 0
     median = _median_shown(grey, shown)
     gains = np.array([_gain(grey[k], median, shown[k]) for k in range(len(samples))], np.float32)
@@ -154,6 +155,12 @@ def _blend(samples: np.ndarray, weights: np.ndarray) -> tuple[Colours, np.ndarra
     for k in range(len(samples)):
         colours += samples[k] * (gains[k] * final[k] / np.maximum(total, 1e-12))[:, None]
     return np.round(colours).clip(0, 255).astype(np.uint8), seen
+
+
+def _grey(colours: Colours) -> np.ndarray:
+    """The mean of the channels, a channel at a time: numpy is slow along an axis of three."""
+    red, green, blue = (colours[:, k].astype(np.float32) for k in range(3))
+    return np.asarray((red + green + blue) / np.float32(3.0))
 
 
 def _median_shown(grey: np.ndarray, shown: np.ndarray) -> np.ndarray:
