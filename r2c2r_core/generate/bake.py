@@ -47,8 +47,9 @@ def bake(
     """
     eyes = world_from_local.inverse.apply(np.array([view.eye_world for view in views]))
     wanted = np.ones((len(views), 6), dtype=bool) if front_y_m is None else _best_views(atlas, eyes, views)
-    used = np.flatnonzero(wanted.any(axis=1))
-    samples, weights = _gather(atlas, vertices_world, faces, world_from_local, [views[k] for k in used], wanted[used])
+    used: np.ndarray = np.asarray(wanted.any(axis=1))
+    frames = [view for view, is_used in zip(views, used, strict=True) if is_used]
+    samples, weights = _gather(atlas, vertices_world, faces, world_from_local, frames, wanted[used])
     if front_y_m is not None:
         _prefer_best(weights, atlas.chart)
     colours, seen = _blend(samples, weights)
