@@ -65,17 +65,24 @@ class Guard:
         headers = Headers(scope=scope)
         session = session_in(headers.get("cookie", ""))
         refusal, person = self._foreign(scope, headers), None
-        try:
-            person = await self.person_of(session) if session and refusal is None else None
-        except R2C2RError as error:  # the database does not answer
-            kind, status = kind_of(error)
-            refusal = status, kind, error.message, error.hint
-        refusal = refusal or (_closed(scope) if person is None else None)
+        if refusal is None and not scope["path"].startswith(OPEN_PATHS):
+            person, refusal = await self._enter(scope, session)
         if refusal is not None:
             await _refuse(scope, receive, _with_safe_headers(send, scope), *refusal)
             return
         scope.setdefault("state", {}).update(session=session if person else "", person=person)
         await self.app(scope, receive, _with_safe_headers(send, scope) if scope["type"] == "http" else send)
+
+    async def _enter(self, scope: Scope, session: str) -> tuple[Person | None, Refusal | None]:
+        """Whose request it is, or why nobody in particular may ask that."""
+        try:
+            person = await self.person_of(session) if session else None
+        except R2C2RError as error:  # the database does not answer
+            kind, status = kind_of(error)
+            return None, (status, kind, error.message, error.hint)
+        if person is None and not _brings_token(scope):
+            return None, (401, "unauthorised", "no session", NO_SESSION)
+        return person, None
 
     def _foreign(self, scope: Scope, headers: Headers) -> Refusal | None:
         """Why a request does not come from our own pages, or not to us."""
@@ -91,13 +98,6 @@ class Guard:
         elif scope["method"] not in SAFE_METHODS and "x-requested-with" not in headers:
             return 403, "forbidden", "the header X-Requested-With is missing", "send X-Requested-With: r2c2r"
         return None
-
-
-def _closed(scope: Scope) -> Refusal | None:
-    """Why nobody in particular may not see this."""
-    if scope["path"].startswith(OPEN_PATHS) or _brings_token(scope):
-        return None
-    return 401, "unauthorised", "no session", NO_SESSION
 
 
 def _brings_token(scope: Scope) -> bool:

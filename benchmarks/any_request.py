@@ -3,7 +3,7 @@
     python benchmarks/any_request.py [--examples 100] [--seed 0] [--json benchmarks/app.json]
 
 Schemathesis makes requests from the app's own OpenAPI document, such as it allows and such as it forbids; each is sent with a
-session and without one, half of them at things that exist (all of them, unless thorough). The queue stands still meanwhile:
+session and without one, most of them at things that exist (all of them, unless thorough). The queue stands still meanwhile:
 what is queued by thousands of requests is not what is looked at. Then it runs, and Schemathesis walks from answer to request:
 what one operation made, others are asked about.
 """
@@ -36,6 +36,7 @@ from tests.app.conftest import ORIGIN, Running, fake, running
 SAID_IN_ONE_LINE = (503, 507)  # a helper is down, the disk is full
 ENDS_ITS_SESSION = ("signOut",)
 DELETES = ("deleteProject",)  # not at the project that the others need
+NOWHERE = 4  # one request at what does not exist (where little of it is read) for so many at what does
 STEPS = 30  # of a walk
 
 
@@ -71,10 +72,10 @@ def _send_to_each(web: Running, project: str, examples: int, seed: int, thorough
         name = operation.definition.raw["operationId"]
         parameters = {p.name for p in operation.path_parameters}
         existing = {key: value for key, value in known.items() if key in parameters and name not in DELETES}
-        places = (existing, None) if existing and thorough else (existing or None,)
-        for mode, place in itertools.product(GenerationMode, places):
+        places = [(existing or None, examples)] + ([(None, max(examples // NOWHERE, 1))] if existing and thorough else [])
+        for mode, (place, count) in itertools.product(GenerationMode, places):
             strategy = operation.as_strategy(generation_mode=mode, path_parameters=place)
-            for problem, status in _try((web.client, stranger), strategy, examples, seed):
+            for problem, status in _try((web.client, stranger), strategy, count, seed):
                 statuses[status] += 1
                 if problem:
                     failures.append(f"{name}: {problem}")

@@ -13,6 +13,7 @@ from app.db.tables import Project, SceneObject, Verdict
 from app.errors import NotFound
 from app.files import ProjectFiles
 from app.jobs.plain import plain
+from app.services import views
 from app.services.context import Context
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.overrides import MOST_BATCHES
@@ -120,7 +121,7 @@ def _facts_at(
 
 def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
     """One candidate's noun; NotFound when the object has no such candidate."""
-    found = Workspace(files.work).load_latest("generate", name)
+    found = views.latest(files, "generate", name)
     for asset in found.candidates if found else ():
         if asset.candidate_id == candidate:
             return asset

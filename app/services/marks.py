@@ -57,8 +57,8 @@ def _word(at: np.ndarray, text: str, colour: tuple[int, int, int]) -> dict[str, 
 
 def _scene_objects(files: ProjectFiles) -> tuple[SceneObject, ...]:
     for stage in ("warp", "synthesize"):
-        path = files.work / "nouns" / stage / "scene.noun"
-        if path.is_file():
-            scene = views.latest(path, path.stat().st_mtime_ns, files.work, stage, "scene")
-            return scene.objects if scene is not None else ()
+        scene = views.latest(files, stage, "scene")
+        if scene is not None:
+            objects: tuple[SceneObject, ...] = scene.objects
+            return objects
     return ()

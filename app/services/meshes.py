@@ -1,8 +1,6 @@
 """A candidate's mesh for a person's eyes: upright and facing the camera where its placement is known."""
 
-from functools import lru_cache
 from itertools import permutations, product
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -10,12 +8,12 @@ import numpy as np
 from scipy.spatial import cKDTree  # here, not where it is used: two first requests at once would meet it half imported
 
 from app.files import ProjectFiles
+from app.services import views
 from r2c2r_core.arrays import Matrix3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
-from r2c2r_core.workspace import Workspace
 
 SIZE = 320
 SAMPLES = 1500
@@ -34,7 +32,7 @@ def upright(files: ProjectFiles, name: str, candidate: str) -> Matrix3:
 
     Only the chosen candidate was aligned with the scan; the others are turned until they look like it.
     """
-    placement = _latest(files.work, "align", name)
+    placement = views.latest(files, "align", name)
     if placement is None:
         return np.eye(3)
     object_from_placed = np.asarray(_object_axes(files, name).T @ placement.world_from_mesh.rotation)
@@ -109,7 +107,7 @@ def _sampled(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray, Matrix3]:
 
 def _object_axes(files: ProjectFiles, name: str) -> Matrix3:
     """world_from_object rotation as the masks say it; identity where they do not."""
-    track = _latest(files.work, "segment", name)
+    track = views.latest(files, "segment", name)
     if track is None:
         return np.eye(3)
     pose = track.front.world_from_front if track.front else track.box.world_from_object if track.box else None
@@ -117,7 +115,7 @@ def _object_axes(files: ProjectFiles, name: str) -> Matrix3:
 
 
 def _candidates(files: ProjectFiles, name: str) -> tuple[MeshAsset, ...]:
-    found = _latest(files.work, "generate", name)
+    found = views.latest(files, "generate", name)
     return tuple(found.candidates) if found is not None else ()
 
 
@@ -152,13 +150,3 @@ def _shading(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
     scale = camera.fx / np.where(depth > 0, depth, 1.0)
     cosine = 1.0 / np.sqrt(1.0 + (dx * scale) ** 2 + (dy * scale) ** 2)
     return np.asarray(0.55 + 0.45 * np.nan_to_num(cosine, nan=0.6))
-
-
-def _latest(work: Path, stage: str, name: str) -> Any:
-    path = work / "nouns" / stage / f"{name}.noun"
-    return _latest_at(path, path.stat().st_mtime_ns, work, stage, name) if path.is_file() else None
-
-
-@lru_cache(maxsize=6)
-def _latest_at(path: Path, _changed: int, work: Path, stage: str, name: str) -> Any:
-    return Workspace(work).load_latest(stage, name)

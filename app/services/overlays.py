@@ -21,7 +21,6 @@ from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.model.scene import SceneObject
-from r2c2r_core.workspace import Workspace
 
 WIDTH = 640
 PHOTOS = 12
@@ -101,7 +100,7 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
 def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf) -> list[Part]:
     """The object's meshes in the world; NotReady while that stage has not made them."""
     if of == "placed":
-        placement, made = (Workspace(files.work).load_latest(stage, name) for stage in ("align", "generate"))
+        placement, made = (views.latest(files, stage, name) for stage in ("align", "generate"))
         asset = (
             next((c for c in made.candidates if placement and c.candidate_id == placement.candidate_id), None) if made else None
         )
@@ -220,11 +219,7 @@ def _photo(files: ProjectFiles, entry: dict[str, Any]) -> schemas.Photo | None:
 
 
 def _scene_object(files: ProjectFiles, stage: str, name: str) -> SceneObject | None:
-    path = _path(files, stage, name)
-    try:
-        scene = views.latest(path, path.stat().st_mtime_ns, files.work, stage, "scene")
-    except FileNotFoundError:
-        return None
+    scene = views.latest(files, stage, "scene")
     return next((item for item in scene.objects if item.name == name), None) if scene is not None else None
 
 

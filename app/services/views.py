@@ -1,4 +1,4 @@
-"""The recording's cameras, read once."""
+"""What a stage stored, and the recording's cameras: read once for every time they change."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -7,6 +7,15 @@ from typing import Any
 from app.files import ProjectFiles
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.workspace import Workspace
+
+
+def latest(files: ProjectFiles, stage: str, name: str) -> Any:
+    """The stage's newest noun of that name; None while there is none."""
+    path = files.work / "nouns" / stage / f"{name}.noun"
+    try:
+        return _latest_at(path, path.stat().st_mtime_ns, files.work, stage, name)
+    except FileNotFoundError:
+        return None
 
 
 def frame_of(files: ProjectFiles, index: int) -> Frame | None:
@@ -24,7 +33,6 @@ def _frames_at(path: Path, _changed: int, work: Path) -> dict[int, Any]:
     return {frame.index: frame for frame in capture.frames} if capture is not None else {}
 
 
-@lru_cache(maxsize=4)
-def latest(path: Path, changed: int, work: Path, stage: str, name: str) -> Any:
-    """A stage's noun, read once for every time its file changes."""
+@lru_cache(maxsize=8)
+def _latest_at(path: Path, _changed: int, work: Path, stage: str, name: str) -> Any:
     return Workspace(work).load_latest(stage, name)

@@ -1,6 +1,9 @@
 import errno
+import sqlite3
 
 import pytest
+from sqlalchemy import event
+from sqlalchemy.exc import OperationalError
 
 from app.errors import KINDS, error_body, kind_of
 from r2c2r_core import errors as core
@@ -102,6 +105,30 @@ def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pyte
     job = web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "failed")
     assert job["error"]["kind"] == "no-space"
     assert len(web.get(f"/api/projects/{project}/objects")) == 2
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "kind"), [("database is locked", 503, "unavailable"), ("database or disk is full", 507, "no-space")]
+)
+def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(web: Running, said: str, status: int, kind: str) -> None:
+    def refuse(_: object) -> None:
+        raise OperationalError("BEGIN", None, sqlite3.OperationalError(said))
+
+    engine, marked = web.context.engine, {"Idempotency-Key": "k"}
+    event.listen(engine, "begin", refuse)
+    asked = [
+        lambda: web.client.get("/api/projects"),
+        lambda: web.client.post("/api/projects/sample", json={}),
+        lambda: web.client.post("/api/projects/sample", json={}, headers=marked),  # by what remembers keys
+        lambda: web.client.get("/media/x/thumbnail.jpg"),  # by who looks up whose session it is
+    ]
+    for ask in asked:
+        web.context.people.look_again()
+        answer = ask()
+        assert (answer.status_code, answer.json()["kind"], set(answer.json())) == (status, kind, SHAPE)
+    assert web.client.get("/static/index.html").status_code == 200  # which is for everybody
+    event.remove(engine, "begin", refuse)
+    assert web.get("/api/projects") == []
 
 
 def test_the_queue_goes_on_after_an_error_nobody_thought_of(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
