@@ -14,8 +14,6 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 
-expect.set_options(timeout=60_000)  # what is waited for comes late on two busy cores
-
 PATIENCE_MS = 180_000  # a busy machine that draws 3D in software; nothing waits longer than what it waits for takes
 expect.set_options(timeout=PATIENCE_MS)
 

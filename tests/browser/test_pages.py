@@ -4,6 +4,7 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -43,28 +44,36 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, st
         yield address, project
 
 
+@contextmanager
+def signed_in(browser: Browser, address: str, **looks: Any) -> Iterator[Page]:
+    """A page of a browser of its own, which opened the printed address."""
+    context = browser.new_context(**looks)
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(address)
+    yield page
+    context.close()
+
+
 @pytest.mark.skipif(not AXE.is_file(), reason="npm ci was not run in static/")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_page_has_a_serious_finding(browser: Browser, finished: tuple[str, str], theme: Any, size: str) -> None:
     address, project = finished
     width, height = SIZES[size]
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=theme, bypass_csp=True)
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
-    page.goto(address)
+    looks = {"viewport": {"width": width, "height": height}, "color_scheme": theme, "bypass_csp": True}
     base = address.split("/?")[0]
-    found = serious(page, "projects")
-    page.goto(f"{base}/people")
-    page.get_by_role("heading", name="Add somebody").wait_for()
-    found += serious(page, "people")
-    for name in PAGES:
-        page.goto(f"{base}/p/{project}{name}")
-        page.locator("h1, h2").first.wait_for()
-        found += serious(page, name or "overview")
-    page.evaluate("document.body.append(document.createElement('button'))")
-    assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
-    context.close()
+    with signed_in(browser, address, **looks) as page:
+        found = serious(page, "projects")
+        page.goto(f"{base}/people")
+        page.get_by_role("heading", name="Add somebody").wait_for()
+        found += serious(page, "people")
+        for name in PAGES:
+            page.goto(f"{base}/p/{project}{name}")
+            page.locator("h1, h2").first.wait_for()
+            found += serious(page, name or "overview")
+        page.evaluate("document.body.append(document.createElement('button'))")
+        assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
     assert found == []
 
 
@@ -93,75 +102,60 @@ def serious(page: Page, where: str) -> list[str]:
 
 def test_a_change_made_without_a_connection_is_stored_when_it_is_back(browser: Browser, finished: tuple[str, str]) -> None:
     address, project = finished
-    context = browser.new_context()
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
-    page.goto(address)
-    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-    page.get_by_role("button", name="drawer_1", exact=True).click()
-    context.set_offline(True)
-    page.get_by_label("Name of drawer_1").fill("top_drawer")
-    page.get_by_label("Name of drawer_1").press("Enter")
-    expect(page.locator(".banner")).to_contain_text("1 change not stored yet")
-    context.set_offline(False)
-    expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
-    expect(page.locator(".banner")).to_be_hidden()
-    context.close()
+    with signed_in(browser, address) as page:
+        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+        page.get_by_role("button", name="drawer_1", exact=True).click()
+        page.context.set_offline(True)
+        page.get_by_label("Name of drawer_1").fill("top_drawer")
+        page.get_by_label("Name of drawer_1").press("Enter")
+        expect(page.locator(".banner")).to_contain_text("1 change not stored yet")
+        page.context.set_offline(False)
+        expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
+        expect(page.locator(".banner")).to_be_hidden()
 
 
 def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(browser: Browser, finished: tuple[str, str]) -> None:
     address, project = finished
-    context = browser.new_context()
-    context.set_default_timeout(PATIENCE_MS)
-    first, second = context.new_page(), context.new_page()
-    first.goto(address)
-    first.route("**/api/projects/**", lambda route: route.abort() if route.request.method == "PATCH" else route.continue_())
-    first.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-    first.locator(".object-list .pick").first.click()
-    first.get_by_label("Category of").last.fill("door")
-    first.get_by_label("Category of").last.press("Enter")
-    expect(first.locator(".banner")).to_contain_text("1 change not stored yet")
-    sent: list[str] = []
-    second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
-    second.goto(first.url)
-    second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
-    assert sent == []
-    first.close()
-    second.locator(".object-list .pick").first.click()
-    expect(second.get_by_label("Category of").last).to_have_value("door")
-    assert len(sent) == 1
-    context.close()
+    with signed_in(browser, address) as first:
+        second = first.context.new_page()
+        first.route("**/api/projects/**", lambda route: route.abort() if route.request.method == "PATCH" else route.continue_())
+        first.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+        first.locator(".object-list .pick").first.click()
+        first.get_by_label("Category of").last.fill("door")
+        first.get_by_label("Category of").last.press("Enter")
+        expect(first.locator(".banner")).to_contain_text("1 change not stored yet")
+        sent: list[str] = []
+        second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
+        second.goto(first.url)
+        second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
+        assert sent == []
+        first.close()
+        second.locator(".object-list .pick").first.click()
+        expect(second.get_by_label("Category of").last).to_have_value("door")
+        assert len(sent) == 1
 
 
 def test_who_is_at_a_list_by_keyboard_stays_there(browser: Browser, finished: tuple[str, str]) -> None:
     address, project = finished
-    context = browser.new_context()
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
-    page.goto(address)
-    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-    hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
-    hide.focus()
-    for button in (show, hide):
-        page.keyboard.press("Enter")
-        expect(button).to_be_focused()
-    context.close()
+    with signed_in(browser, address) as page:
+        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+        hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
+        hide.focus()
+        for button in (show, hide):
+            page.keyboard.press("Enter")
+            expect(button).to_be_focused()
 
 
 def test_a_control_reached_by_keyboard_is_used_by_it(browser: Browser, finished: tuple[str, str]) -> None:
     address, project = finished
-    context = browser.new_context()
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
-    page.goto(address)
-    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
-    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
-    for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
-        page.get_by_role("button", name=name).focus()
-        page.keyboard.press(key)
-        expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
-    page.get_by_label("Mask opacity").focus()
-    page.keyboard.press("ArrowRight")  # not: the next frame
-    expect(page.get_by_label("Mask opacity")).to_have_value("43")
-    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
-    context.close()
+    with signed_in(browser, address) as page:
+        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
+        expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+        for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
+            page.get_by_role("button", name=name).focus()
+            page.keyboard.press(key)
+            expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
+        page.get_by_label("Mask opacity").focus()
+        page.keyboard.press("ArrowRight")  # not: the next frame
+        expect(page.get_by_label("Mask opacity")).to_have_value("43")
+        expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
