@@ -15,6 +15,7 @@ class Candidate(Shape):
     id: str
     generator: str
     seed: int
+    assumes: str  # what it takes for true of what nobody saw; empty: a sample of a generator's own
     watertight: bool
     faces: int
     frames: list[int]

@@ -61,6 +61,7 @@ def _candidate(entry: dict[str, Any], verdict: Verdict | None, address: str, ver
         id=entry["candidate_id"],
         generator=entry["generator"],
         seed=entry["seed"],
+        assumes=entry["assumes"],
         watertight=entry["watertight"],
         faces=entry["faces"],
         frames=entry["frames"],
@@ -95,7 +96,7 @@ def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:
 
 
 def _candidate_facts(found: CandidateSet) -> dict[str, Any]:
-    kept = ("candidate_id", "generator", "seed", "watertight", "frames", "metrics", "parameters", "warnings")
+    kept = ("candidate_id", "generator", "seed", "assumes", "watertight", "frames", "metrics", "parameters", "warnings")
     candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
     about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
     return {**about, "candidates": candidates}

@@ -69,6 +69,7 @@ export interface Candidate {
   id: string;
   generator: string;
   seed: number;
+  assumes: string;
   watertight: boolean;
   faces: number;
   frames: number[];

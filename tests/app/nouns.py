@@ -101,6 +101,7 @@ def asset(name: str, candidate: str) -> MeshAsset:
         metrics={"volume": 1.0, "odd": float("nan")},
         parameters={},
         warnings=(),
+        assumes="0.58 m deep, to the wall behind it",
     )
 
 

@@ -40,6 +40,7 @@ def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed:
     )
     assert [c["id"] for c in group["candidates"]] == ["c0", "c1"]
     assert group["candidates"][0]["metrics"] == {"volume": 1.0}  # what is not a number is left out
+    assert group["candidates"][0]["assumes"] == "0.58 m deep, to the wall behind it"
     assert (group["placement"]["candidate"], group["placement"]["rms_m"], group["placement"]["votes"]) == (
         "c0",
         0.004,

@@ -70,6 +70,7 @@ function card(group, candidate, current, told) {
         candidate.id === group.chosen ? h("span", { class: "chip good" }, "★ used") : "",
         second ? h("span", { class: "chip" }, "runner-up") : "",
       ),
+      candidate.assumes ? h("div", { class: "assumes" }, candidate.assumes) : "",
       evidence(candidate),
       said ? h("div", { class: "muted" }, said) : "",
       ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
