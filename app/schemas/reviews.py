@@ -45,7 +45,7 @@ class Placement(Shape):
     translation_m: list[float]
     matches: int
     inliers: int
-    rms_m: float
+    rms_m: float | None  # None: no depth inside its masks
     mask_iou: float
     condition: float
     unsure: bool

@@ -78,10 +78,10 @@ def _candidate(entry: dict[str, Any], verdict: Verdict | None, address: str, ver
 
 def _placement(facts: dict[str, Any]) -> schemas.Placement:
     similarity = facts["world_from_mesh"]
-    names = ("matches", "inliers", "unsure", "runner_up", "runner_up_turn_deg", "method", "votes", "warnings")
+    names = ("matches", "inliers", "unsure", "runner_up", "runner_up_turn_deg", "method", "votes", "warnings", "rms_m")
     shown = {key: facts[key] for key in names}
     shown["spread"] = facts["spread"] and {key: facts["spread"][key] for key in ("turn_deg", "shift_m", "scale")}
-    shown |= {key: facts[key] if facts[key] is not None else 0.0 for key in ("rms_m", "mask_iou", "condition")}
+    shown |= {key: facts[key] if facts[key] is not None else 0.0 for key in ("mask_iou", "condition")}
     shown |= {"candidate": facts["candidate_id"], "scale": similarity["scale"], "translation_m": similarity["translation"]}
     return schemas.Placement.model_validate(shown)
 

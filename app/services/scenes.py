@@ -76,7 +76,7 @@ def _noun_facts(path: Path, _changed: int, work: Path, stage: str, name: str) ->
     noun = Workspace(work).load_latest(stage, name)
     if noun is None:
         return None
-    return len(noun.masks) if stage == "segment" else float(noun.rms_m)
+    return len(noun.masks) if stage == "segment" else plain(float(noun.rms_m))
 
 
 def _facts(files: ProjectFiles, stage: str, name: str) -> Any:

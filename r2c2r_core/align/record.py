@@ -88,7 +88,9 @@ def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> 
     """What else a person should know, a line each."""
     lines = []
     allowed = max(0.015, 0.03 * case.observation.size_m)
-    if not rms_m <= allowed:
+    if np.isnan(rms_m):
+        lines.append("the scan has no depth inside its masks: outlines alone placed it")
+    elif rms_m > allowed:
         lines.append(f"scan and mesh are {rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
     if condition > 30000:
         lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")

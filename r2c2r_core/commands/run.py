@@ -1,6 +1,7 @@
 """`r2c2r run`."""
 
 import argparse
+import math
 import shutil
 import sys
 from collections.abc import Mapping
@@ -124,7 +125,7 @@ def _summary(reconstruction: Any) -> str:
         width, depth, height = (f"{100 * size:.1f}" for size in item.dimensions_m)
         joints = ", ".join(f"{joint.type} {joint.upper:.2f}" for joint in item.joints) or "-"
         placement = placements.get(item.name)
-        rms = f"{1000 * placement.rms_m:.1f}" if placement else "-"
+        rms = f"{1000 * placement.rms_m:.1f}" if placement and not math.isnan(placement.rms_m) else "-"
         warnings = "; ".join(item.warnings + (placement.warnings if placement else ()))
         frames = len(tracks[item.name].masks) if item.name in tracks else 0
         rows.append((item.name, item.category, f"{width} x {depth} x {height}", joints, str(frames), rms, warnings))

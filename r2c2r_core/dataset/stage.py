@@ -168,7 +168,7 @@ def _object_entry(item: LabelledObject, placed: tuple[MeshAsset, Placement] | No
 
 
 def _candidate_entry(asset: MeshAsset) -> dict[str, Any]:
-    names = ("candidate_id", "generator", "seed", "watertight", "frames", "metrics", "parameters", "warnings")
+    names = ("candidate_id", "generator", "seed", "assumes", "watertight", "frames", "metrics", "parameters", "warnings")
     return {name: getattr(asset, name) for name in names}
 
 

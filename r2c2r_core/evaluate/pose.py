@@ -5,6 +5,8 @@ import numpy as np
 from r2c2r_core.evaluate.records import ObjectRecord
 from r2c2r_core.model.report import Metric
 
+_ROUND = "round about its vertical axis"
+
 
 def pose_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
     """Distance of the box centres and of the front faces' centres in mm, and the yaw in degrees.
@@ -12,12 +14,17 @@ def pose_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
     The front is reported apart because a built-in unit's back, and with it the centre, cannot be seen.
     """
     centre = found.world_from_object.translation - truth.world_from_object.translation
-    front = _front_centre(found) - _front_centre(truth)
     return (
         Metric(name="centre", value=1000 * float(np.linalg.norm(centre)), unit="mm", better="lower", tolerance=3.0),
-        Metric(name="front_centre", value=1000 * float(np.linalg.norm(front)), unit="mm", better="lower", tolerance=3.0),
+        _front(truth, found),
         _yaw(truth, found),
     )
+
+
+def _front(truth: ObjectRecord, found: ObjectRecord) -> Metric:
+    off = None if truth.turns_freely else 1000 * float(np.linalg.norm(_front_centre(found) - _front_centre(truth)))
+    note = _ROUND if truth.turns_freely else ""
+    return Metric(name="front_centre", value=off, unit="mm", better="lower", tolerance=3.0, note=note)
 
 
 def _front_centre(thing: ObjectRecord) -> np.ndarray:
@@ -27,7 +34,7 @@ def _front_centre(thing: ObjectRecord) -> np.ndarray:
 
 def _yaw(truth: ObjectRecord, found: ObjectRecord) -> Metric:
     if truth.turns_freely:
-        return Metric(name="yaw", value=None, unit="deg", better="lower", tolerance=0.3, note="round about its vertical axis")
+        return Metric(name="yaw", value=None, unit="deg", better="lower", tolerance=0.3, note=_ROUND)
     turn = truth.world_from_object.rotation.T @ found.world_from_object.rotation
     yaw = abs(float(np.degrees(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))))
     return Metric(name="yaw", value=yaw, unit="deg", better="lower", tolerance=0.3)

@@ -134,7 +134,13 @@ def _mask_entry(reconstruction: Reconstruction, track: MaskTrack) -> dict[str, A
 
 def _candidate_entries(candidates: CandidateSet) -> list[dict[str, Any]]:
     return [
-        {"id": c.candidate_id, "generator": c.generator, "seed": c.seed, "metrics": _plain(c.metrics)}
+        {
+            "id": c.candidate_id,
+            "generator": c.generator,
+            "seed": c.seed,
+            "assumes": c.assumes,
+            "metrics": _plain(c.metrics),
+        }
         for c in candidates.candidates
     ]
 

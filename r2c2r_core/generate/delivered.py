@@ -23,6 +23,7 @@ def delivered_asset(
     parameters: dict[str, float],
     metrics: dict[str, float] | None = None,
     warnings: tuple[str, ...] = (),
+    assumes: str = "",
 ) -> MeshAsset:
     """The parts as one closed candidate in a frame and unit of its own; raises GenerationFailed for what cannot be closed.
 
@@ -44,4 +45,5 @@ def delivered_asset(
         metrics={**(metrics or {}), **shape_metrics(*join_vertices(mesh.vertices, mesh.faces))},
         parameters={**parameters, "delivered_faces": float(sum(len(part.faces) for part in parts))},
         warnings=(*warnings, *(f"{generator} mesh: {note}" for note in notes)),
+        assumes=assumes,
     )

@@ -118,4 +118,5 @@ def _artifact(asset: MeshAsset, glb: bytes) -> dict[str, Any]:
         "parameters": asset.parameters,
         "metrics": asset.metrics,
         "warnings": list(asset.warnings),
+        "assumes": asset.assumes,
     }

@@ -4,7 +4,8 @@
     POST   /v1/mesh                        the form of wire.py -> 202 {"job": id}
     GET    /v1/jobs/{id}                   -> {"state": "queued|running|done|failed|cancelled", "error": text,
                                                "artifacts": [{"bytes": n, "sha256": hex, "generator": name, "frames": [int],
-                                               "parameters": {name: number}, "metrics": {}, "warnings": [text]}]}
+                                               "parameters": {name: number}, "metrics": {}, "warnings": [text],
+                                               "assumes": text}]}
     GET    /v1/jobs/{id}/artifacts/{n}     -> the mesh as GLB
     DELETE /v1/jobs/{id}                   nobody waits for it any more
 `…/v1/infer`  TRELLIS as NVIDIA NIM (nvcr.io/nim/microsoft/trellis, variant large:image): one JSON request, one answer
@@ -100,6 +101,7 @@ class Remote:
             parameters=_numbers(artifact.get("parameters")),
             metrics=_numbers(artifact.get("metrics")),
             warnings=tuple(str(line)[:300] for line in artifact.get("warnings", ())),
+            assumes=str(artifact.get("assumes", ""))[:300],
         )
 
     def _wait(self, job: str) -> dict[str, Any]:

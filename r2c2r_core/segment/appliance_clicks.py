@@ -69,7 +69,10 @@ def _photographed(front: Front, scene: Scene, usual_m: float, wall_m: float | No
     photos = photos_of(front, scene)
     front, clear = outlined(front, photos, usual_m, wall_m)
     standing = stood(front, photos)
-    return (front, clear) if standing is front else outlined(standing, photos, usual_m, wall_m)
+    if standing is front:
+        return front, clear
+    front, again = outlined(standing, photos, usual_m, wall_m)
+    return front, clear or again
 
 
 def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize, support_row: float | None) -> Cell | None:

@@ -73,8 +73,8 @@ def _appliance(
     front, seen = appliance_front(bench, prompt, hint, negatives, glimpse=glimpse) or (None, False)
     if front is None:
         return None
-    usual = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
-    return FoundAppliance(front, bench.scene, warnings=() if seen else (usual,))
+    assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
+    return FoundAppliance(front, bench.scene, warnings=() if seen else (assumed,))
 
 
 def _thing(

@@ -48,8 +48,10 @@ class Stance(NamedTuple):
 def stood(front: Front, photos: Sequence[Photo]) -> Front:
     """The front as the photographs have it stand, where depth saw too little of it; else as it was."""
     run, cell = front.run, front.cell
-    rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
-    if run.seen[rows, columns].mean() > _COVERED:
+    rows = slice(max(round(cell.top), 0), max(round(cell.bottom), 0))
+    columns = slice(max(round(cell.left), 0), max(round(cell.right), 0))
+    covered = run.seen[rows, columns]
+    if not covered.size or covered.mean() > _COVERED:
         return front
     found = stance(body_of(front), photos)
     cell_m = run.grid.cell_m

@@ -34,6 +34,7 @@ the paper's Powell search (eq. 8-9), for comparison."""
 _SURE_SHARE, _SURE_M = 0.08, 0.004  # a depth known this well, of itself or in metres, was measured
 _LEAST_SWINGS, _AGREED = 3, 0.75  # frames that show a door open, and the share of them that must agree on its side
 _SAME_STOP_RAD = np.deg2rad(4.0)
+_AS_TIGHT = 1.03  # a square is as tight as this when turned by 0.9 degrees, a round thing however it is turned
 _TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
 
 
@@ -186,15 +187,25 @@ def front_face_y(points: Points, normals: Points) -> float:
 
 
 def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch) -> np.ndarray:
-    """Upright axes along the mesh's own box, turned by the quarter turn whose front is nearest to `outward`."""
+    """Upright axes along the mesh's own box, turned by the quarter turn whose front is nearest to `outward`.
+
+    A round thing has no such box: any is as tight, and it faces `outward`.
+    """
     if search == "upright":
         axes = upright_box(samples.points, samples.normals, trim=_TRIM).world_from_box.rotation
     else:
         free = smallest_box(samples.points) if search == "hull" else powell_box(samples.points)
         axes = free.world_from_box.rotation
     level = [sign * axis for axis in axes.T for sign in (-1.0, 1.0) if abs(axis[2]) < _LEVEL]
-    front = max(level, key=lambda d: float(d @ outward), default=outward)
-    return front_rotation(np.array([front[0], front[1], 0.0]))
+    nearest = max(level, key=lambda d: float(d @ outward), default=outward)
+    facing, tightest = front_rotation(outward), front_rotation(np.array([nearest[0], nearest[1], 0.0]))
+    as_tight = _plan_area(samples.points, facing) <= _AS_TIGHT * _plan_area(samples.points, tightest)
+    return facing if as_tight else tightest
+
+
+def _plan_area(points: Points, rotation: np.ndarray) -> float:
+    low, high = np.quantile((points @ rotation)[:, :2], [_TRIM, 1 - _TRIM], axis=0)
+    return float(np.prod(high - low))
 
 
 def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:

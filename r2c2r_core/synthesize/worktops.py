@@ -190,10 +190,9 @@ def _stretches(top: _Top) -> Iterator[Interval]:
 
 
 def _below_what_stands_on_it(slab: Slab, run: UnitRun, objects: Sequence[MeasuredObject]) -> Slab:
-    """The slab, lowered by millimetres where an object was placed that far into its surface."""
+    """The slab, lowered by millimetres where objects were placed that far into its surface."""
     height = float(slab.high[2])
-    for corners in map(run.corners, objects):
-        bottom = float(corners[:, 2].min())
-        if slab.meets(corners, 0) and slab.meets(corners, 1) and height - _STOOD_IN_M < bottom < height + CLEAR_M / 4:
-            height = bottom - CLEAR_M / 4
-    return replace(slab, high=np.array([*slab.high[:2], min(height, float(slab.high[2]))]))
+    over = [corners for corners in map(run.corners, objects) if slab.meets(corners, 0) and slab.meets(corners, 1)]
+    bottoms = [float(corners[:, 2].min()) - CLEAR_M / 4 for corners in over]
+    lowest = min((bottom for bottom in bottoms if height - _STOOD_IN_M < bottom < height), default=height)
+    return replace(slab, high=np.array([*slab.high[:2], lowest]))

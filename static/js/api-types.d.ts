@@ -461,7 +461,7 @@ export interface Placement {
   translation_m: number[];
   matches: number;
   inliers: number;
-  rms_m: number;
+  rms_m: number | null;
   mask_iou: number;
   condition: number;
   unsure: boolean;

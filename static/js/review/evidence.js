@@ -17,7 +17,7 @@ export function placement(placement, item) {
   /** @type {[string, string][]} */
   const rows = [
     ["Placed by", placement.method],
-    ["To the scan", `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
+    ["To the scan", placement.rms_m === null ? "no depth" : `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
     ["Silhouette", `${(100 * placement.mask_iou).toFixed(0)} % overlap`],
     ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
     ["Held to", held(placement.spread)],

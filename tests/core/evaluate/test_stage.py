@@ -93,6 +93,17 @@ def test_each_metric_returns_the_size_of_a_known_perturbation(tmp_path: Path) ->
     assert values["hinge_side"] == 1.0
 
 
+def test_a_round_thing_has_no_front_to_be_turned(tmp_path: Path) -> None:
+    truth = truth_of(0)
+    manifest = bundle_of(truth)
+    bottle = next(entry for entry in manifest["objects"] if entry["name"] == "bottle_1")
+    pose = Rigid3.from_matrix(np.array(bottle["world_from_object"]))
+    bottle["world_from_object"] = Rigid3(rotation_about_z(np.radians(40.0)) @ pose.rotation, pose.translation).matrix.tolist()
+    values = row(evaluate_bundle(*write(tmp_path, truth, manifest)), "bottle_1")
+    assert (values["front_centre"], values["yaw"]) == (None, None)
+    assert values["centre"] == pytest.approx(0.0, abs=1e-5)
+
+
 def test_a_door_hinged_on_the_other_edge_is_wrong_and_a_drawer_called_a_door_too(tmp_path: Path) -> None:
     truth = truth_of(0)
     manifest = bundle_of(truth)

@@ -2,7 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
@@ -114,3 +116,20 @@ def test_a_round_things_depth_follows_from_its_width() -> None:
     found = carton_seen(face(1, -0.04), {"revolved": 1.0})
     assert found.sources[1] == "inferred"
     assert not found.warnings
+
+
+@pytest.mark.parametrize("turn_deg", [12.0, 40.0])
+def test_a_round_thing_faces_as_its_box_does_however_it_was_placed(turn_deg: float) -> None:
+    """A turned carton keeps its own axes."""
+    track, placement, asset = placed_unit(CARTON, np.random.default_rng(0))
+    at = placement.world_from_mesh
+    turned = Similarity3(at.scale, rotation_about_z(np.radians(turn_deg)) @ at.rotation, at.translation)
+    placement = replace(placement, world_from_mesh=turned)
+    solid = trimesh.creation.cylinder(radius=0.04, height=0.2, sections=32)
+    upright = turned.inverse.apply(np.asarray(solid.vertices) @ rotation_about_z(np.radians(turn_deg)).T + CARTON.centre)
+    drum = replace(asset, mesh=replace(asset.mesh, vertices=upright, faces=np.asarray(solid.faces)))
+    yaws = []
+    for item in (drum, asset):
+        found = measure_object(capture(), track, placement, item, fixture_for("box")[0], ObjectOverride())
+        yaws.append(np.degrees(np.arctan2(*found.world_from_object.rotation[[1, 0], 0])) % 90)
+    assert yaws == pytest.approx([0.0, turn_deg], abs=1.0)
