@@ -13,7 +13,7 @@ from r2c2r_core.synthesize.edits import moved
 _SAME_DIRECTION_RAD = np.deg2rad(7.0)
 _COPLANAR_M = 0.015
 _MANHATTAN_RAD = np.deg2rad(1.0)  # the room's right angle is measured on all walls: nearer than this it is the better word
-_PARALLEL_RAD = np.deg2rad(1.0)  # the yaw of a 0.5 m wide front, its edges known to about 8 mm
+_PARALLEL_RAD = np.deg2rad(0.6)  # the yaw of a 0.5 m wide front, its ends known to about 5 mm
 _LONG_RUN_M = 0.8
 
 
