@@ -10,6 +10,7 @@ MAX_DIRECTORY_BYTES = 64 * 1024 * 1024  # of the archive's own table of contents
 MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth do not compress like this
 LONGEST_NAME = 1000  # characters, folders included
 DEEPEST = 32  # folders in folders
+READ_BYTES = 1 << 20  # of the table of contents at once
 MIN_SUSPICIOUS = 64 * 1024 * 1024  # bytes unpacked below which no ratio is suspicious
 
 
@@ -83,17 +84,17 @@ def _refuse_large_directory(path: Path, max_files: int) -> None:
         directory_bytes = int.from_bytes(tail[record + 40 : record + 48], "little") if record >= 0 else 0
     if directory_bytes > min(MAX_DIRECTORY_BYTES, max_files * 400):
         raise CaptureError("the archive's table of contents is implausibly large", hint="pack one recording only")
-    entries = _entries_at_most(path, max(size - directory_bytes - len(tail), 0))
+    entries = entries_at_most(path, max(size - directory_bytes - len(tail), 0))
     if entries > max_files:
         raise CaptureError(f"the archive holds {entries} files, at most {max_files} expected", hint="pack one recording only")
 
 
-def _entries_at_most(path: Path, start: int) -> int:
+def entries_at_most(path: Path, start: int) -> int:
     """How many entries a table of contents in the file's bytes from `start` on can have: each begins with its mark."""
     mark, found, kept = b"PK\x01\x02", 0, b""
     with path.open("rb") as handle:
         handle.seek(start)
-        while piece := handle.read(1 << 20):
+        while piece := handle.read(READ_BYTES):
             found += (kept + piece).count(mark)
             kept = (kept + piece)[-3:]  # a mark that is cut in two; too short for one that was counted
     return found

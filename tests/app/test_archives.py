@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.archives import check_archive
+from app.archives import READ_BYTES, check_archive, entries_at_most
 from r2c2r_core.errors import CaptureError
 
 LIMITS = {"max_bytes": 1 << 20, "max_files": 100}
@@ -35,6 +35,16 @@ def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path,
         check_archive(path, "it", max_bytes=1 << 20, max_files=599)
     with pytest.raises(AssertionError, match="each entry"):
         check_archive(path, "it", max_bytes=1 << 20, max_files=600)
+
+
+@pytest.mark.parametrize("cut", range(5))  # so many bytes of the mark are read before the border, the rest after it
+def test_an_entry_whose_mark_is_cut_by_the_border_of_a_read_is_counted_once(tmp_path: Path, cut: int) -> None:
+    begins = "n" * (READ_BYTES - 46 - cut)  # the first entry of the table takes 46 bytes and its name
+    path = tmp_path / "cut.zip"
+    table = b"".join(b"PK\x01\x02" + bytes(42) + name.encode() for name in (begins, "a", "b"))
+    path.write_bytes(table)
+    assert table[READ_BYTES - cut :].startswith(b"PK\x01\x02")
+    assert entries_at_most(path, 0) == 3
 
 
 def test_an_encrypted_archive_is_refused(tmp_path: Path) -> None:
