@@ -65,17 +65,25 @@ def missing_files(path: Path) -> tuple[str, ...]:
     named: list[str] = []
     if path.suffix.lower() == ".obj":
         libraries = _named_in(path, ("mtllib",))
-        pictures = [name for library in libraries for name in _named_in(path.parent / library, ("map_Kd",))]
-        named = [*libraries, *pictures]
+        found = [library for name in libraries if (library := _beside(path, name)) is not None]
+        named = [*libraries, *(name for library in found for name in _named_in(library, ("map_Kd",)))]
     elif path.suffix.lower() == ".glb":
         named = _glb_pictures(path)
-    return tuple(dict.fromkeys(name for name in named if not (path.parent / name).is_file()))
+    return tuple(dict.fromkeys(name for name in named if _beside(path, name) is None))
+
+
+def _beside(path: Path, name: str) -> Path | None:
+    """The file of that name in the mesh file's folder or below it; None also where the name leads out of there."""
+    folder = path.parent.resolve()
+    try:
+        found = (folder / name).resolve()
+        return found if found.is_relative_to(folder) and found.is_file() else None
+    except (OSError, ValueError):  # a name that no file can have
+        return None
 
 
 def _named_in(path: Path, keywords: tuple[str, ...]) -> list[str]:
     """The files behind the keywords of an OBJ or MTL file; options such as `-o 0 0 0` stand before the name."""
-    if not path.is_file():  # a device would be read for ever
-        return []
     try:
         with path.open(errors="replace") as lines:
             words = [line.split() for line in lines if line.lstrip().startswith(keywords)]

@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 
 from r2c2r_core.generate import repair
-from r2c2r_core.generate.meshfile import missing_files, parts_of
+from r2c2r_core.generate.meshfile import missing_files, parts_of, read_parts
 from r2c2r_core.generate.repair import mended
 from r2c2r_core.generate.upload import read_upload
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, oriented_extents, volume
@@ -153,6 +153,20 @@ def test_files_that_were_not_given_are_named(tmp_path):
     asset = read_upload(obj, "chair_1", "upload0")
     assert any("wood_grain.png was not given" in warning for warning in asset.warnings)
     assert asset.watertight
+
+
+@pytest.mark.parametrize("named", ["../elsewhere/wood.mtl", "{folder}/elsewhere/wood.mtl", "link.mtl", "n" * 5000])
+def test_materials_outside_the_objs_own_folder_are_named_and_not_read(tmp_path, named):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "wood.mtl").write_text("newmtl wood\nKd 1 0 0\nmap_Kd secret.png\n")
+    (tmp_path / "upload").mkdir()
+    (tmp_path / "upload" / "link.mtl").symlink_to(tmp_path / "elsewhere" / "wood.mtl")
+    named = named.format(folder=tmp_path)
+    obj = tmp_path / "upload" / "chair.obj"
+    obj.write_text(f"mtllib {named}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wood\nf 1 2 3\n")
+    assert missing_files(obj) == (named,)
+    (part,) = read_parts(obj)
+    assert part.is_plain
 
 
 def test_a_glb_with_its_picture_elsewhere_is_named(tmp_path):
