@@ -58,6 +58,12 @@ def newest_bundle(session: Session, project_id: str) -> Bundle | None:
     return session.exec(query).first()
 
 
+def no_retry(row: Job, project: Project) -> str:
+    """Why the job, if it failed, would only fail again; empty where it may be retried."""
+    of_recording = row.kind in ("import", "sample")
+    return "the recording was refused, and is not kept" if of_recording and project.source_path is None else ""
+
+
 def job_shape(session: Session, row: Job) -> schemas.Job:
     """A job as it goes over the wire."""
     project = session.get(Project, row.project_id)
@@ -75,6 +81,7 @@ def job_shape(session: Session, row: Job) -> schemas.Job:
         message=row.message,
         error=schemas.ErrorBody(**row.error) if row.error else None,
         position=_position(session, row),
+        no_retry=no_retry(row, project) if project else "",
         attempts=row.attempts,
         who=row.who,
         has_log=row.log_path is not None,

@@ -21,7 +21,7 @@ class Project(SQLModel, table=True):
     id: str = Field(primary_key=True)  # random, never used twice: media are cached for ever under it
     name: str
     status: str  # importing | failed | ready
-    created: float
+    created: float  # when its upload began, where it was uploaded
     updated: float
     source_name: str
     source_path: str | None = None  # absolute; the upload, or a recording on this machine

@@ -32,6 +32,7 @@ class Job(Shape):
     eta_s: float | None
     message: str
     error: ErrorBody | None
+    no_retry: str  # why it cannot be retried once it failed; empty where it can
     position: int | None  # in the queue, 1 is next
     attempts: int
     who: str

@@ -88,6 +88,6 @@ class Figures(Shape):
     clicks_per_object: float | None
     verdicts: int  # verdicts and corrections
     automatic_kept: float | None  # share of accepted candidates that were the automatic choice
-    upload_to_approval_s: float | None
+    upload_to_approval_s: float | None  # from the upload's beginning, or the import's where there was none
     computing_s: float  # of the import, proposals, masks and runs; what went on at the same time counts once
     age_s: float

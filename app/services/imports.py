@@ -25,7 +25,7 @@ def from_finished_upload(context: Context, upload: Upload, received: Path) -> sc
         received.replace(target)
     with writing(context.engine) as session:
         name = _name(upload.name, upload.file_name)
-        project = projects.new_project(session, name, file_name, target, project_id=upload.id)
+        project = projects.new_project(session, name, file_name, target, project_id=upload.id, began=upload.created)
         session.delete(session.merge(upload))
         job = queue_job(context, session, project, "import", {})
     return _started(context, project.id, job)

@@ -83,8 +83,8 @@ def retry(context: Context, job_id: int) -> schemas.Job:
                 context, session, project, schemas.RunRequest(**{k: v for k, v in row.payload.items() if k != "inputs"})
             )
         else:
-            if project.source_path is None:
-                raise Conflict("the recording was refused, and is not kept", hint="delete the project, and upload another one")
+            if said := queries.no_retry(row, project):
+                raise Conflict(said, hint="delete the project, and upload another one")
             project.status, project.error = "importing", None
             session.add(project)
             job = queue_job(context, session, project, row.kind, row.payload)

@@ -48,10 +48,11 @@ def new_project(
     source_path: Path | None,
     work: Path | None = None,
     project_id: str | None = None,
+    began: float | None = None,
 ) -> Project:
-    """A project's row, still importing."""
+    """A project's row, still importing; `began` is when its upload did."""
     now, number = time.time(), project_id or secrets.token_hex(6)
-    project = Project(id=number, name=name, status="importing", created=now, updated=now, source_name=source_name)
+    project = Project(id=number, name=name, status="importing", created=began or now, updated=now, source_name=source_name)
     project.source_path = str(source_path) if source_path else None
     project.work_path = str(work) if work else None
     session.add(project)

@@ -301,6 +301,7 @@ export interface Job {
   eta_s: number | null;
   message: string;
   error: ErrorBody | null;
+  no_retry: string;
   position: number | null;
   attempts: number;
   who: string;
@@ -744,6 +745,7 @@ export interface ThingVerdict {
 export interface UndoRequest {
   object?: number | null;
   scope?: "prompts" | "review";
+  version?: number | null;
 }
 
 /** What was undone or redone, so that the page can say it. */
@@ -751,6 +753,7 @@ export interface Undone {
   object: SceneObject;
   text: string;
   frame: number | null;
+  version: number;
 }
 
 /** A recording on its way in; what comes next starts at `offset`. */

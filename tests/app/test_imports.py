@@ -156,7 +156,8 @@ def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and
     web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "failed")
     log = web.settings.data_dir / "projects" / project["id"] / "logs" / f"job-{project['job']['id']}.log"
     assert [path for path in left_behind(web) if path.is_file()] == [log]
-    assert "refused" in web.post(f"/api/jobs/{project['job']['id']}/retry", status=409)["message"]
+    told = web.get(f"/api/jobs/{project['job']['id']}")["no_retry"]  # before anybody asks for it
+    assert ("refused" in told, web.post(f"/api/jobs/{project['job']['id']}/retry", status=409)["message"]) == (True, told)
     web.delete(f"/api/projects/{project['id']}")
     assert left_behind(web) == []
 
@@ -166,6 +167,7 @@ def test_a_recording_that_cannot_be_read_where_it_lies_stays_there(web: Running,
     project = web.post("/api/projects/import", {"path": str(tmp_path / "broken.r3d")}, 202)["id"]
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "failed")
     assert (tmp_path / "broken.r3d").read_bytes() == R3D
+    assert web.get(f"/api/projects/{project}")["job"]["no_retry"] == ""
 
 
 def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) -> None:

@@ -13,6 +13,7 @@ from app.db.tables import Upload
 from app.services import accounts, leftovers, uploads
 from tests.app.conftest import ORIGIN, Running
 from tests.app.test_imports import R3D, archive, break_off, left_behind
+from tests.app.test_states import step
 
 
 def begin(web: Running, content: bytes = R3D, **more: Any) -> str:
@@ -47,6 +48,21 @@ def test_pieces_become_a_project_also_when_the_server_stops_between_them(start: 
         stored = web.settings.data_dir / "projects" / upload / "source" / "Kitchen.r3d"
         assert stored.read_bytes() == R3D
         assert list(web.settings.uploads.iterdir()) == []
+
+
+def test_the_time_to_approval_begins_with_the_first_byte(web: Running) -> None:
+    upload = begin(web)
+    with writing(web.context.engine) as session:
+        row = session.get(Upload, upload)
+        assert row is not None
+        row.created -= 1000.0  # seconds that sending it takes
+    send(web.client, upload, 0, R3D)
+    finish(web, upload)
+    web.until(lambda: web.get(f"/api/projects/{upload}")["status"] == "ready")
+    for to in ("ready", "in review", "approved"):
+        step(web, upload, to, "it is time")
+    figures = web.get(f"/api/projects/{upload}/figures")
+    assert 1000.0 < figures["upload_to_approval_s"] <= figures["age_s"]
 
 
 def test_bytes_that_do_not_fit_are_refused_with_the_offset_that_does(web: Running) -> None:

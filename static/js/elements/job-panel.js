@@ -84,8 +84,9 @@ export class JobPanel extends LiveElement {
     const add = (text, act, tone = "") =>
       row.append(h("button", { type: "button", class: tone, onClick: () => act().catch(sayError) }, text));
     if (running) add("Cancel", async () => (this.job = await cancelJob(job.id)));
-    if (["failed", "cancelled"].includes(job.state))
-      add("Try again", async () => (this.job = await retryJob(job.id)), "primary");
+    const ended = ["failed", "cancelled"].includes(job.state);
+    if (ended && job.no_retry) row.append(h("span", { class: "muted" }, `It cannot be tried again: ${job.no_retry}.`));
+    else if (ended) add("Try again", async () => (this.job = await retryJob(job.id)), "primary");
     if (job.has_log) {
       add(this.#log.hidden ? "Show the log" : "Hide the log", async () => {
         this.#log.hidden = !this.#log.hidden;

@@ -101,6 +101,8 @@ export class ReviewState extends LiveElement {
 function cost(figures) {
   const clicks = !figures.clicks_per_object ? "" : `${figures.clicks_per_object.toFixed(1)} clicks an object`;
   const time =
-    figures.upload_to_approval_s === null ? "" : `approved ${duration(figures.upload_to_approval_s)} after the import`;
+    figures.upload_to_approval_s === null
+      ? ""
+      : `approved ${duration(figures.upload_to_approval_s)} after the upload or import began`;
   return [clicks, time].filter(Boolean).join(" · ");
 }
