@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from app import schemas
 from app.deps import Ctx
 from app.routes.numbers import FrameNumber, RowId
-from app.services import clouds, masks, prompt_files, prompts
+from app.services import clouds, masks, prompt_files, prompts, undoing
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
 
@@ -68,14 +68,14 @@ def delete_point(context: Ctx, project: str, object: RowId, point: RowId, infer:
 
 @router.post("/undo", operation_id="undo")
 def undo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Undo the last change of one object, or of the project; 409 when there is none."""
-    return prompts.undo(context, project, body)
+    """Undo the last change of one object, or of the project; 409 when there is none, or `version` is old."""
+    return undoing.undo(context, project, body)
 
 
 @router.post("/redo", operation_id="redo")
 def redo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Redo what was undone last; 409 when there is nothing."""
-    return prompts.redo(context, project, body)
+    """Redo what was undone last; 409 when there is nothing, or `version` is old."""
+    return undoing.redo(context, project, body)
 
 
 @router.get("/prompts.json", operation_id="exportPrompts")

@@ -84,6 +84,7 @@ class UndoRequest(Shape):
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     scope: Literal["prompts", "review"] = "prompts"
+    version: int | None = Field(default=None, ge=0)  # of it in this scope, as last seen: 409 when somebody changed it since
 
 
 class Undone(Shape):
@@ -92,6 +93,7 @@ class Undone(Shape):
     object: SceneObject
     text: str
     frame: int | None
+    version: int  # of the object in this scope by now
 
 
 class HistoryEntry(Shape):

@@ -1,7 +1,6 @@
 """Objects and clicks. Every change is stored, with what was before it, before the answer goes out."""
 
 import re
-from typing import Literal
 
 from sqlalchemy import func
 from sqlmodel import Session, col, select
@@ -51,9 +50,7 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        if body.version is not None and body.version != item.version:
-            current = _shape(context, session, project, item, None).model_dump()
-            raise Conflict(f"{item.name} was changed meanwhile", hint="look at what is stored now", current=current)
+        refuse_overtaken(context, session, project, item, body)
         wanted = _wanted(session, item, body)
         text = ", ".join(f"{key} of {item.name} → {value}" for key, value in wanted.items()) or "nothing"
         with history.change(session, item, "prompts", "edit", text, who=context.who):
@@ -61,6 +58,16 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
                 setattr(item, key, value)
             session.add(item)
     return after_change(context, project_id, object_id, infer="category" in wanted)
+
+
+def refuse_overtaken(
+    context: Context, session: Session, project: Project, item: SceneObject, body: schemas.ObjectPatch | schemas.UndoRequest
+) -> None:
+    """Raise Conflict, with what is stored now, when somebody changed the object since the sender last looked."""
+    if body.version is None or body.version == item.version:
+        return
+    current = _shape(context, session, project, item, None).model_dump()
+    raise Conflict(f"{item.name} was changed meanwhile", hint="look at what is stored now", current=current)
 
 
 def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -128,16 +135,6 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
     return after_change(context, project_id, object_id, infer)
 
 
-def undo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Undo the last change of one object, or of the project."""
-    return _step(context, project_id, body, "undo")
-
-
-def redo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Redo what was undone last."""
-    return _step(context, project_id, body, "redo")
-
-
 def _create(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
     for point in body.points:
         check_point(context, project, point.frame, point.x, point.y)
@@ -168,23 +165,6 @@ def tell_object(context: Context, project_id: str, object_id: int) -> schemas.Sc
     shape = object_shape(context, project_id, object_id)
     context.hub.publish("object", project_id, object=shape.model_dump())
     return shape
-
-
-def _step(context: Context, project_id: str, body: schemas.UndoRequest, direction: Literal["undo", "redo"]) -> schemas.Undone:
-    if body.scope == "review":
-        context.require("reviewer")
-    with writing(context.engine) as session:
-        queries.project_row(session, project_id)
-        number = body.object if body.object is not None else history.last_change(session, project_id, body.scope, direction)
-        if number is None:
-            raise Conflict(f"nothing to {direction}")
-        item = queries.object_row(session, project_id, number, deleted=True)
-        step = history.undo if direction == "undo" else history.redo
-        event = step(session, item, body.scope, who=context.who)
-    shape = after_change(context, project_id, number, infer=body.scope == "prompts")
-    if body.scope == "review":
-        context.hub.publish("review", project_id, object=number)
-    return schemas.Undone(object=shape, text=event.text, frame=event.frame)
 
 
 def after_change(context: Context, project_id: str, object_id: int | None, infer: bool) -> schemas.SceneObject:

@@ -93,7 +93,11 @@ def store_override(context: Context, project_id: str, object_id: int, body: sche
 
 
 def refuse_overtaken(
-    context: Context, session: Session, project: Project, item: SceneObject, body: schemas.VerdictIn | schemas.OverridePatch
+    context: Context,
+    session: Session,
+    project: Project,
+    item: SceneObject,
+    body: schemas.VerdictIn | schemas.OverridePatch | schemas.UndoRequest,
 ) -> None:
     """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
     if body.version is None or body.version == history.version_of(session, item, "review"):

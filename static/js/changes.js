@@ -4,7 +4,7 @@
  */
 
 /** @import {
- *   CandidateGroup, Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, VerdictIn
+ *   CandidateGroup, Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, UndoRequest, VerdictIn
  * } from "./api-types" */
 
 /**
@@ -72,11 +72,17 @@ export const cancelSegment = (project, object) => ({
   path: `${on(project, object)}/segment/cancel`,
   json: {},
 });
-/** @param {string} project @param {"undo" | "redo"} which @param {number | null} object @param {"prompts" | "review"} scope @returns {Change<Undone>} */
-export const undoRedo = (project, which, object, scope) => ({
+/**
+ * Where `version` is given, nothing is taken back that somebody said since.
+ * @param {string} project
+ * @param {"undo" | "redo"} which
+ * @param {UndoRequest} wanted
+ * @returns {Change<Undone>}
+ */
+export const undoRedo = (project, which, wanted) => ({
   method: "POST",
   path: `${at(project)}/${which}`,
-  json: { object, scope },
+  json: body(wanted),
 });
 /** @param {string} project @param {string[]} ids @returns {Change<SceneObject[]>} */
 export const confirmProposals = (project, ids) => ({

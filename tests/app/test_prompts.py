@@ -29,6 +29,18 @@ def test_a_click_is_stored_and_undone_and_redone_also_after_a_restart(start: Cal
         web.post(f"/api/projects/{project}/redo", {"object": number}, 409)
 
 
+def test_a_click_is_not_undone_over_what_somebody_changed_meanwhile(web: Running) -> None:
+    project = web.sample()
+    item = web.get(f"/api/projects/{project}/objects")[0]
+    at = f"/api/projects/{project}/objects/{item['id']}"
+    seen = web.post(f"{at}/points", {"frame": 3, "x": 20, "y": 20})["version"]
+    renamed = web.patch(at, {"name": "of_somebody_else"})
+    refused = web.post(f"/api/projects/{project}/undo", {"object": item["id"], "version": seen}, 409)
+    assert (refused["kind"], refused["current"]["name"]) == ("conflict", "of_somebody_else")
+    undone = web.post(f"/api/projects/{project}/undo", {"object": item["id"], "version": renamed["version"]})
+    assert undone["version"] == undone["object"]["version"] > renamed["version"]
+
+
 def test_undo_of_the_project_takes_the_last_change_of_any_object(web: Running) -> None:
     project = web.sample()
     first, second = (o["id"] for o in web.get(f"/api/projects/{project}/objects"))

@@ -227,6 +227,25 @@ def test_a_verdict_or_correction_on_what_somebody_changed_meanwhile_is_refused_w
     assert again["group"]["override"]["hinge"] == "right"
 
 
+@pytest.mark.parametrize("direction", ["undo", "redo"])
+def test_nothing_is_undone_or_redone_over_what_somebody_said_meanwhile(reviewed: Reviewed, direction: str) -> None:
+    web, project, number = reviewed
+    base, at = f"/api/projects/{project}", f"/api/projects/{project}/objects/{number}"
+    mine = {"object": number, "scope": "review"}
+    seen = web.patch(f"{at}/override", {"hinge": "left", "rerun": False})["group"]["version"]
+    if direction == "redo":
+        seen = web.post(f"{base}/undo", {**mine, "version": seen})["version"]
+        web.post(f"{base}/redo", mine)  # by somebody who looked at it before
+    else:
+        web.patch(f"{at}/override", {"hinge": "right", "rerun": False})
+    stored = web.get(f"{at}/candidates")
+    refused = web.post(f"{base}/{direction}", {**mine, "version": seen}, 409)
+    assert (refused["kind"], refused["current"]["group"]) == ("conflict", stored)
+    assert web.get(f"{at}/candidates") == stored
+    undone = web.post(f"{base}/undo", {**mine, "version": refused["current"]["version"]})
+    assert undone["version"] == web.get(f"{at}/candidates")["version"] > stored["version"]
+
+
 def test_a_new_name_is_no_change_of_the_review(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     at = f"/api/projects/{project}/objects/{number}"

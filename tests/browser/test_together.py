@@ -207,6 +207,18 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     expect(bea.get_by_text("0 of 1 object accepted")).to_be_visible()
     bea.keyboard.press("Control+y")
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
+    expect(ann.get_by_text("1 of 1 object accepted")).to_be_visible()
+    bea.context.set_offline(True)  # what she takes back is not what was said last any more
+    bea.keyboard.press("Control+z")
+    expect(bea.locator(".banner")).to_contain_text("1 change not stored yet")
+    ann.get_by_role("button", name="Reject", exact=True).first.click()
+    say(ann, "Reject", "looks too small")
+    expect(ann.get_by_role("button", name="Reject", exact=True).first).to_have_attribute("aria-pressed", "true")
+    bea.context.set_offline(False)
+    expect(bea.locator(".toast", has_text="drawer_1 was reviewed meanwhile: ann, rejected c0")).to_be_visible()
+    expect(bea.get_by_role("button", name="Reject", exact=True).first).to_have_attribute("aria-pressed", "true")
+    bea.keyboard.press("Control+z")  # now that she has seen it
+    expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     bea.keyboard.press("y")  # once more than needed takes nothing back
     move(bea, "Approve", "the mug is not part of it")
     for page in people:

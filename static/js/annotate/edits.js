@@ -150,8 +150,8 @@ export class Edits extends EventTarget {
   undoRedo(which, frame) {
     const { chosen } = this.#objects;
     const mine = which === "undo" ? chosen?.can_undo : chosen?.can_redo;
-    const wanted = changes.undoRedo(this.project, which, mine ? (chosen?.id ?? null) : null, "prompts");
-    this.save(wanted).then(
+    const wanted = { object: mine ? (chosen?.id ?? null) : null };
+    this.save(changes.undoRedo(this.project, which, wanted)).then(
       ({ object, text, frame: at }) => {
         this.#say("object", { object });
         const where = at !== null && at !== frame ? ` (frame ${at})` : "";

@@ -74,15 +74,24 @@ export class Decisions extends EventTarget {
     if (group) this.#report(uploadCandidate(this.#project, group, file));
   }
 
-  /** @param {"undo" | "redo"} which */
+  /**
+   * Of what was said here or seen here: where somebody else said something since, that is shown instead.
+   * @param {"undo" | "redo"} which
+   */
   async undoRedo(which) {
+    const { object } = this.#objects;
+    await outbox.settled; // what was said before is what it takes back
+    const version = this.#objects.groups.find((group) => group.object === object)?.version;
+    if (version === undefined) return;
     try {
-      const { text } = await outbox.send(undoRedo(this.#project, which, this.#objects.object, "review"));
-      say(`${which === "undo" ? "Undone" : "Redone"}: ${text}`);
-      await this.#objects.load();
+      const wanted = { object, scope: /** @type {const} */ ("review"), version };
+      const undone = await outbox.send(undoRedo(this.#project, which, wanted));
+      this.#objects.stored(object, undone.version);
+      say(`${which === "undo" ? "Undone" : "Redone"}: ${undone.text}`);
     } catch (error) {
       sayError(error);
     }
+    await this.#objects.load();
   }
 
   get #project() {
@@ -103,6 +112,7 @@ export class Decisions extends EventTarget {
   async #report(answer) {
     try {
       const { text, job, group } = await answer;
+      if (group) this.#objects.stored(group.object, group.version);
       say(text ?? "What is stored stays as it is", { kind: text ? "good" : "" });
       this.dispatchEvent(new CustomEvent("stored", { detail: { object: group?.object, job } }));
       await this.#objects.load();

@@ -35,7 +35,7 @@ export class ReviewObjects extends EventTarget {
         getScene(this.project).catch(orNone),
         getCertificate(this.project).catch(orNone),
       ]);
-      this.groups = groups.map((group) => this.#asAccepted(group));
+      this.groups = groups.map((group) => this.#asSaid(group));
       this.items = scene?.items ?? [];
       this.certificate = certificate;
       if (!this.group) this.choose((groups.find(({ object }) => object === first) ?? groups[0])?.object ?? NONE);
@@ -96,14 +96,25 @@ export class ReviewObjects extends EventTarget {
     const stored = () => this.#accepting.delete(group.object);
     this.#accepting.set(group.object, candidate);
     answer.then(stored, stored);
-    this.groups = this.groups.map((one) => this.#asAccepted(one));
+    this.groups = this.groups.map((one) => this.#asSaid(one));
     if (this.object === group.object) this.stepToReview();
     this.#say("change");
   }
 
-  /** @param {CandidateGroup} group */
-  #asAccepted(group) {
-    return { ...group, accepted: this.#accepting.get(group.object) ?? group.accepted };
+  /**
+   * What was said here is stored: what is said next is about that version.
+   * @param {number} object
+   * @param {number} version
+   */
+  stored(object, version) {
+    this.groups = this.groups.map((one) => (one.object === object ? { ...one, version } : one));
+  }
+
+  /** With what was said here after it was asked for. @param {CandidateGroup} group */
+  #asSaid(group) {
+    const known = this.groups.find(({ object }) => object === group.object)?.version ?? 0;
+    const accepted = this.#accepting.get(group.object) ?? group.accepted;
+    return { ...group, accepted, version: Math.max(known, group.version) };
   }
 
   /** @param {string} type */

@@ -1,0 +1,52 @@
+"""Undo and redo: of clicks and names for everybody, of verdicts and corrections for reviewers."""
+
+from typing import Literal
+
+from sqlmodel import Session
+
+from app import schemas
+from app.db import history, queries
+from app.db.engine import writing
+from app.db.tables import Project, SceneObject
+from app.errors import Conflict
+from app.services import prompts, reviews
+from app.services.context import Context
+
+
+def undo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Undo the last change of one object, or of the project."""
+    return _step(context, project_id, body, "undo")
+
+
+def redo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
+    """Redo what was undone last."""
+    return _step(context, project_id, body, "redo")
+
+
+def _step(context: Context, project_id: str, body: schemas.UndoRequest, direction: Literal["undo", "redo"]) -> schemas.Undone:
+    if body.scope == "review":
+        context.require("reviewer")
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        number = body.object if body.object is not None else history.last_change(session, project_id, body.scope, direction)
+        if number is None:
+            raise Conflict(f"nothing to {direction}")
+        item = queries.object_row(session, project_id, number, deleted=True)
+        _refuse_overtaken(context, session, project, item, body)
+        step = history.undo if direction == "undo" else history.redo
+        event = step(session, item, body.scope, who=context.who)
+        version = item.version if body.scope == "prompts" else history.version_of(session, item, "review")
+    shape = prompts.after_change(context, project_id, number, infer=body.scope == "prompts")
+    if body.scope == "review":
+        context.hub.publish("review", project_id, object=number)
+    return schemas.Undone(object=shape, text=event.text, frame=event.frame, version=version)
+
+
+def _refuse_overtaken(
+    context: Context, session: Session, project: Project, item: SceneObject, body: schemas.UndoRequest
+) -> None:
+    """Raise Conflict rather than take back what the sender has not seen."""
+    if body.scope == "review":
+        reviews.refuse_overtaken(context, session, project, item, body)
+    else:
+        prompts.refuse_overtaken(context, session, project, item, body)
