@@ -3,9 +3,9 @@
     python benchmarks/cabinet.py FOLDER [--workdir DIR]
 
 FOLDER is shared/data/cabinet-tum-fr3-58. Writes cabinet.json beside this file: width, depth and height, of the placed mesh and
-of the scene's object, against the recording's own box (0.793 x 0.445 m, top 0.554 m above the floor), and whether each is
-within 2 cm. The category is one that stands free on the floor and may be as long as this is: as a "cabinet" it would be taken
-for one of a row, whose depth no frame shows.
+of the scene's object, against the recording's own box (0.793 x 0.445 m, top 0.554 m above the floor), whether each is
+within 2 cm, and how much of that box the mesh fills (the cabinet is closed all round). The category is one that stands free on
+the floor and may be as long as this is: as a "cabinet" it would be taken for one of a row, whose depth no frame shows.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from r2c2r_core.geometry.boxes import upright_box
-from r2c2r_core.geometry.meshes import sample_surface
+from r2c2r_core.geometry.meshes import sample_surface, volume
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.pipeline import Request, reconstruct
 from r2c2r_core.workspace import Workspace
@@ -57,6 +57,7 @@ def measured(work: Workspace) -> dict[str, object]:
         **{f"{name}_m": np.sort(size).round(4).tolist() for name, size in sizes.items()},
         **{f"{name}_off_mm": (1000 * value).round(1).tolist() for name, value in off.items()},
         "within_2_cm": {name: bool((np.abs(value) < 0.02).all()) for name, value in off.items()},
+        "filled_share": round(volume(vertices, asset.mesh.faces) / float(np.prod(TRUE_M)), 3),
         "mask_iou": round(placement.mask_iou, 4),
         "rms_mm": round(1000 * placement.rms_m, 2),
         "unsure": placement.unsure,

@@ -5,7 +5,9 @@ posts that depth shows say how thick they are and how they lean (masks often lea
 the same, mirrored, where free space lets one stand.
 """
 
+import re
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,7 @@ from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 
-_LEGGED = ("chair", "stool", "table", "desk", "bench")
+_LEGGED = re.compile(r"(\w*(chair|stool|desk|bench)|table)(e?s)?")  # armchair, barstools; no vegetable, no turntable
 _CELL_M, _LEVEL_M = 0.02, 0.015
 _LEAST_AREA = 0.3  # of the thing's plan, that its slab covers
 _LOWEST, _HIGHEST_M = 0.3, 1.15  # a slab's height: share of the thing's, and metres
@@ -29,6 +31,7 @@ _CORNER_M = 0.10  # how far from a corner its post may stand
 _LEAN = 0.35  # a post's, at most: metres sideways a metre down
 _STEP_M, _LEAST_STEPS, _LEAST_POINTS = 0.03, 5, 8  # heights at which depth must show a post, and its points at each
 _TO_EDGE_M = 0.06  # a slab ends where the thing does, if it is seen to come this near
+_CLOSED = 0.5  # of the height below a slab that is filled wider than a post: a side
 _EMPTY = 0.7  # of a corner's height that is seen free: nothing stands there
 
 
@@ -57,12 +60,13 @@ class Support(NamedTuple):
 
 
 def stands_on_legs(category: str) -> bool:
-    """Whether things of that name are a slab on posts."""
-    return any(word.rstrip("s") in _LEGGED for word in category.lower().replace("_", " ").split())
+    """Whether things of that name are a slab on posts: by its last word, as a table lamp is a lamp."""
+    words = re.findall(r"[a-z]+", category.lower())
+    return bool(words) and _LEGGED.fullmatch(words[-1]) is not None
 
 
 def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
-    """The slab that was seen and its four posts; None without a floor, a slab, or where a corner is seen to be empty."""
+    """The slab that was seen and its four posts; None without a floor or a slab, with a closed side or an empty corner."""
     seen, points = carving.seen, carving.seen.points
     if seen.floor is None:
         return None
@@ -74,6 +78,8 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     low = np.where(low - seen.low[:2] < _TO_EDGE_M, seen.low[:2], low)
     high = np.where(seen.high[:2] - high < _TO_EDGE_M, seen.high[:2], high)
     slab = BoxPart(np.append(low, level - _thickness(points, level, low, high)), np.append(high, level))
+    if _has_closed_side(points, slab, seen.floor):
+        return None
     under = _points_under(slab, seen.floor, views, seen.world_from_local)
     corners = [(x, y) for x in (0, 1) for y in (0, 1)]
     seen_posts = {corner: _seen_post(under, slab, corner, seen.floor) for corner in corners}
@@ -109,6 +115,31 @@ def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) 
         return _SLAB_M
     ends = np.flatnonzero(counts < 0.3 * counts[0])
     return float(np.clip(0.02 + 0.01 * (ends[0] if len(ends) else len(counts)), *_SLAB_RANGE_M))
+
+
+def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
+    """Whether the thing's own points below the slab's rim, between its corners, are wider than a post at most heights.
+
+    Without this, a closed side that is cut off round a corner and seen at a slant is as slender as a post.
+    """
+    from scipy import ndimage
+
+    low, high = slab.low[:2], slab.high[:2]
+    lowest, highest = floor + _STEP_M, float(slab.low[2])
+    if highest - lowest < _STEP_M:
+        return False
+    corner = np.minimum(_CORNER_M, (high - low) / 4)
+    between = (points[:, :2] > low + corner) & (points[:, :2] < high - corner)
+    wide = np.ones((round(1.5 * _POST_RANGE_M[1] / _CELL_M), 1), bool)  # a post that noise blurs is still narrower
+    for axis, edge in product((0, 1), (low, high)):
+        along = 1 - axis
+        side = points[between[:, along] & (np.abs(points[:, axis] - edge[axis]) < _CORNER_M)]
+        cells = max(int((high - low)[along] / _CELL_M), 1), int((highest - lowest) / _STEP_M)
+        span = [[low[along], high[along]], [lowest, highest]]
+        filled = np.histogram2d(side[:, along], side[:, 2], bins=cells, range=span)[0] > 0
+        if ndimage.binary_erosion(filled, wide).any(axis=0).mean() > _CLOSED:
+            return True
+    return False
 
 
 def _points_under(slab: BoxPart, floor: float, views: Sequence[View], world_from_local: Rigid3) -> list[tuple[Points, Vector3]]:

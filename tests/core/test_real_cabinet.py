@@ -9,7 +9,7 @@ from r2c2r_core.align.stage import AlignConfig
 from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.generate.stage import GenerateConfig
 from r2c2r_core.geometry.boxes import upright_box
-from r2c2r_core.geometry.meshes import sample_surface
+from r2c2r_core.geometry.meshes import sample_surface, volume
 from r2c2r_core.ingest.stage import IngestConfig
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.pipeline import Request, reconstruct
@@ -35,6 +35,8 @@ def test_a_real_cabinet_has_its_size_within_two_centimetres(tmp_path: Path) -> N
     reconstruct(Request(source=CABINET, prompts=prompts, config=QUICK), work, until="synthesize")
     placement, scene = work.load_latest("align", "cabinet"), work.load_latest("synthesize", "scene")
     mesh = work.load_latest("generate", "cabinet").candidates[0].mesh
-    surface, _ = sample_surface(placement.world_from_mesh.apply(mesh.vertices), mesh.faces, 6000, np.random.default_rng(0))
+    vertices = placement.world_from_mesh.apply(mesh.vertices)
+    surface, _ = sample_surface(vertices, mesh.faces, 6000, np.random.default_rng(0))
     np.testing.assert_allclose(np.sort(upright_box(surface, trim=0.003).size_m), TRUE_M, atol=0.02)
+    assert volume(vertices, mesh.faces) > 0.85 * np.prod(TRUE_M)  # closed all round: no slab on legs, and no shell
     np.testing.assert_allclose(np.sort(scene.objects[0].dimensions_m), TRUE_M, atol=0.02)

@@ -139,6 +139,30 @@ def chair_scene(seed=0):
     return capture, track("chair_1", "chair", "thing", masks, box=thing)
 
 
+def storage_bench_scene(seed=0):
+    """A closed bench 0.8 x 0.4 x 0.45 m with a back board 0.85 m high, on the floor."""
+    parts = [box((-0.4, 0, 0), (0.4, 0.4, 0.45), (160, 60, 50), 1), box((-0.4, 0.36, 0.45), (0.4, 0.4, 0.85), (60, 90, 170), 1)]
+    return _on_floor(parts, "storage_bench", np.array([0.8, 0.4, 0.85]), seed)
+
+
+def desk_scene(seed=0):
+    """A desk 1.2 x 0.6 x 0.74 m on a block of drawers and two legs."""
+    parts = [
+        box((-0.6, 0, 0.7), (0.6, 0.6, 0.74), (160, 60, 50), 1),
+        box((0.2, 0.02, 0), (0.58, 0.58, 0.7), (60, 90, 170), 1),
+        *(box((-0.6, y, 0), (-0.555, y + 0.045, 0.7), (90, 60, 40), 1) for y in (0.0, 0.555)),
+    ]
+    return _on_floor(parts, "desk", np.array([1.2, 0.6, 0.74]), seed)
+
+
+def _on_floor(parts, category, size, seed):
+    """A thing whose front is at y = 0, filmed from before it at some two metres."""
+    centre = np.array([0.0, size[1] / 2, size[2] / 2])
+    capture, masks = scan(parts, target=centre, distance=2.0, seed=seed, wall_y=1.6)
+    thing = ThingBox(world_from_object=Rigid3(np.eye(3), centre), dimensions_m=size, support_z_m=0.0)
+    return capture, track(f"{category}_1", category, "thing", masks, box=thing)
+
+
 def carton_scene(size, *, arc_deg, elevation_deg, yaw_rad, wall_gap_m=0.05, seed=0):
     """A carton on a counter before a wall, filmed along an arc; the segmenter's box is square to the room and too deep."""
     turn = rotation_about_z(yaw_rad)
