@@ -23,13 +23,19 @@ from r2c2r_core.model.track import FrontPanel, ThingBox
 HandleStyle = Literal["bar", "block", "none"]
 
 _TOLD: dict[DepthSource, str] = {
-    "seen": "{:.2f} m deep, as its sides show",
-    "points": "{:.2f} m deep, as far as its points reach",
-    "wall": "{:.2f} m deep, to the wall behind it",
-    "worktop": "{:.2f} m deep, as the worktop on it",
-    "category": "{:.2f} m deep, as its kind usually is",
-    "catalogue": "{:.2f} m deep, the next size sold",
+    "seen": "as its sides show",
+    "points": "as far as its points reach",
+    "box": "as its box was measured",
+    "wall": "to the wall behind it",
+    "worktop": "as the worktop on it",
+    "category": "as its kind usually is",
+    "catalogue": "the next size sold",
 }
+_SPREAD: dict[DepthSource, float] = {
+    "wall": 0.2,
+    "worktop": 1.0,
+    "category": 1.0,
+}  # of the draw's; what was seen, or is sold, has none
 _HANDLE_ERROR: dict[HandleStyle, float] = {"bar": 0.0, "block": 0.25, "none": 1.0}  # of its protrusion
 _FRONT_ZONE_M = 0.03  # faces this near to the outer face belong to the front
 _LEAST_FACE_POINTS = 200
@@ -47,7 +53,7 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
     relief = cache(partial(measure_relief, front))  # the guesses of one draw share it
 
     def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
-        depth = _varied(behind, variation)
+        depth = behind.depth_m * _scale(behind, variation)
         low = np.array([-front.width_m / 2, 0.0, -front.height_m / 2])
         high = np.array([front.width_m / 2, depth, front.height_m / 2])
         made = _box_with_relief(BoxPart(low, high), front.world_from_front, np.zeros(3), relief(variation), handle)
@@ -66,15 +72,17 @@ def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hyp
     front = _local_front(track.front, box)
     corners = cache(partial(_measured_box, evidence, box))
     relief = cache(partial(measure_relief, front)) if front is not None else None
-    depths = _appliance_depths(evidence, box, *corners(everything))
+    depths, seen_m = _appliance_depths(evidence, box, *corners(everything))
 
     def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
         low, high = (corner.copy() for corner in corners(variation))
-        high[1] = low[1] + _varied(behind, variation)
+        depth = max(behind.depth_m * _scale(behind, variation), seen_m)
+        high[1] = low[1] + depth
         found = relief(variation) if relief is not None else NO_RELIEF
         at = box.world_from_object.inverse.apply(front.world_from_front.translation[None])[0] if front is not None else low
         made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
-        return replace(made, unseen_error_m=abs(float(high[1] - low[1]) - depths[0].depth_m) + _handle_error(found, handle))
+        error = abs(depth - depths[0].depth_m) + _handle_error(found, handle)
+        return replace(made, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
 
     return _depths_and_handles(depths, front, shape)
 
@@ -84,7 +92,7 @@ def _depths_and_handles(
 ) -> tuple[Hypothesis, ...]:
     """The most trusted depth with each style of handle, and the other depths, by turns."""
     style: HandleStyle = "bar" if front is not None and front.handle is not None else "none"
-    others = [Hypothesis(_TOLD[b.source].format(b.depth_m), partial(shape, b, style)) for b in depths]
+    others = [Hypothesis("{depth_m:.2f} m deep, " + _TOLD[b.source], partial(shape, b, style)) for b in depths]
     if style == "none":
         return tuple(others)
     best = depths[0]
@@ -118,14 +126,13 @@ def _handle_error(relief: Relief, style: HandleStyle) -> float:
     return 0.0 if relief.handle is None else _HANDLE_ERROR[style] * relief.handle.protrusion_m
 
 
-def _varied(behind: DepthBehind, variation: Variation) -> float:
-    """A depth that the scan shows is varied little, a usual one by its full spread."""
-    spread = {"seen": 0.0, "points": 0.0, "wall": 0.2}.get(behind.source, 1.0)
-    return behind.depth_m * (1.0 + spread * (variation.depth_scale - 1.0))
+def _scale(behind: DepthBehind, variation: Variation) -> float:
+    """A depth that the scan shows is varied little, a usual one by its full spread, one that is sold not at all."""
+    return 1.0 + _SPREAD.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
 
 
-def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[DepthBehind, ...]:
-    """The depth its sides show, where they were seen; else what furniture may have, but no less than was seen."""
+def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[tuple[DepthBehind, ...], float]:
+    """The depth its sides show, where they were seen; else what furniture may have. And the least, which was seen."""
     category = evidence.track.category
     width, thought, height = (float(v) for v in box.dimensions_m)
     end = rear_edge(low, high, evidence.pool, box.world_from_object)
@@ -133,8 +140,9 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
     front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, float(low[1]), 0.0]]))[0])
     assumed = depths_behind(evidence.capture, front, width, height, category)
     if measured > _MOST_HIDDEN * category_depth(category) and _side_seen(box, evidence.pool):
-        return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "points"), *assumed])
-    return distinct([b._replace(depth_m=max(b.depth_m, measured)) for b in assumed])
+        return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
+    reached = DepthBehind(measured, "points")
+    return distinct([b if b.depth_m >= measured else reached for b in assumed]), measured
 
 
 def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:

@@ -36,10 +36,14 @@ def carton_family(evidence: Evidence, seen: Seen) -> tuple[Hypothesis, ...]:
 
 
 def _cuboid_shape(found: Cuboid, room_m: float, sigmas: float, variation: Variation) -> Shape:
-    """The box with another depth, so many standard deviations off, but not in a wall."""
+    """The box with another depth, so many standard deviations off, but not in a wall.
+
+    A draw takes the likeliest depth to either side, and others further to the side that they are named for.
+    """
     size = np.array(found.size_m)
     low = -size / 2  # the front, which was seen, stays
-    deeper = min(found.depth_spread_m * (sigmas + variation.depth_draw), room_m)
+    off = sigmas * (1.0 + abs(variation.depth_draw) / 3.0) if sigmas else variation.depth_draw
+    deeper = min(found.depth_spread_m * off, room_m)
     size[1] = max(size[1] + deeper, 0.3 * size[1])
     parameters = {"boxed": 1.0, "depth_sigma_m": float(found.sigma_m[1])}
     return thing_model(box_mesh(low, low + size), found.world_from_cuboid, parameters)

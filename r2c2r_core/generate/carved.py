@@ -83,14 +83,19 @@ def sheet_field(carving: Carving, solid: np.ndarray) -> np.ndarray:
 
 def above(carving: Carving, field: np.ndarray, height_m: float) -> np.ndarray:
     """The field with all that is below a height (local) cut off."""
-    z = carving.grid.low[2] + (np.arange(carving.grid.shape[2]) + 0.5) * carving.grid.voxel_m
-    return np.maximum(field, height_m - z)
+    return np.maximum(field, height_m - carving.grid.heights())
 
 
 def volume_below(carving: Carving, field: np.ndarray, height_m: float) -> float:
     """How much of the solid lies below a height (local), cubic metres."""
-    z = carving.grid.low[2] + (np.arange(carving.grid.shape[2]) + 0.5) * carving.grid.voxel_m
-    return float(np.count_nonzero(field[:, :, z < height_m] < 0)) * carving.grid.voxel_m**3
+    return float(np.count_nonzero(field[:, :, carving.grid.heights() < height_m] < 0)) * carving.grid.voxel_m**3
+
+
+def emptied_height(carving: Carving, solid: np.ndarray, left: np.ndarray) -> float:
+    """How much of `solid` is not in `left`: the mean height over the ground that the solid covers, metres."""
+    inside = solid < 0
+    columns = max(int(np.count_nonzero(inside.any(axis=2))), 1)
+    return float(np.count_nonzero(inside & (left >= 0))) / columns * carving.grid.voxel_m
 
 
 def _mirror_unseen(field: np.ndarray, seen: np.ndarray, free: np.ndarray, hidden: np.ndarray) -> bool:

@@ -10,7 +10,7 @@ from r2c2r_core.generate.asset import shape_metrics, unposed
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
-from r2c2r_core.generate.consistency import self_consistency
+from r2c2r_core.generate.consistency import JUDGES, self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.shape import Shape
@@ -23,7 +23,6 @@ from r2c2r_core.model.mesh import MeshAsset
 _FRONT_PX = 768  # long side of a front's picture
 _FINEST_TEXEL_M = 0.0012  # a phone at 1 m sees 1.3 mm per pixel
 _THING_PX = 512
-_JUDGES = 8  # views that judge every candidate of an object alike
 
 
 class Completion:
@@ -33,7 +32,10 @@ class Completion:
         self._known: _Known | None = None
 
     def make(self, evidence: Evidence, candidate_id: str, seed: int) -> MeshAsset:
-        """One candidate: one of the hypotheses about what nobody saw, from all good frames; once these are told, from some."""
+        """One candidate: one of the hypotheses about what nobody saw, by turns.
+
+        With seed 0 the first turn is from all good frames; every other is a draw of its own, from some.
+        """
         guess = self._guess(evidence, candidate_id, seed)
         atlas = _cut_open(guess.shape)
         shape, variation = guess.shape, guess.variation
@@ -69,13 +71,18 @@ class Completion:
         shape = hypothesis.shape(variation)
         if not _is_solid(shape):
             raise GenerationFailed(f"{evidence.track.name}: candidate {candidate_id} did not close")
-        return _Guess(shape, variation, hypothesis.assumes)
+        return _Guess(shape, variation, hypothesis.assumes.format(**shape.parameters))
 
     def _hypotheses(self, evidence: Evidence) -> "_Known":
         """Found once for all candidates of an object, and kept until the next object's turn."""
         if self._known is None or self._known.evidence is not evidence:
             everything = whole_pool(evidence)
-            self._known = _Known(evidence, everything, _hypotheses_of(evidence, everything), {})
+            try:
+                self._known = _Known(evidence, everything, _hypotheses_of(evidence, everything), {})
+            except GenerationFailed as error:  # the other candidates would fail alike
+                self._known = _Known(evidence, everything, (), {}, error)
+        if self._known.failure is not None:
+            raise self._known.failure.with_traceback(None)
         return self._known
 
 
@@ -84,9 +91,10 @@ class _Known(NamedTuple):
     everything: Variation  # every good frame, and the middle of each range
     hypotheses: tuple[Hypothesis, ...]
     draws: dict[tuple[int, int], Variation]
+    failure: GenerationFailed | None = None  # why there are no hypotheses
 
     def draw(self, turn: int, seed: int) -> Variation:
-        """The frames and settings that all hypotheses share in one turn: at first every good frame, later some."""
+        """The frames and settings that all hypotheses share in one turn: at seed 0 first every good frame, else some."""
         if turn == 0 and seed == 0:
             return self.everything
         if (turn, seed) not in self.draws:
@@ -107,7 +115,7 @@ def _generator(evidence: Evidence, purpose: str, seed: int) -> np.random.Generat
 
 def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
     """Scale-free measures, and how the shape fits what is known: masks and depth of the frames that judge all alike."""
-    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
+    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:JUDGES])
     more = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
     if evidence.track.kind == "thing":  # furniture hangs on its wall
         more |= {"stands": float(stands(shape.vertices_world, shape.faces)), "carved": shape.parameters.get("carved", 0.0)}

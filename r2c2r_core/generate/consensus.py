@@ -21,17 +21,26 @@ from typing import Literal
 import numpy as np
 
 from r2c2r_core.errors import GenerationFailed, OverrideError
+from r2c2r_core.generate.consistency import COPIED_COST, disagreement
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset
 
 Rule = Literal["medoid", "mean"]
 
 _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
-_DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
 _UNSEEN_WEIGHT = 1.0  # per metre: half of an error that was seen
 _OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
-_COPIED_COST = 0.05  # carving copies the masks' errors: it has to agree with them better than a clean shape
 _FALLS_COST = 0.1  # what would tip over was not found standing
 _MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
+_FITS_ALIKE = 0.005  # of IoU
+_BUT = {
+    "oddness": "its proportions differ {oddness:.1f} %",
+    "unseen": "what nobody saw of it is {unseen:.0f} cm off the likeliest",
+    "heavy": "it has {faces:.0f} faces",
+    "falls": "it would tip over",
+    "copied": "it copies the masks with their errors",
+    "open": "it is not closed",
+}
+"""What each cost but the fit says of who has to bear it."""
 
 
 def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str] = (), rule: Rule = "medoid") -> CandidateSet:
@@ -40,10 +49,8 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
     if not allowed:
         name = candidates[0].object_name if candidates else "object"
         raise GenerationFailed(f"{name}: every candidate was rejected", hint="take one back, upload a mesh or change the seed")
-    oddness = _oddness(candidates, allowed, rule)
-    doubt = _doubt(candidates)
-    by_chance = np.array([not c.assumes or rule == "mean" for c in candidates])
-    cost = np.where(by_chance, oddness, 0.0) + doubt + _flaws(candidates)
+    costs = _costs(candidates, allowed, rule)
+    cost = sum(costs.values(), np.zeros(len(candidates)))
     order = sorted(range(len(candidates)), key=lambda i: (i not in allowed, round(float(cost[i]), 12), i))
     best = order[0]
     return CandidateSet(
@@ -51,7 +58,7 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
         candidates=tuple(candidates),
         chosen_id=candidates[best].candidate_id,
         chosen_by="consensus",
-        reason=_reason(candidates, best, allowed, oddness, doubt, rule),
+        reason=_reason(candidates, best, allowed, costs, rule),
         ranking=tuple(candidates[i].candidate_id for i in order),
     )
 
@@ -76,29 +83,23 @@ def _oddness(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule
     return np.array([np.abs(shapes[i] - shapes[j]).mean() for i, j in enumerate(others)])
 
 
-def _doubt(candidates: Sequence[MeshAsset]) -> np.ndarray:
-    """Disagreement with masks and depth; where unknown, the median of the candidates that know theirs."""
-    known = [
-        1.0
-        - c.metrics["mask_iou"]
-        + _DEPTH_WEIGHT * c.metrics.get("depth_residual_m", 0.0)
-        + _UNSEEN_WEIGHT * c.metrics.get("unseen_error_m", 0.0)
-        if "mask_iou" in c.metrics
-        else np.nan
-        for c in candidates
-    ]
-    values = np.array(known, dtype=np.float64)
-    missing = np.isnan(values)
-    return np.where(missing, np.median(values[~missing]) if (~missing).any() else 0.0, values)
-
-
-def _flaws(candidates: Sequence[MeshAsset]) -> np.ndarray:
-    """What a mesh costs that cannot be as it is, or that later stages can use less well."""
+def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) -> dict[str, np.ndarray]:
+    """Per candidate all that speaks against it, in units of IoU, by what it is."""
+    by_chance = np.array([not c.assumes or rule == "mean" for c in candidates])
+    known = np.array(["mask_iou" in c.metrics for c in candidates])
+    fit = np.array([disagreement(c.metrics) if "mask_iou" in c.metrics else 0.0 for c in candidates])
+    unseen = np.where(known, _UNSEEN_WEIGHT * np.array([c.metrics.get("unseen_error_m", 0.0) for c in candidates]), 0.0)
+    usual = float(np.median((fit + unseen)[known])) if known.any() else 0.0  # for one whose fit is unknown
     faces = np.array([c.metrics.get("faces", 0.0) for c in candidates])
-    heavy = _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0))
-    falls = np.array([_FALLS_COST if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates])
-    copied = np.array([_COPIED_COST * c.metrics.get("carved", 0.0) for c in candidates])
-    return np.asarray(heavy + falls + copied + [0.0 if c.watertight else _OPEN_COST for c in candidates])
+    return {
+        "oddness": np.where(by_chance, _oddness(candidates, allowed, rule), 0.0),
+        "fit": np.where(known, fit, usual),
+        "unseen": unseen,
+        "heavy": _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0)),
+        "falls": np.array([_FALLS_COST if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates]),
+        "copied": np.array([COPIED_COST * c.metrics.get("carved", 0.0) for c in candidates]),
+        "open": np.array([0.0 if c.watertight else _OPEN_COST for c in candidates]),
+    }
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
@@ -112,7 +113,7 @@ def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence
 
 
 def _reason(
-    candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], oddness: np.ndarray, doubt: np.ndarray, rule: Rule
+    candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray], rule: Rule
 ) -> str:
     """One sentence for the reviewer."""
     chosen, count = candidates[best], len(allowed)
@@ -120,14 +121,32 @@ def _reason(
     skipped = f" ({passed_over} rejected)" if passed_over else ""
     if count == 1:
         return f"{chosen.candidate_id} is the only candidate left{skipped}."
-    beside = _papers_choice(candidates, best, allowed, rule)
-    middle = "mean" if rule == "mean" else "others"
-    shape = f"its proportions differ {100 * oddness[best]:.1f} % from the {middle} of {count}{skipped}"
     name = f"{chosen.candidate_id} ({chosen.assumes})" if chosen.assumes else chosen.candidate_id
+    middle = "mean" if rule == "mean" else "others"
+    counted = not chosen.assumes or rule == "mean"  # what assumes something is odd on purpose
+    shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}, " if counted else ""
+    ending = f"{_passed_over(candidates, best, allowed, costs)}{_papers_choice(candidates, best, allowed, rule)}."
     if "mask_iou" not in chosen.metrics:
-        return f"{name}: {shape}; its fit to masks and depth is known only after alignment{beside}."
-    place = 1 + sum(1 for i in allowed if doubt[i] < doubt[best] - 1e-12)
+        return f"{name}: {shape}its fit to masks and depth is known only after alignment, of {count}{skipped}{ending}"
+    place = 1 + sum(1 for i in allowed if costs["fit"][i] < costs["fit"][best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
-    fit = f"mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (rank {place} of {count})"
-    return f"{name}: {shape}, with {fit}{beside}."
+    return f"{name}: {shape}mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (fit {place} of {count}{skipped}){ending}"
+
+
+def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:
+    """Why not the one that fits masks and depth best of the others, where their fit does not say it; begins with "; "."""
+    fit = costs["fit"]
+    rival = min((i for i in allowed if i != best and "mask_iou" in candidates[i].metrics), key=lambda i: fit[i], default=None)
+    if rival is None or fit[rival] > fit[best] + _FITS_ALIKE:
+        return ""
+    decided = max(_BUT, key=lambda term: costs[term][rival] - costs[term][best])
+    if costs[decided][rival] - costs[decided][best] <= max(fit[best] - fit[rival], 1e-3):
+        return ""
+    said = _BUT[decided].format(
+        oddness=100 * costs["oddness"][rival],
+        unseen=100 * candidates[rival].metrics.get("unseen_error_m", 0.0),
+        faces=candidates[rival].metrics.get("faces", 0.0),
+    )
+    fits = "fits better" if fit[rival] < fit[best] - _FITS_ALIKE else "fits alike"
+    return f"; {candidates[rival].candidate_id} {fits}, but {said}"

@@ -1,6 +1,6 @@
 """How well a mesh, where its generator believes it is, reproduces the masks and the depth it came from."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -14,6 +14,9 @@ from r2c2r_core.geometry.raster import rasterize
 _RENDER_PX = 240  # long side of the view; finer changes the IoU by less than its noise
 _OCCLUDER_GAP_M = 0.05
 _WORST_DEPTH_M = 0.2  # backends.md §2.7
+_DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
+JUDGES = 8  # views of the pool, best first, that judge every shape of an object alike
+COPIED_COST = 0.05  # of IoU: carving copies the masks' errors, it has to agree with them better than a clean shape
 
 
 def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray, views: Sequence[View]) -> dict[str, float]:
@@ -36,6 +39,11 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
             residuals.append(float(np.minimum(np.abs(depth - sensor)[both], _WORST_DEPTH_M).mean()))
     metrics = {"mask_iou": float(np.mean(overlaps))} if overlaps else {}
     return {**metrics, "depth_residual_m": float(np.mean(residuals))} if residuals else metrics
+
+
+def disagreement(fit: Mapping[str, float]) -> float:
+    """What `self_consistency` measured as one cost, 0 for a perfect fit, in units of IoU."""
+    return 1.0 - fit["mask_iou"] + _DEPTH_WEIGHT * fit.get("depth_residual_m", 0.0)
 
 
 def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) -> float:

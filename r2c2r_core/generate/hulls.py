@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.generate.carved import SHEET_M, Carving, above, carve, sheet_field, solid_field, volume_below
+from r2c2r_core.generate.carved import (
+    SHEET_M,
+    Carving,
+    above,
+    carve,
+    emptied_height,
+    sheet_field,
+    solid_field,
+    volume_below,
+)
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.legs import Support, find_support, stands_on_legs
@@ -51,7 +60,10 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
     def sheet(variation: Variation) -> Shape:
         known = carved(variation)
         field = sheet_field(known.carving, known.field)
-        return _less_likely(_surfaced(known, field, mirrored=float(known.mirrored)), known, field, support)
+        shell = _surfaced(known, field, mirrored=float(known.mirrored))
+        if support is not None:  # there is air under its slab
+            return _less_likely(shell, known, field, support)
+        return replace(shell, unseen_error_m=emptied_height(known.carving, known.field, field))
 
     family = [Hypothesis("carved from free space", hull)]
     if is_round:

@@ -8,7 +8,7 @@ from r2c2r_core.generate.variation import Variation
 
 
 class Hypothesis(NamedTuple):
-    """A completion, and in a few words what it takes for true ("to the wall behind it")."""
+    """A completion, and in a few words what it takes for true ("{depth_m:.2f} m deep, to the wall behind it")."""
 
-    assumes: str
+    assumes: str  # a format that the made shape's parameters fill: each draw tells its own measures
     shape: Callable[[Variation], Shape]  # raises GenerationFailed

@@ -27,8 +27,14 @@ class Grid(NamedTuple):
 
     def centres(self) -> Points:
         """All voxel centres (n, 3), last axis fastest."""
-        axes = [self.low[k] + (np.arange(self.shape[k]) + 0.5) * self.voxel_m for k in range(3)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return np.stack(np.meshgrid(*map(self._along, range(3)), indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def heights(self) -> np.ndarray:
+        """Z of each layer of voxel centres, along the last axis."""
+        return self._along(2)
+
+    def _along(self, axis: int) -> np.ndarray:
+        return np.asarray(self.low[axis] + (np.arange(self.shape[axis]) + 0.5) * self.voxel_m)
 
 
 def grid_round(low: Vector3, high: Vector3, voxel_m: float, margin_m: float) -> Grid:
@@ -75,7 +81,7 @@ def _extract(grid: Grid, field: np.ndarray, level: float, floor: float | None) -
 
     shifted = field - level
     if floor is not None:  # the level must not lift the thing off its support
-        shifted = np.maximum(shifted, floor - (grid.low[2] + (np.arange(grid.shape[2]) + 0.5) * grid.voxel_m))
+        shifted = np.maximum(shifted, floor - grid.heights())
     padded = np.pad(shifted, 1, constant_values=grid.voxel_m)
     padded[np.abs(padded) < 1e-7] = 1e-7  # a vertex exactly on a voxel centre would be duplicated
     if not (padded < 0).any():

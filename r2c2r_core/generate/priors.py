@@ -1,4 +1,4 @@
-"""How deep furniture is when nobody sees it: the wall behind, else what its category usually measures."""
+"""How deep furniture is when nobody sees it: the wall behind, the worktop on it, what is usual or sold."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -38,7 +38,7 @@ _ALONG_M, _LEVEL_M = 0.02, 0.01
 _GAP_BINS, _SHEET_FILL = 6, 0.7  # what stands on a worktop hides less of it
 
 
-DepthSource = Literal["seen", "points", "wall", "worktop", "category", "catalogue"]
+DepthSource = Literal["seen", "points", "box", "wall", "worktop", "category", "catalogue"]
 
 
 class DepthBehind(NamedTuple):
@@ -62,7 +62,7 @@ def depths_behind(
     """The different depths a front may have, most trusted first.
 
     To the wall behind it where one stands at a plausible distance; to where the worktop on it ends; as deep as its category
-    usually is; and the next depths that cabinets are sold in.
+    usually is.
     """
     usual = category_depth(category)
     near, far = (share * usual for share in _WALL_RANGE)

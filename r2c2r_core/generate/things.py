@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 from itertools import chain, zip_longest
+from math import inf
 
+from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.cartons import carton_family
-from r2c2r_core.generate.consistency import self_consistency
+from r2c2r_core.generate.consistency import COPIED_COST, JUDGES, disagreement, self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hulls import carved_family
 from r2c2r_core.generate.hypothesis import Hypothesis
@@ -15,8 +17,6 @@ from r2c2r_core.generate.symmetry import fit_revolution, is_rounder_than_box
 from r2c2r_core.generate.variation import Variation
 
 _LATHE_FIT, _CUBOID_FIT = 0.75, 0.8  # below it carving is tried: a lathe is compared with it, a box given up
-_SIMPLER = 0.05  # carving copies the masks' errors: it has to agree with them better than a clean shape
-_JUDGES = 8
 
 Family = tuple[Hypothesis, ...]
 
@@ -39,18 +39,23 @@ def thing_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothe
 
 
 def _likeliest(lathe: Family, is_certain: bool, cuboid: Family, carved: Family, fit: Callable[[Hypothesis], float]) -> Family:
-    """The clean family that fits well enough, else the better of a lathe and carving."""
+    """The clean family that fits well enough, else the better of a lathe and carving; a box where neither can be made."""
     sure = [(fit(family[0]), family, least) for family, least in ((lathe, _LATHE_FIT), (cuboid, _CUBOID_FIT)) if family]
     sure = [entry for entry in sure if entry[1] is cuboid or is_certain]
     if sure:
         best = max(sure, key=lambda entry: entry[0])
         if best[0] > best[2]:
             return best[1]
-    return lathe if lathe and fit(lathe[0]) > fit(carved[0]) - _SIMPLER else carved
+    left = [(fit(carved[0]) - COPIED_COST, carved), *([(fit(lathe[0]), lathe)] if lathe else [])]
+    if cuboid and all(found == -inf for found, _ in left):
+        return cuboid
+    return max(left, key=lambda entry: entry[0])[1]
 
 
 def _fit(evidence: Evidence, everything: Variation, hypothesis: Hypothesis) -> float:
-    """Mask IoU less twice the depth residual in metres (backends.md §2.7), over the best frames."""
-    shape = hypothesis.shape(everything)
-    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:_JUDGES])
-    return fit["mask_iou"] - 2.0 * fit.get("depth_residual_m", 0.0)
+    """How well it agrees with masks and depth of the best frames, at most 1; -inf for what cannot be made."""
+    try:
+        shape = hypothesis.shape(everything)
+    except GenerationFailed:
+        return -inf
+    return 1.0 - disagreement(self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:JUDGES]))

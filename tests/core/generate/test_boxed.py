@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import GenerationFailed
+from r2c2r_core.generate import boxed, priors
+from r2c2r_core.generate.completion import Completion
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.rear_edge import rear_edge
-from r2c2r_core.generate.variation import draw_variation
+from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
 from tests.core.generate.scenes import appliance_shape, front_shape
 
@@ -75,6 +77,42 @@ def test_a_front_without_a_wall_gets_its_categorys_depth(front_scene):
     depths = {round(float(np.ptp(shape_of(front_shape, (open_room, track), k).vertices_local[:, 1])), 4) for k in range(5)}
     assert all(0.58 * 0.95 <= depth - 0.035 <= 0.58 * 1.05 for depth in depths)
     assert len(depths) > 2  # nobody saw it, so it is varied
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_card_tells_the_depth_that_its_mesh_has(front_scene, seed):
+    """c0 goes to the wall, the last two are as deep as others that are sold."""
+    evidence = gather_evidence(*front_scene, 6)
+    cards = [Completion().measured(evidence, f"c{k}", seed) for k in range(4)]
+    for shape, _, told in cards:
+        if "deep" in told:
+            assert told.startswith(f"{shape.vertices_local[:, 1].max():.2f} m deep")
+    sold = [shape.vertices_local[:, 1].max() for shape, _, told in cards if "sold" in told]
+    assert sold
+    assert all(min(abs(depth - listed) for listed in priors._DEPTHS_SOLD_M) < 1e-6 for depth in sold)
+
+
+@pytest.mark.parametrize(("usual_m", "told"), [(0.28, "points"), (0.345, "usually")])
+def test_an_appliance_is_never_shallower_than_its_points_reach_and_says_why(appliance_scene, monkeypatch, usual_m, told):
+    """Seen 34 cm deep: a kind that is usually less deep is no reason for that."""
+    monkeypatch.setattr(boxed, "_side_seen", lambda box, views: False)
+    monkeypatch.setitem(priors.CATEGORY_DEPTH_M, "microwave", usual_m)
+    evidence = gather_evidence(*appliance_scene, 10)
+    everything = whole_pool(evidence)
+    first = boxed.appliance_hypotheses(evidence, everything)[0]
+    assert told in first.assumes
+    for scale in (0.95, 1.0):
+        body = first.shape(replace(everything, depth_scale=scale)).vertices_local
+        assert body[:, 1].max() + 0.17 > 0.333
+
+
+def test_the_segmenters_own_depth_is_told_as_that(appliance_scene):
+    capture, track = appliance_scene
+    deep = replace(track, box=replace(track.box, dimensions_m=np.array([0.47, 0.40, 0.285])))
+    evidence = gather_evidence(capture, deep, 10)
+    told = [h.assumes for h in boxed.appliance_hypotheses(evidence, whole_pool(evidence))]
+    assert "sides show" in told[0]
+    assert "its box was measured" in told[1]
 
 
 def test_a_front_without_a_rectangle_says_what_to_do(front_scene):

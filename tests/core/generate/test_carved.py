@@ -7,11 +7,12 @@ import pytest
 
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.hulls import carved_family
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.generate.votes import collect_votes, grid_votes
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.geometry.transforms import Rigid3
-from tests.core.generate.scenes import best_thing
+from tests.core.generate.scenes import best_thing, carton_scene
 
 
 def carve(scene, seed=0):
@@ -75,3 +76,13 @@ def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene)
     np.testing.assert_allclose(
         np.minimum(blocks.free_m, truncation)[~free], np.minimum(every.free_m, truncation)[~free], atol=1e-6
     )
+
+
+def test_a_shell_answers_for_what_it_leaves_empty():
+    """Of a body 0.2 m deep and 0.2 m high only front and top are seen: a shell 4 cm thick leaves half of it out."""
+    evidence = gather_evidence(*carton_scene(np.array([0.3, 0.2, 0.2]), arc_deg=30.0, elevation_deg=20.0, yaw_rad=0.0), 6)
+    everything = whole_pool(evidence)
+    family = {h.assumes: h for h in carved_family(evidence, everything, is_round=False)}
+    assert family["carved from free space"].shape(everything).unseen_error_m is None
+    shell = family["as thin as a board where nobody saw its back"].shape(everything)
+    assert 0.06 < shell.unseen_error_m < 0.2

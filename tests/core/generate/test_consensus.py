@@ -130,6 +130,42 @@ def test_being_odd_on_purpose_is_no_fault_and_is_said():
     assert chosen.reason.startswith("c2 (shallower): ")
 
 
+def guesses(*changes):
+    """Candidates alike in all but these metrics, each with something that it assumes."""
+    alike = [replace(candidate(f"c{k}", 0.6, 0.5, 0.8), assumes="a guess") for k in range(len(changes))]
+    return [replace(c, metrics={**c.metrics, **change}) for c, change in zip(alike, changes, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"unseen_error_m": 0.34}, "c1 fits alike, but what nobody saw of it is 34 cm off the likeliest"),
+        ({"mask_iou": 0.93, "unseen_error_m": 0.34}, "c1 fits better, but what nobody saw of it is 34 cm off the likeliest"),
+        ({"stands": 0.0}, "c1 fits alike, but it would tip over"),
+        ({"mask_iou": 0.92, "carved": 1.0}, "c1 fits better, but it copies the masks with their errors"),
+        ({"faces": 80_000.0}, "c1 fits alike, but it has 80000 faces"),
+    ],
+)
+def test_the_reason_says_what_decided_against_the_candidate_that_fits_as_well(other, said):
+    chosen = choose_candidate(guesses({}, other))
+    assert chosen.chosen_id == "c0"
+    assert said in chosen.reason
+
+
+def test_proportions_are_given_only_where_they_count():
+    assert "proportions" in choose_candidate(FIVE).reason
+    assert "proportions" not in choose_candidate(guesses({}, {"extent_middle": 0.9})).reason
+    odd = replace(candidate("c3", 1.0, 0.99, 0.10, iou=0.95))
+    assert "c3 fits better, but its proportions differ" in choose_candidate([*FIVE[:3], odd]).reason
+
+
+def test_where_the_fit_decided_the_reason_says_no_more():
+    """The rank is that of the fit: what nobody saw has no part in it."""
+    reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
+    assert "(fit 1 of 2)" in reason
+    assert "but" not in reason
+
+
 def test_what_would_fall_over_has_to_fit_better_to_win():
     alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
     assert choose_candidate([replace(alike[0], metrics={**alike[0].metrics, "stands": 0.0}), *alike[1:]]).chosen_id == "c1"

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.generate.cartons import carton_family
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.seen import observe_thing
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight
 from tests.core.generate.scenes import best_thing, carton_scene
@@ -62,3 +64,17 @@ def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
 def test_a_depth_that_only_the_wall_ends_is_not_called_seen():
     shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0, wall_gap_m=0.01))
     assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])
+
+
+def test_shallower_and_deeper_than_likely_are_that_in_every_draw():
+    evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=0.0, yaw_rad=0.0), 8)
+    everything = whole_pool(evidence)
+    family = {h.assumes: h.shape for h in carton_family(evidence, observe_thing(evidence, everything))}
+    likeliest = np.ptp(family["a box"](everything).vertices_local[:, 1])
+    for draw in (-1.5, -0.5, 1.5):
+        drawn = {
+            name: np.ptp(shape(replace(everything, depth_draw=draw)).vertices_local[:, 1]) for name, shape in family.items()
+        }
+        assert drawn["a box, shallower than likely"] < min(likeliest, drawn["a box"]) + 1e-9
+        assert drawn["a box, deeper than likely"] > max(likeliest, drawn["a box"]) - 1e-9
+        assert drawn["a box, shallower than likely"] < likeliest < drawn["a box, deeper than likely"]
