@@ -31,11 +31,8 @@ _TOLD: dict[DepthSource, str] = {
     "category": "as its kind usually is",
     "catalogue": "the next size sold",
 }
-_SPREAD: dict[DepthSource, float] = {
-    "wall": 0.2,
-    "worktop": 1.0,
-    "category": 1.0,
-}  # of the draw's; what was seen, or is sold, has none
+# of the draw's; what was seen, or is sold, has none
+_SPREAD: dict[DepthSource, float] = {"wall": 0.2, "worktop": 1.0, "category": 1.0}
 _HANDLE_ERROR: dict[HandleStyle, float] = {"bar": 0.0, "block": 0.25, "none": 1.0}  # of its protrusion
 _FRONT_ZONE_M = 0.03  # faces this near to the outer face belong to the front
 _LEAST_FACE_POINTS = 200

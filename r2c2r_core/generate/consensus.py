@@ -125,13 +125,14 @@ def _reason(
     middle = "mean" if rule == "mean" else "others"
     counted = not chosen.assumes or rule == "mean"  # what assumes something is odd on purpose
     shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}, " if counted else ""
-    ending = f"{_passed_over(candidates, best, allowed, costs)}{_papers_choice(candidates, best, allowed, rule)}."
+    beside = _papers_choice(candidates, best, allowed, rule)
     if "mask_iou" not in chosen.metrics:
-        return f"{name}: {shape}its fit to masks and depth is known only after alignment, of {count}{skipped}{ending}"
+        return f"{name}: {shape}one of {count}{skipped}; its fit to masks and depth is known only after alignment{beside}."
     place = 1 + sum(1 for i in allowed if costs["fit"][i] < costs["fit"][best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
+    but = _passed_over(candidates, best, allowed, costs)
     residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
-    return f"{name}: {shape}mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (fit {place} of {count}{skipped}){ending}"
+    return f"{name}: {shape}mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (fit {place} of {count}{skipped}){but}{beside}."
 
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:

@@ -176,3 +176,13 @@ def test_what_was_carved_along_the_masks_has_to_agree_with_them_better_than_a_cl
     carved = replace(carved, metrics={**carved.metrics, "carved": 1.0})
     assert choose_candidate([carved, clean]).chosen_id == "c0"
     assert choose_candidate([replace(carved, metrics={**carved.metrics, "mask_iou": 0.97}), clean]).chosen_id == "c1"
+
+
+def test_what_has_no_fit_yet_is_not_compared_by_it():
+    """The upload's shape is in the middle; nothing is said of who fits better than it."""
+    upload = candidate("upload0", 0.62, 0.52, 0.78, iou=None, generator="upload")
+    others = [candidate("c0", 0.60, 0.50, 0.80, iou=0.9), candidate("c1", 0.66, 0.56, 0.74, iou=0.9)]
+    reason = choose_candidate([*others, upload]).reason
+    assert reason.startswith("upload0: its proportions differ")
+    assert "known only after alignment" in reason
+    assert "fits" not in reason
