@@ -31,6 +31,7 @@ _UNSEEN_WEIGHT = 1.0  # per metre: half of an error that was seen
 _OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
 _FALLS_COST = 0.1  # what would tip over was not found standing
 _MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
+_BY_CHANCE = 0.02  # draws of one hypothesis differ by this: the frames that were drawn are the ones that judge, or are not
 _FITS_ALIKE = 0.005  # of IoU
 _BUT = {
     "oddness": "its proportions differ {oddness:.1f} %",
@@ -52,7 +53,8 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
     costs = _costs(candidates, allowed, rule)
     cost = sum(costs.values(), np.zeros(len(candidates)))
     order = sorted(range(len(candidates)), key=lambda i: (i not in allowed, round(float(cost[i]), 12), i))
-    best = order[0]
+    best = _of_most_frames(candidates, [i for i in order if i in allowed], cost)
+    order.insert(0, order.pop(order.index(best)))
     return CandidateSet(
         object_name=candidates[best].object_name,
         candidates=tuple(candidates),
@@ -72,6 +74,14 @@ def chosen_by_person(candidates: CandidateSet, candidate_id: str) -> CandidateSe
             hint=f"choose one of: {', '.join(known)}, or a mesh file",
         )
     return replace(candidates, chosen_id=candidate_id, chosen_by="person", reason="A person chose it.")
+
+
+def _of_most_frames(candidates: Sequence[MeshAsset], order: Sequence[int], cost: np.ndarray) -> int:
+    """The best one; of draws that assume what it does and cost no more than chance makes of it, that from most frames."""
+    best = order[0]
+    said = candidates[best].assumes
+    alike = [i for i in order if said and candidates[i].assumes == said and cost[i] <= cost[best] + _BY_CHANCE]
+    return max(alike, key=lambda i: len(candidates[i].frames), default=best)
 
 
 def _oddness(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) -> np.ndarray:
