@@ -215,8 +215,9 @@ def _limits(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override:
 
 def _swing_rad(item: MeasuredObject, hinge: Hinge | None) -> float | None:
     """How far its door was seen open on the edge that it hangs on; a person may have put it on the other one."""
-    on_it = item.swung is not None and hinge is not None and item.swung.hinge == hinge.side
-    return item.swung.angle_rad if item.swung is not None and on_it else None
+    if item.swung is None or hinge is None or item.swung.hinge != hinge.side:
+        return None
+    return item.swung.angle_rad
 
 
 def _seen_open(item: MeasuredObject, hinge: Hinge | None) -> str:
