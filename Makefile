@@ -1,6 +1,6 @@
 # make demo   the sample kitchen through every stage, its certified bundle, and the app opened on it
 # make test   everything CI runs
-# make env | check | bench beside them
+# make env | check | docs | bench beside them
 SHELL := /bin/bash
 PYTHON ?= python3
 DATA ?= .demo
@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LEARNED := $(VENV)/.learned
 
-.PHONY: demo test env check bench libs clean
+.PHONY: demo test env check docs bench libs clean
 
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
@@ -26,7 +26,7 @@ libs:
 $(STAMP): pyproject.toml constraints.txt
 	bash scripts/make-venv.sh "$(PYTHON)" "$(VENV)"
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
-	@# scene_synthesizer brings it and nothing here calls it: the C code inside is free for non-commercial use only
+	@# scene_synthesizer (of the dev group) brings it, nothing here calls it: its C code is free for non-commercial use only
 	"$(BIN)/python" -m pip uninstall --quiet --yes triangle
 	touch "$(STAMP)"
 
@@ -41,6 +41,10 @@ check: env
 	"$(BIN)/mypy"
 	"$(BIN)/lint-imports"
 	bash scripts/check-static.sh
+
+# in build/site, without the network
+docs: env
+	NO_MKDOCS_2_WARNING=1 "$(BIN)/mkdocs" build --strict --quiet
 
 bench: env
 	"$(BIN)/python" benchmarks/run.py $(BENCH)
