@@ -1,0 +1,100 @@
+"""What a line of the category table says of a kind of object."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from r2c2r_core.model.inputs import HingeSide
+from r2c2r_core.model.materials import UNKNOWN_THING, Material
+
+Kind = Literal["front", "appliance", "thing"]
+"""How it is looked for: a panel among lines, a box behind a front, or the part of the scan that stands on something."""
+
+Opening = Literal["drawer", "side", "pair", "bottom", "fixed", "rigid"]
+"""How it opens: slides out, one side-hinged door, two doors, a bottom-hinged door, not at all; or it is a loose thing."""
+
+_SLACK = 0.1  # of a size, by which what was cut may miss what is sold: a seam or a shadow on either side
+_SIGMAS = 4.0  # from the least to the greatest size: 19 of 20 lie between them where the logarithm is normal
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """One measure of a kind: the least, the usual and the greatest in metres, and who says so."""
+
+    low: float
+    usual: float
+    high: float
+    source: str
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the logarithm of the size."""
+        return float(np.log(self.high / self.low)) / _SIGMAS
+
+    def holds(self, value_m: float) -> bool:
+        """Whether a size is possible."""
+        return self.low <= value_m <= self.high
+
+    def deviation(self, value_m: float | np.ndarray) -> np.ndarray:
+        """How far sizes are from the usual one, in standard deviations of their logarithm."""
+        return np.asarray(np.log(np.asarray(value_m) / self.usual) / self.spread)
+
+    def fit(self, value_m: float) -> float:
+        """1 for a possible size, falling smoothly to 0 over about a fifth of it outside."""
+        outside = max(float(np.log(self.low / value_m)), float(np.log(value_m / self.high)), 0.0)
+        return float(np.exp(-((outside / _SLACK) ** 2)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Category:
+    """A kind of object: what it is called, how large it is, how it opens and what it is made of. One line of one table."""
+
+    name: str  # words joined by underscores
+    aliases: tuple[str, ...] = ()
+    kind: Kind
+    opens: Opening
+    width: Size  # across the front; the larger side of a thing
+    depth: Size  # from the outer face of the front to the back
+    height: Size
+    material: Material = UNKNOWN_THING
+    fixture: str | None = None  # what builds it: "module" or "module:NAME" of synthesize/fixtures or of a plug-in
+    hinge: HingeSide | None = None  # of a single door, where nothing tells
+    one_front: bool = False  # a machine, or a stack: one front whatever lines it carries
+    several_fronts: bool = False  # that are one object, told apart by their handles
+    stands: bool = False  # rests on what is below it; a wall cabinet and a built-in front do not
+    on_floor: bool = False
+    round: bool = False  # a body of revolution
+    open_vessel: bool = False  # hollow and open upwards
+    on_legs: bool = False  # a level slab on posts
+    wider: tuple[float, str] | None = None  # from this width (metres) on it is that category
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its name and what else people call it."""
+        return self.name, *self.aliases
+
+    @property
+    def label(self) -> str:
+        """Its name as people read it."""
+        return self.name.replace("_", " ")
+
+    @property
+    def one_of_a_stack(self) -> bool:
+        """Whether it is one drawer of what may have been cut as a stack."""
+        return self.opens == "drawer" and not self.several_fronts
+
+    @property
+    def may_be_pair(self) -> bool:
+        """Whether two doors side by side may be one object."""
+        return self.opens == "pair" or self.wider is not None
+
+    @property
+    def longest_m(self) -> float:
+        """The largest side it can have."""
+        return max(self.width.high, self.depth.high, self.height.high)
+
+    @property
+    def usual_m(self) -> tuple[float, float, float]:
+        """Usual width, depth and height."""
+        return self.width.usual, self.depth.usual, self.height.usual

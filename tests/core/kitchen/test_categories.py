@@ -1,0 +1,110 @@
+"""The category table, and every name in it through every stage: they agree because there is nothing else to ask."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.generate.priors import depths_behind
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.categories import CATEGORIES
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.segment import finders
+from r2c2r_core.segment.things import sized_as
+from r2c2r_core.synthesize.fixtures.spec import Order, Part
+from r2c2r_core.synthesize.fixtures.table import fixture_of
+from tests.core.synthesize.kitchen_units import Unit, capture
+from tests.core.synthesize.test_build_scene import built
+
+PAIRED = {"double_door_cabinet", "double_door_wall_cabinet", "sink_cabinet", "double_sink_cabinet"}
+OPENS = {"drawer": "prismatic", "side": "revolute", "pair": "revolute", "bottom": "revolute"}
+
+
+def built_as(name: str, category: Category) -> SceneObject:
+    """What is built of an object of usual size that a person calls so."""
+    kind = "thing" if category.kind == "thing" else "appliance"
+    return built(Unit("a", name, (0, 0, 1.2), category.usual_m, kind=kind)).objects[0]
+
+
+def parts_of(category: Category) -> tuple[Part, ...]:
+    fixture = fixture_of(category)
+    if fixture is None:
+        return ()
+    order = Order(dimensions_m=np.array(category.usual_m), material=category.material, hinge=category.hinge, handle=None)
+    return fixture.build(order).parts
+
+
+@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
+def test_every_line_is_whole(category: Category) -> None:
+    for size in (category.width, category.depth, category.height):
+        assert 0 < size.low <= size.usual <= size.high
+        assert len(size.source) > 20
+    assert (category.fixture is None) == (category.opens == "rigid") == (fixture_of(category) is None)
+    assert (category.hinge is not None) == (category.opens in ("side", "bottom"))
+    if category.wider is not None:
+        least, other = category.wider
+        assert category_of(other).opens == "pair"
+        assert category_of(other).width.low <= least <= category.width.high
+
+
+@pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
+def test_every_name_is_the_same_in_every_stage(category: Category, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(finders, "region_at", lambda planes, point: object())
+    monkeypatch.setattr(finders, "find_front", lambda run, on, off, **how: asked.update(how))
+    bench: Any = type("Bench", (), {"planes": (), "run_of": lambda self, region: object()})()
+    item = built_as(category.name, category)
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-category.depth.usual, area_m2=4.0)
+    front = Rigid3()
+    for name in category.names:
+        found = category_of(name)
+        # segment: what is looked for
+        finders._front(bench, found, np.zeros((1, 3)), np.zeros((0, 3)))
+        assert asked["pair"] == (category.name in PAIRED or category.name.endswith("refrigerator"))
+        assert asked["unit"] is (category if category.one_front else None)
+        assert asked["stacked"] == (category.name == "drawer")
+        assert sized_as(found).radius_m == min(category.longest_m / 2, 1.0)
+        # generate: how deep it is, and which wall may be behind it
+        depths = depths_behind(capture((wall,)), front, 0.6, 0.6, found)
+        assert depths[-1].depth_m == pytest.approx(category.depth.usual, abs=0.006)
+        # synthesize: what is built
+        assert fixture_of(found) == fixture_of(category)
+    # and built once, for all its names are one line
+    assert item.fixture == (category.name if category.fixture is not None else "object")
+    assert {joint.type for joint in item.joints} == ({OPENS[category.opens]} if category.opens in OPENS else set())
+    density = {part.density_kg_m3 for part in parts_of(category)}
+    assert density <= {category.material.density_kg_m3}
+
+
+@pytest.mark.parametrize(
+    ("typed", "kind", "opens", "depth_m"),
+    [
+        ("pantry", "front", "side", 0.58),
+        ("wall_unit", "front", "side", 0.35),
+        ("cooker", "front", "bottom", 0.62),
+        ("extractor", "appliance", "fixed", 0.45),
+        ("chest_of_drawers", "front", "drawer", 0.58),
+        ("two_door_cabinet", "front", "pair", 0.58),
+        ("microwave_oven", "appliance", "side", 0.38),
+        ("upper_cabinet", "front", "side", 0.35),
+        ("wall oven", "front", "bottom", 0.58),
+        ("refrigerator", "appliance", "side", 0.65),
+        ("hood", "appliance", "fixed", 0.45),
+    ],
+)
+def test_what_six_tables_told_apart(typed: str, kind: str, opens: str, depth_m: float) -> None:
+    """Names that were cut as a blob of 0.2 m, as one drawer or one door, or given an oven's depth, by one table or another."""
+    category = category_of(typed)
+    assert (category.kind, category.opens, category.depth.usual) == (kind, opens, depth_m)
+    joints = built_as(typed, category).joints
+    assert len(joints) == {"fixed": 0, "pair": 2}.get(opens, 3 if category.several_fronts else 1)
+
+
+def test_a_bottle_is_known_and_weighs_what_bottles_do() -> None:
+    item = built_as("wine bottle", category_of("bottle"))
+    assert item.movable
+    assert item.warnings == () or "category" not in item.warnings[0]
+    assert 0.2 <= item.links[0].inertial.mass_kg <= 2.2

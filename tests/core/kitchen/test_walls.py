@@ -1,0 +1,70 @@
+"""Segment, generate and synthesize mean the same wall behind a front, at the same distance."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.generate.priors import depths_behind
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.kitchen.walls import depths_in, distances_behind, wall_behind
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.segment.fronts import depth_to_wall
+from r2c2r_core.synthesize.dimensions import distance_to_wall
+from tests.core.synthesize.kitchen_units import capture
+
+OUTWARD = np.array([0.0, -1.0, 0.0])
+MIDDLE = np.array([1.0, 0.5, 0.6])
+
+
+def wall_at(distance_m: float, *, off_deg: float = 0.0) -> Wall:
+    """A wall that far behind the front's middle, along its normal, and turned about the vertical."""
+    normal = rotation_about_z(np.deg2rad(off_deg)) @ OUTWARD
+    return Wall(normal=normal, offset_m=float(normal @ (MIDDLE - distance_m * OUTWARD)), area_m2=4.0)
+
+
+def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
+    """What each stage says."""
+    kind, scan = category_of(category), capture(walls)
+    cell = SimpleNamespace(left=0.0, right=0.0, top=0.0, bottom=0.0)
+    grid = SimpleNamespace(points_at=lambda at: MIDDLE[None], outward=OUTWARD)
+    front: Any = SimpleNamespace(run=SimpleNamespace(grid=grid), cell=cell)
+    half = np.array([0.3, 0.25, 0.3])
+    low, high = MIDDLE - half * [1, 0, 1], MIDDLE + half * [1, 2, 1]
+    generated = next(
+        (d.depth_m for d in depths_behind(scan, Rigid3(np.eye(3), MIDDLE), 0.6, 0.6, kind) if d.source == "wall"), None
+    )
+    return [
+        depth_to_wall(front, scan.room, kind),
+        None if generated is None else generated + 0.005,  # what stands against a wall leaves it a gap
+        distance_to_wall(scan, np.eye(3), low, high, kind.depth),
+    ]
+
+
+@pytest.mark.parametrize("category", ["cabinet", "wall_cabinet", "refrigerator", "microwave"])
+@pytest.mark.parametrize("share", [0.8, 1.0, 1.1])
+@pytest.mark.parametrize("off_deg", [0.0, 9.0, -9.0])
+def test_every_stage_means_the_same_wall(category: str, share: float, off_deg: float) -> None:
+    distance = share * category_of(category).depth.usual
+    wall = wall_at(distance, off_deg=off_deg)
+    assert asked((wall, wall_at(3.0)), category) == [pytest.approx(distance, abs=1e-9)] * 3
+
+
+@pytest.mark.parametrize(
+    "wall", [wall_at(0.58, off_deg=11.0), wall_at(0.58, off_deg=90.0), wall_at(-0.5), wall_at(2.5), wall_at(0.1)]
+)
+def test_no_stage_means_a_wall_beside_before_or_far_behind(wall: Wall) -> None:
+    assert asked((wall,), "cabinet") == [None] * 3
+
+
+def test_the_nearest_wall_that_is_possible_is_meant() -> None:
+    walls = (wall_at(0.7), wall_at(0.1), wall_at(0.55))
+    assert wall_behind(walls, MIDDLE, OUTWARD, category_of("cabinet").depth) == pytest.approx(0.55)
+    np.testing.assert_allclose(distances_behind(walls, MIDDLE, OUTWARD), [0.1, 0.55, 0.7])
+
+
+def test_what_reaches_into_a_wall_is_told_in_metres() -> None:
+    points = MIDDLE - np.outer([0.2, 0.6], OUTWARD)
+    np.testing.assert_allclose(depths_in((wall_at(0.5), wall_at(0.9)), points), [0.1, -0.3])
