@@ -1,0 +1,160 @@
+"""Worker processes that compute side by side: `python -m r2c2r_core.pool FD` is one, and FD its socket to who started it.
+
+A worker lives as long as its pool: importing takes it a second or two, and what its tasks share stays with it. It ends when the
+pool closes its end of the socket, or whoever held it died.
+"""
+
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import psutil
+
+from r2c2r_core.errors import Cancelled, EnvironmentProblem
+from r2c2r_core.progress import SILENT, Progress
+
+WORKER_BYTES = 1500 << 20  # of a process: 0.9 GB were seen at its peak on the sample of 180 frames, and half as much again
+_POLL_S = 0.2  # between looks at whether the person cancelled
+
+
+class Task(NamedTuple):
+    """A function of a module and its arguments, all picklable; it also takes `progress`."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
+class Failed(NamedTuple):
+    """What a task raised, and where, for the log."""
+
+    error: Exception
+    where: str
+
+
+class WorkerLost(RuntimeError):
+    """The process ended in the middle of a task."""
+
+
+def usual_workers() -> int:
+    """As many as there are cores for this process, and room in memory."""
+    room = psutil.virtual_memory().available // WORKER_BYTES
+    return int(max(1, min(len(os.sched_getaffinity(0)), room)))
+
+
+@dataclass(slots=True, eq=False)
+class Pool:
+    """Up to `workers` processes, started when there is work for them."""
+
+    workers: int
+    _idle: list["_Worker"] = field(default_factory=list)
+    _busy: dict[Connection, "_Worker"] = field(default_factory=dict)
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        for worker in (*self._idle, *self._busy.values()):
+            worker.end()
+
+    def run(self, tasks: Mapping[str, Task], progress: Progress = SILENT) -> Iterator[tuple[str, Any | Failed]]:
+        """Every task's name and what it gave or Failed, as they end; raises Cancelled. One that ends its process has failed."""
+        waiting, shares, done = list(tasks.items()), {}, 0
+        while waiting or self._busy:
+            while waiting and len(self._busy) < self.workers:
+                name, task = waiting.pop(0)
+                worker = self._idle.pop() if self._idle else _Worker()
+                worker.begin(name, task)
+                self._busy[worker.channel] = worker
+            for channel in wait(list(self._busy), _POLL_S):
+                worker = self._busy[channel]  # type: ignore[index]  # these are the connections given
+                kind, *content = worker.answer()
+                if kind == "at":
+                    shares[worker.name] = content[0]
+                    progress.at((done + sum(shares.values())) / len(tasks), content[1])
+                    continue
+                del self._busy[worker.channel]
+                shares.pop(worker.name, None)
+                done += 1
+                if kind != "lost":
+                    self._idle.append(worker)
+                yield worker.name, content[0] if kind == "done" else Failed(*content)
+            progress.check()
+
+
+class _Worker:
+    """One process, from the side of the pool."""
+
+    def __init__(self) -> None:
+        ours, theirs = socket.socketpair()
+        command = [sys.executable, "-m", "r2c2r_core.pool", str(theirs.fileno())]
+        try:
+            self._process = subprocess.Popen(command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=2)
+        except OSError as error:
+            raise EnvironmentProblem(f"no worker process can be started ({error})", hint="set --workers 1") from error
+        finally:
+            theirs.close()
+        self.channel = Connection(ours.detach())
+        self.name = ""
+
+    def begin(self, name: str, task: Task) -> None:
+        """Give it something to do; it is idle."""
+        self.name = name
+        self.channel.send(task)
+
+    def answer(self) -> tuple[Any, ...]:
+        """("at", share, text), ("done", value), ("failed", error, where); of a process that is gone ("lost", error, where)."""
+        try:
+            answer: tuple[Any, ...] = self.channel.recv()
+        except (EOFError, OSError):
+            self.channel.close()
+            code = self._process.wait()
+            ended = f"its process ended ({signal.Signals(-code).name if code < 0 else code})"
+            return "lost", WorkerLost(f"{ended}, which too little memory may do; try --workers 1"), ""
+        return answer
+
+    def end(self) -> None:
+        """At once: what it is at is stored whole or not at all."""
+        self.channel.close()
+        self._process.kill()
+        self._process.wait()
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Do what comes through the socket, one task after another, until it is closed."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # they reach the whole process group: the pool decides
+        signal.signal(number, signal.SIG_IGN)
+    channel = Connection(int(arguments[0]))
+    progress = Progress(lambda _, fraction, text: channel.send(("at", fraction, text)), channel.poll)
+    while True:
+        try:
+            task: Task = channel.recv()
+            channel.send(_answer(task, progress))
+        except (EOFError, BrokenPipeError, Cancelled):
+            return 0
+
+
+def _answer(task: Task, progress: Progress) -> tuple[Any, ...]:
+    try:
+        return "done", task.function(*task.arguments, progress=progress)
+    except Cancelled:
+        raise
+    except Exception as error:  # the edge of a task: judged by who gave it
+        where = traceback.format_exc()
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:  # an exception of a library that does not travel
+            error = RuntimeError(f"{type(error).__name__}: {error}")
+        return "failed", error, where
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,171 @@
+"""manifest.json of a bundle: where every number in it comes from. The writer is export/manifest.py."""
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field, Strict
+
+from r2c2r_core.model.scene import Source
+from r2c2r_core.schema.document import Document
+from r2c2r_core.schema.prompts import PromptsFilePoint, Version
+
+_Three: TypeAlias = Annotated[tuple[float, float, float], Strict(False)]
+_Row: TypeAlias = Annotated[tuple[float, float, float, float], Strict(False)]
+_Pose: TypeAlias = Annotated[tuple[_Row, _Row, _Row, _Row], Strict(False)]
+_Rotation: TypeAlias = Annotated[tuple[_Three, _Three, _Three], Strict(False)]
+_Sources: TypeAlias = Annotated[tuple[Source, Source, Source], Strict(False)]
+
+
+class ManifestCapture(Document):
+    """The recording."""
+
+    name: str = Field(description="the recording's name")
+    sha256: str = Field(description="identity of the recording: of the zip itself, or of its files")
+    format: str = Field(description="the format it was read as")
+    frames: int = Field(ge=0, description="how many of its frames were used")
+
+
+class ManifestJointSource(Document):
+    """Where a joint's numbers come from."""
+
+    axis: Source = Field(description="measured, inferred, default or person")
+    origin: Source = Field(description="measured, inferred, default or person")
+    limits: Source = Field(description="measured, inferred, default or person")
+
+
+class ManifestBlocker(Document):
+    """What keeps a joint from opening all the way."""
+
+    name: str = Field(description="an object, or another joint")
+    kind: Literal["thing", "joint"] = Field(description="thing or joint")
+    position: float = Field(description="rad or m of the blocked joint at which they meet")
+
+
+class ManifestJoint(Document):
+    """One joint; 0 is closed, positive opens by the right-hand rule about or along the axis."""
+
+    name: str = Field(description="the joint's name, which begins with its object's")
+    type: Literal["revolute", "prismatic"] = Field(description="revolute or prismatic")
+    axis: _Three = Field(description="a unit vector in the world")
+    origin: _Three = Field(description="a point on the axis, in m, in the world")
+    lower: float = Field(description="rad or m")
+    upper: float = Field(description="rad or m")
+    source: ManifestJointSource = Field(description="where its numbers come from")
+    confidence: float | None = Field(description="of the hinge's side, 0 to 1; null where there is no choice")
+    blocked_by: list[ManifestBlocker] = Field(default_factory=list, description="what is in its way when it opens")
+
+
+class ManifestMask(Document):
+    """The evidence in the frames."""
+
+    frames: int = Field(ge=0, description="frames with a mask")
+    mean_area_px: float = Field(ge=0, description="mean area of a mask in px")
+    prompts: list[PromptsFilePoint] = Field(description="the clicks it comes from")
+
+
+class ManifestCandidate(Document):
+    """A mesh that was proposed."""
+
+    id: str = Field(description="the candidate's id")
+    generator: str = Field(description="the backend that made it")
+    seed: int = Field(description="the seed it was drawn with")
+    assumes: str = Field(description="what it takes for true of what nobody saw; empty: a sample of the generator's own")
+    metrics: dict[str, float | None] = Field(description="what was measured of it, by name")
+
+
+class ManifestChoice(Document):
+    """Which candidate was taken."""
+
+    candidate: str = Field(description="the candidate's id")
+    by: str = Field(description="consensus or person")
+    at: str | None = Field(description="when a person chose; null otherwise")
+
+
+class ManifestSpread(Document):
+    """By how much a pose may be off: standard deviations."""
+
+    turn_deg: float | None = Field(description="deg, about the axis held least")
+    shift_m: float | None = Field(description="m, along the direction held least")
+    scale: float | None = Field(description="share of the size")
+
+
+class ManifestPlacement(Document):
+    """Where the candidate stands, and the evidence for it."""
+
+    scale: float = Field(description="m per unit of the mesh")
+    rotation: _Rotation = Field(description="3x3, world from mesh")
+    translation: _Three = Field(description="m, world from mesh")
+    inliers: int = Field(ge=0, description="matches that agree")
+    rms_m: float | None = Field(description="residual in m; null without depth inside the masks")
+    mask_iou: float | None = Field(description="overlap of its outline with the masks, 0 to 1")
+    unsure: bool = Field(description="whether another pose fits about as well")
+    runner_up_turn_deg: float | None = Field(description="how far that other pose is turned, in deg")
+    spread: ManifestSpread | None = Field(description="by how much the pose may be off")
+
+
+class ManifestWarp(Document):
+    """How the mesh was fitted to what was built."""
+
+    residual_m: float | None = Field(description="m; null where the primitive is shown")
+    paper_residual_m: float | None = Field(description="m, of the paper's affine map; null where it was not asked for")
+
+
+class ManifestScanFit(Document):
+    """The mesh beside the scan."""
+
+    median_m: float | None = Field(description="m, from scan to mesh")
+    p95_m: float | None = Field(description="m, 95 % of the scan is nearer")
+    f_score_1cm: float | None = Field(description="0 to 1, at 1 cm")
+    f_score_2cm: float | None = Field(description="0 to 1, at 2 cm")
+    points: int = Field(ge=0, description="points of the scan that were compared")
+
+
+class ManifestMeshes(Document):
+    """Files of the bundle."""
+
+    visual: list[str] = Field(description="paths of what is seen")
+    collision: list[str] = Field(description="paths of colliders that are no boxes")
+
+
+class ManifestObject(Document):
+    """One object of the scene."""
+
+    name: str = Field(description="the object's name")
+    category: str = Field(description="as a person called it")
+    fixture: str = Field(description="as what it was built")
+    dimensions_m: _Three = Field(description="[width, depth, height] in m, without the handle")
+    world_from_object: _Pose = Field(description="4x4; origin at the box's centre, front at -Y, +Z up")
+    joint: ManifestJoint | None = Field(description="the first of its joints; null where nothing moves")
+    joints: list[ManifestJoint] = Field(description="all of its joints")
+    movable: bool = Field(description="whether it stands free")
+    dimension_source: _Sources = Field(description="where width, depth and height come from")
+    layout_move_m: float | None = Field(description="m by which the layout moved it")
+    mask: ManifestMask | None = Field(description="null for what was made from the scan without clicks")
+    candidates: list[ManifestCandidate] = Field(description="meshes that were proposed")
+    chosen: ManifestChoice | None = Field(description="null for what was made from the scan without clicks")
+    placement: ManifestPlacement | None = Field(description="null for what was made from the scan without clicks")
+    warp: ManifestWarp = Field(description="how the mesh was fitted")
+    scan_fit: ManifestScanFit | None = Field(description="the mesh beside the scan; null where it was not seen")
+    meshes: ManifestMeshes = Field(description="its files")
+    mass_kg: float = Field(gt=0, description="kg of all its links")
+    warnings: list[str] = Field(description="what every stage said about it")
+
+
+class ManifestStage(Document):
+    """How a stage was run."""
+
+    name: str = Field(description="the stage")
+    backend: str = Field(description="the backend that did it")
+    config: dict[str, Any] = Field(description="its settings; see `r2c2r schema config`")
+    seconds: float = Field(default=0.0, ge=0, description="how long it took")
+
+
+class Manifest(Document):
+    """manifest.json."""
+
+    schema_: Version = Field(alias="schema", description="1, the current format")
+    tool_version: str = Field(description="the version of r2c2r that wrote it")
+    created: str | None = Field(description="ISO 8601; null where nobody gave a time, so that equal inputs give equal bytes")
+    capture: ManifestCapture = Field(description="the recording")
+    world_from_capture: _Pose = Field(description="4x4: the levelled world from the recording's own")
+    objects: list[ManifestObject] = Field(description="what the scene holds")
+    stages: list[ManifestStage] = Field(description="how each stage was run")

@@ -1,0 +1,97 @@
+"""One description of each document, for the command line, the app, and whoever writes one."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from app import schemas
+from r2c2r_core.commands.schema import NAMES, document_of, schema_text
+from r2c2r_core.config import ReconstructConfig, config_from
+from r2c2r_core.errors import InputError
+from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.schema.manifest import Manifest
+from r2c2r_core.schema.prompts import PromptsFile
+from tests.core.export.kitchen import kitchen, reconstruction
+
+PUBLISHED = Path(__file__).parents[3] / "docs" / "schemas"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_published_is_what_is_read(name: str) -> None:
+    again = f"r2c2r schema {name} > docs/schemas/{name}.json"
+    assert (PUBLISHED / f"{name}.json").read_text(encoding="utf-8") == schema_text(name), again
+
+
+def models_of(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    yield model
+    for field in model.model_fields.values():
+        for inner in _inside(field.annotation):
+            yield from models_of(inner)
+
+
+def _inside(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in getattr(annotation, "__args__", ()):
+        yield from _inside(inner)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_that_can_be_written_is_documented(name: str) -> None:
+    for model in models_of(document_of(name)):
+        assert model.__doc__, model
+        for key, field in model.model_fields.items():
+            assert field.description, f"{model.__name__}.{key} says nothing of what it means"
+
+
+def test_the_defaults_are_within_their_own_bounds() -> None:
+    written = json.loads(json.dumps(asdict(ReconstructConfig())))
+    assert config_from(written, "config.json") == ReconstructConfig()
+
+
+def test_what_is_set_is_set_and_the_rest_stays() -> None:
+    config = config_from({"warp": {"front_scale": [1, 2]}, "align": {"views": 3}, "ingest": {"near_m": 1}}, "config.json")
+    assert (config.warp.front_scale, config.warp.depth_scale) == ((1.0, 2.0), (0.2, 5.0))
+    assert (config.align.views, config.align.view_px, config.ingest.near_m) == (3, 128, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("document", "says"),
+    [
+        ([], "the document is []"),
+        ({"fly": {}}, "unknown key 'fly' in the document; expected ingest, segment"),
+        ({"segment": 3}, "segment is 3; expected an object"),
+        ({"segment": None}, "segment is null"),
+        ({"ingest": {"colour": 1}}, "unknown key 'colour' in ingest; expected most_frames"),
+        ({"generate": {"count": None}}, "generate.count is null; expected 1 to 10 candidates"),
+        ({"generate": {"count": 0}}, "generate.count is 0; expected 1 to 10 candidates"),
+        ({"generate": {"rule": "nonsense"}}, "generate.rule is 'nonsense'; expected medoid, or mean"),
+        ({"warp": {"method": "axis"}}, "warp.method is 'axis'; expected axes, or paper"),
+        ({"warp": {"front_scale": [1]}}, "warp.front_scale"),
+        ({"ingest": {"finest_voxel_m": -1}}, "ingest.finest_voxel_m is -1; expected side of the fusion's voxels"),
+        ({"export": {"pictures": 1}}, "export.pictures is 1"),
+        ({"align": {"views": True}}, "align.views is True"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_one_line(document: Any, says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        config_from(document, "config.json")
+    assert says in str(caught.value)
+    assert str(caught.value).startswith("config.json: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_manifest_that_is_written_is_the_one_described() -> None:
+    scene = kitchen()
+    written = json.loads(json.dumps(manifest_of(reconstruction(scene), plan_bundle(scene), None)))
+    assert [item.name for item in Manifest.model_validate(written).objects] == [item.name for item in scene.objects]
+
+
+def test_the_app_reads_prompts_by_the_same_description() -> None:
+    assert schemas.PromptsFile is PromptsFile
