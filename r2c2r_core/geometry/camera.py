@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.arrays import DepthMetres, Matrix3, Pixels, Points
+from r2c2r_core.arrays import DepthMetres, Matrix3, PixelField, Pixels, PointField
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,34 +29,41 @@ class Intrinsics:
         return Intrinsics(fx=self.fx * sx, fy=self.fy * sy, cx=self.cx * sx, cy=self.cy * sy, width=width, height=height)
 
 
-def project(points_camera: Points, camera: Intrinsics) -> Pixels:
-    """Pixel positions (n, 2) of camera-frame points; inf or nonsense where z <= 0: check z yourself."""
-    z = points_camera[:, 2]
+def project(points_camera: PointField, camera: Intrinsics) -> PixelField:
+    """Pixel positions (..., 2) of camera-frame points (..., 3); inf or nonsense where z <= 0: check z yourself."""
+    z = points_camera[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.stack(
-            [camera.fx * points_camera[:, 0] / z + camera.cx, camera.fy * points_camera[:, 1] / z + camera.cy], axis=1
+            [camera.fx * points_camera[..., 0] / z + camera.cx, camera.fy * points_camera[..., 1] / z + camera.cy], axis=-1
         )
 
 
-def unproject(uv_px: Pixels, depth_m: np.ndarray, camera: Intrinsics) -> Points:
-    """Camera-frame points (n, 3) of pixels with z-depth (n,) (paper eq. 1, with fx != fy allowed)."""
-    x = (uv_px[:, 0] - camera.cx) / camera.fx * depth_m
-    y = (uv_px[:, 1] - camera.cy) / camera.fy * depth_m
-    return np.stack([x, y, depth_m], axis=1)
+def unproject(uv_px: PixelField, depth_m: np.ndarray, camera: Intrinsics) -> PointField:
+    """Camera-frame points (..., 3) of pixels (..., 2) with z-depth (...) (paper eq. 1, with fx != fy allowed)."""
+    x = (uv_px[..., 0] - camera.cx) / camera.fx * depth_m
+    y = (uv_px[..., 1] - camera.cy) / camera.fy * depth_m
+    return np.stack([x, y, depth_m], axis=-1)
 
 
-def pixel_centres(camera: Intrinsics) -> np.ndarray:
+def pixel_rays(uv_px: PixelField, camera: Intrinsics) -> PointField:
+    """Camera-frame points (..., 3) at z = 1 on the rays through pixels (..., 2)."""
+    return unproject(uv_px, np.ones(uv_px.shape[:-1]), camera)
+
+
+def ray_slopes(columns: np.ndarray, rows: np.ndarray, camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
+    """X / z of the centres of pixel columns (w,), and y / z of those of rows (h,)."""
+    return (columns + 0.5 - camera.cx) / camera.fx, (rows + 0.5 - camera.cy) / camera.fy
+
+
+def pixel_centres(camera: Intrinsics) -> PixelField:
     """Continuous coordinates (h, w, 2) of all pixel centres."""
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     return np.stack([u, v], axis=-1)
 
 
-def depth_points(depth_m: DepthMetres, camera: Intrinsics) -> np.ndarray:
+def depth_points(depth_m: DepthMetres, camera: Intrinsics) -> PointField:
     """Camera-frame points (h, w, 3) of a z-depth image."""
-    uv = pixel_centres(camera)
-    x = (uv[..., 0] - camera.cx) / camera.fx * depth_m
-    y = (uv[..., 1] - camera.cy) / camera.fy * depth_m
-    return np.stack([x, y, depth_m], axis=-1)
+    return unproject(pixel_centres(camera), depth_m, camera)
 
 
 def sample_nearest(image: np.ndarray, uv_px: Pixels) -> tuple[np.ndarray, np.ndarray]:
@@ -64,15 +71,12 @@ def sample_nearest(image: np.ndarray, uv_px: Pixels) -> tuple[np.ndarray, np.nda
     height, width = image.shape[:2]
     with np.errstate(invalid="ignore"):
         inside = (uv_px[:, 0] >= 0) & (uv_px[:, 1] >= 0) & (uv_px[:, 0] < width) & (uv_px[:, 1] < height)
-        column = np.where(inside, uv_px[:, 0], 0).astype(np.int64)
-        row = np.where(inside, uv_px[:, 1], 0).astype(np.int64)
-    return image[row, column], inside
+        pixel = np.where(inside, uv_px[:, 1], 0).astype(np.int32) * width + np.where(inside, uv_px[:, 0], 0).astype(np.int32)
+    return image.reshape(height * width, *image.shape[2:]).take(pixel, axis=0), inside
 
 
 def sample_through(image: np.ndarray, camera: Intrinsics, other: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
     """What each pixel of `other`, a camera at the same place, sees in `camera`'s image: (h, w), and whether it lies inside."""
-    centres = pixel_centres(other).reshape(-1, 2)
-    scale = np.array([camera.fx / other.fx, camera.fy / other.fy])
-    uv = (centres - [other.cx, other.cy]) * scale + [camera.cx, camera.cy]
-    values, inside = sample_nearest(image, uv)
+    uv = project(pixel_rays(pixel_centres(other), other), camera)
+    values, inside = sample_nearest(image, uv.reshape(-1, 2))
     return values.reshape(other.height, other.width), inside.reshape(other.height, other.width)

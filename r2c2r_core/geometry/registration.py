@@ -1,10 +1,8 @@
-"""Similarity transforms between point sets: closed form, refitted, and by closest points; against outliers: consensus.py."""
+"""Similarity transforms between point sets: closed form, and refitted; against outliers: consensus.py."""
 
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.transforms import Similarity3
@@ -19,14 +17,6 @@ class SimilarityFit(NamedTuple):
 
     target_from_source: Similarity3
     inliers: np.ndarray  # (n,) bool
-
-
-class IcpFit(NamedTuple):
-    """What closest-point iteration ended with."""
-
-    model_pose: Similarity3  # observed_from_model
-    distance_m: np.ndarray  # (n,) observed point to the placed model
-    iterations: int
 
 
 def umeyama(source: Points, target: Points, *, weights: np.ndarray | None = None, scale: float | None = None) -> Similarity3:
@@ -88,38 +78,3 @@ def refit(
     if fit is None or np.count_nonzero(inliers) < minimum_inliers:
         return None
     return SimilarityFit(fit, inliers)
-
-
-def icp(
-    observed: Points,
-    model: Float[np.ndarray, "m 3"],
-    start: Similarity3,
-    *,
-    free_scale: bool = False,
-    keep: float = 0.85,
-    iterations: int = 30,
-    tree: cKDTree | None = None,
-) -> IcpFit:
-    """Move `model` under `observed` points by closest points, from observed to model, keeping the nearest share `keep`.
-
-    The direction matters more than the library: the other way round pulls the unseen back of a complete model onto the
-    visible front (29 mm instead of 1.3 mm). `start` and the result are observed_from_model.
-    """
-    index = cKDTree(model) if tree is None else tree
-    pose, used = start, 0
-    for step in range(iterations):
-        used = step + 1
-        distance, nearest = index.query(pose.inverse.apply(observed))
-        chosen = distance <= np.quantile(distance, keep)
-        previous = pose
-        pose = umeyama(model[nearest[chosen]], observed[chosen], scale=None if free_scale else pose.scale)
-        if _moved(previous, pose, observed) < 1e-6:
-            break
-    distance, _ = index.query(pose.inverse.apply(observed))
-    return IcpFit(pose, distance * pose.scale, used)
-
-
-def _moved(before: Similarity3, after: Similarity3, at: Points) -> float:
-    """How far the first points move between two poses of the same model."""
-    sample = before.inverse.apply(at[:50])
-    return float(np.abs(after.apply(sample) - at[:50]).max())

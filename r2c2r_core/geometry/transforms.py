@@ -22,6 +22,7 @@ from r2c2r_core.arrays import Matrix3, Matrix4, Points, Vector3
 
 CAMERA_CV_FROM_GL = np.diag([1.0, -1.0, -1.0])
 """OpenCV camera axes from OpenGL / ARKit camera axes (x right, y up, z back)."""
+_PARALLEL = 1e-12  # sine below which a cross product of unit vectors is mostly rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +45,15 @@ class Rigid3:
         """The transform the other way round."""
         return Rigid3(self.rotation.T, -self.rotation.T @ self.translation)
 
-    def __matmul__(self, other: "Rigid3") -> "Rigid3":
-        return Rigid3(self.rotation @ other.rotation, self.rotation @ other.translation + self.translation)
+    @overload
+    def __matmul__(self, other: "Rigid3") -> "Rigid3": ...
+    @overload
+    def __matmul__(self, other: "Similarity3") -> "Similarity3": ...
+    def __matmul__(self, other: "Rigid3 | Similarity3") -> "Rigid3 | Similarity3":
+        rotation, translation = self.rotation @ other.rotation, self.rotation @ other.translation + self.translation
+        if isinstance(other, Similarity3):
+            return Similarity3(other.scale, rotation, translation)
+        return Rigid3(rotation, translation)
 
     def apply(self, points: Points) -> Points:
         """Points (n, 3) of the source frame, in the destination frame."""
@@ -110,16 +118,15 @@ def rotation_about_z(angle_rad: float) -> Matrix3:
 
 
 def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
-    """The smallest rotation that turns direction `source` onto direction `target`."""
+    """The smallest rotation that turns direction `source` onto direction `target`; of opposites, one of the half turns."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -1.0 + 1e-9:  # opposite: any perpendicular axis serves
-        helper = np.eye(3)[np.argmin(np.abs(a))]
-        axis = np.cross(a, helper)
-        axis /= np.linalg.norm(axis)
-        return 2.0 * np.outer(axis, axis) - np.eye(3)
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+    sine = float(np.linalg.norm(axis))
+    if sine < _PARALLEL:  # equal or opposite: any perpendicular axis serves
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross  # Rodrigues
 
 
 def front_rotation(outward: Vector3) -> Matrix3:

@@ -10,6 +10,8 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Protocol, cast
 
+from r2c2r_core.disk import is_below
+from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import CaptureError
 
 _MAX_MEMBERS = 400_000  # three files a frame, 60 frames/s: 37 minutes
@@ -44,6 +46,8 @@ def open_files(source: Path) -> Files:
         return FolderFiles(source)
     if not source.exists():
         raise CaptureError(f"{source}: no such file or folder", hint="check the path of the recording")
+    if not source.is_file():  # a pipe would be waited for
+        raise CaptureError(f"{source}: {kind_of_file(source.stat().st_mode)}", hint="give a folder or a file")
     return ZipFiles(source)
 
 
@@ -52,7 +56,6 @@ class FolderFiles:
 
     def __init__(self, source: Path) -> None:
         self.source = source
-        self._root = source.resolve()
         found = (path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file())
         self._names = frozenset(islice((name for name in found if not _is_clutter(name)), _MAX_MEMBERS + 1))
         if len(self._names) > _MAX_MEMBERS:
@@ -75,7 +78,7 @@ class FolderFiles:
     def open(self, name: str) -> BinaryIO:
         """The content as a stream; raises CaptureError when it cannot be read."""
         path = self.source / name
-        if not path.resolve().is_relative_to(self._root):
+        if not is_below(path, self.source):
             raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
         try:
             return path.open("rb")

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Points
-from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_nearest
+from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_nearest, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
 
@@ -100,14 +100,7 @@ def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_f
     normals, _ = sample_nearest(second.normals, uv)
     spots = np.floor(uv) + 0.5
     with np.errstate(invalid="ignore"):
-        still = np.stack(
-            [
-                (spots[:, 0] - second.camera.cx) / second.camera.fx * measured,
-                (spots[:, 1] - second.camera.cy) / second.camera.fy * measured,
-                measured,
-            ],
-            axis=1,
-        )
+        still = unproject(spots, measured, second.camera)
         gap = np.einsum("nd,nd->n", there - still, normals)
         apart = np.linalg.norm(there - still, axis=1)
     facing = world_from_second.rotation.T @ world_from_first.rotation

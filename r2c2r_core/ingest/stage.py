@@ -1,4 +1,7 @@
-"""Ingest (paper §3): one recording in, one levelled Capture out; every foreign convention ends here."""
+"""Ingest (paper §3): one recording in, one levelled Capture out; every foreign convention ends here.
+
+Reading and levelling are apart: what a person says of the room never decodes the recording again.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +15,7 @@ from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.depth import usable_depth
 from r2c2r_core.ingest.flying import drop_flying
 from r2c2r_core.ingest.gravity import level_room
+from r2c2r_core.ingest.noise import estimate_depth_noise
 from r2c2r_core.ingest.odometry import estimate_poses
 from r2c2r_core.ingest.planes import sample_surface
 from r2c2r_core.ingest.poses import SettledPoses, refine_poses
@@ -19,45 +23,58 @@ from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFr
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.rgb import stored_jpeg
 from r2c2r_core.ingest.store import StoredImages, new_store, open_images, write_depth, write_rgb
-from r2c2r_core.model.capture import Capture, Frame, PoseEvidence, SceneSurface
+from r2c2r_core.model.capture import Capture, Frame, PoseEvidence, Scan, SceneSurface
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
 
-__all__ = ["IngestConfig", "open_images", "read_capture"]
+__all__ = ["IngestConfig", "level_scan", "open_images", "read_capture", "read_recording"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IngestConfig:
-    """How a recording is read. Measured defaults: see tests/core/ingest."""
+    """How a recording is read."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
 
-    most_frames: int = 600  # longer recordings keep every n-th frame; numbers stay
-    near_m: float = 0.08  # a phone's LiDAR starts at about 0.1 m
-    far_m: float = 8.0  # beyond, Kinect and LiDAR are off by decimetres
-    fused_frames: int = 120
-    fused_far_m: float = 4.0  # beyond, the bias of a Kinect or a phone bends the surface
-    finest_voxel_m: float = 0.01
-    coarsest_voxel_m: float = 0.025
-    smallest_part_m2: float = 0.004  # a handle 2 x 20 cm stays
-    outlier_neighbours: int = 0  # the paper removes statistical outliers by 20 neighbours: mostly true surface (cloud.py)
-    most_bad_share: float = 0.2
-    least_valid_share: float = 0.2  # high confidence alone must leave this much of the median frame
-    seed: int = 0
+    most_frames: int = setting(600, "frames kept of a longer recording, every n-th; numbers stay", ge=1, le=100_000)
+    near_m: float = setting(0.08, "least depth believed, in m: a phone's LiDAR starts at about 0.1", ge=0, le=100)
+    far_m: float = setting(8.0, "largest depth believed, in m: beyond, Kinect and LiDAR are off by decimetres", gt=0, le=100)
+    fused_frames: int = setting(120, "frames that the fused surface is made of", ge=1, le=10_000)
+    fused_far_m: float = setting(
+        4.0, "largest depth fused, in m: beyond, the bias of a Kinect or a phone bends the surface", gt=0, le=100
+    )
+    finest_voxel_m: float = setting(0.01, "side of the fusion's voxels in a small room, in m", ge=0.002, le=1)
+    coarsest_voxel_m: float = setting(0.025, "side of the fusion's voxels in a large room, in m", ge=0.002, le=1)
+    smallest_part_m2: float = setting(0.004, "area below which a loose part of the surface is noise, in m²", ge=0, le=10)
+    outlier_neighbours: int = setting(
+        0, "neighbours by which statistical outliers are told (the paper's are 20); 0 keeps all", ge=0, le=1000
+    )
+    most_bad_share: float = setting(0.2, "share of frames that may be unreadable before a recording is refused", ge=0, le=1)
+    least_valid_share: float = setting(
+        0.2, "share of the median frame that depth of high confidence must leave to be used alone", ge=0, le=1
+    )
+    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
 
 
 def read_capture(
     source: Path, store: Path, config: IngestConfig, *, overrides: Overrides | None = None, progress: Progress = SILENT
 ) -> Capture:
-    """Read a recording; its images are written below `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
+    """Read a recording and level it; its images make the folder `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
+    scan = read_recording(source, store, config, progress=progress.part(0.0, 0.95))
+    return level_scan(scan, overrides or Overrides(objects={}), config, progress=progress.part(0.95, 1.0))
+
+
+def read_recording(source: Path, store: Path, config: IngestConfig, *, progress: Progress = SILENT) -> Scan:
+    """Decode a recording and fuse it, in its own world; its images make the folder `store`."""
     progress.at(0.0, "opening the recording")
     recording = open_recording(source)
     raw, thinned = _thinned(recording.frames, config.most_frames)
     least_confidence, unsure = _least_confidence(recording, raw, config)
     with new_store(store) as partial:
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
+        images = StoredImages(partial)
+        settled = _settle_poses(frames, raw, images, config, progress.part(0.5, 0.65))
+        drop_flying(settled.frames, images, partial, progress.part(0.65, 0.8))
     images = StoredImages(store)
-    settled = _settle_poses(frames, raw, images, config, progress.part(0.5, 0.65))
-    if drop_flying(settled.frames, images, store, progress.part(0.65, 0.75)):
-        images = StoredImages(store)  # without what it has read already
     surface, voxel_m = fuse_frames(
         settled.frames,
         images,
@@ -67,32 +84,46 @@ def read_capture(
         depth_max_m=config.fused_far_m,
         smallest_part_m2=config.smallest_part_m2,
         outlier_neighbours=config.outlier_neighbours,
-        progress=progress.part(0.75, 0.9),
+        progress=progress.part(0.8, 0.97),
     )
-    progress.at(0.9, "levelling")
-    rng = np.random.default_rng(config.seed)
-    sample = sample_surface(surface.vertices, surface.faces, 30_000, rng)
-    file_up = None if settled.evidence.source == "odometry" else recording.up_capture  # such a world is the first camera's
-    levelled = level_room(sample, [f.world_from_camera for f in settled.frames], file_up, overrides, rng)
+    noise = estimate_depth_noise(settled.frames, images, surface.vertices, surface.faces)
     progress.at(0.97, "hashing")
     sha256 = recording.files.sha256(recording.names)
+    up_capture = None if settled.evidence.source == "odometry" else recording.up_capture  # such a world is the first camera's
     progress.at(1.0, f"{len(frames)} frames")
-    return Capture(
+    return Scan(
         name=source.stem if source.is_file() else source.name,
         sha256=sha256,
         format=recording.format,
-        frames=tuple(_in_world(f, levelled.world_from_capture) for f in settled.frames),
-        world_from_capture=levelled.world_from_capture,
-        room=levelled.room,
-        surface=SceneSurface(
-            vertices_world=levelled.world_from_capture.apply(surface.vertices),
-            faces=surface.faces,
-            colours=surface.colours,
-            voxel_m=voxel_m,
-        ),
+        frames=settled.frames,
+        surface=SceneSurface(vertices_world=surface.vertices, faces=surface.faces, colours=surface.colours, voxel_m=voxel_m),
         images=images,
-        notices=(*recording.notices, *thinned, *unsure, *bad, *settled.notices, *levelled.notices),
-        poses=_given_in_world(settled.evidence, levelled.world_from_capture),
+        up_capture=up_capture,
+        notices=(*recording.notices, *thinned, *unsure, *bad, *settled.notices),
+        poses=settled.evidence,
+        depth_noise=noise,
+    )
+
+
+def level_scan(scan: Scan, overrides: Overrides, config: IngestConfig, *, progress: Progress = SILENT) -> Capture:
+    """The scan with +Z up, its floor, yaw and walls found or as a person said: one motion of its poses and surface."""
+    progress.at(0.0, "levelling")
+    rng = np.random.default_rng(config.seed)
+    sample = sample_surface(scan.surface.vertices_world, scan.surface.faces, 30_000, rng)
+    levelled = level_room(sample, [f.world_from_camera for f in scan.frames], scan.up_capture, overrides, rng)
+    motion = levelled.world_from_capture
+    return Capture(
+        name=scan.name,
+        sha256=scan.sha256,
+        format=scan.format,
+        frames=tuple(_in_world(f, motion) for f in scan.frames),
+        world_from_capture=motion,
+        room=levelled.room,
+        surface=replace(scan.surface, vertices_world=motion.apply(scan.surface.vertices_world)),
+        images=scan.images,
+        notices=(*scan.notices, *levelled.notices),
+        poses=_given_in_world(scan.poses, motion),
+        depth_noise=scan.depth_noise,
     )
 
 

@@ -1,4 +1,4 @@
-"""A recording's pixels on disk: rgb/<index:06d>.jpg and depth/<index:06d>.png below one folder."""
+"""A recording's pixels on disk: rgb/<index:06d>.jpg and depth/<index:06d>.png below a folder that is whole or absent."""
 
 import errno
 import shutil
@@ -17,7 +17,7 @@ from r2c2r_core.ingest.depth import decode_depth, encode_depth
 from r2c2r_core.model.capture import Depth, Frame
 
 _CACHED_IMAGES, _CACHED_DEPTHS = 12, 48  # 25 MB at 960x720, 9 MB at 256x192
-_PARTIAL = "partial"
+_PARTIAL = ".partial"
 
 
 class StoredImages:
@@ -64,16 +64,15 @@ def depth_path(store: Path, index: int) -> Path:
 
 @contextmanager
 def new_store(store: Path) -> Iterator[Path]:
-    """A folder to write a recording's images into; they appear in `store` only when the block ends well."""
-    partial = store / _PARTIAL
+    """A folder to write a recording's images into; it becomes `store`, by one rename, only when the block ends well."""
+    partial = store.with_name(store.name + _PARTIAL)
     try:
         shutil.rmtree(partial, ignore_errors=True)
         for name in ("rgb", "depth"):
             (partial / name).mkdir(parents=True)
         yield partial
-        for name in ("rgb", "depth"):
-            shutil.rmtree(store / name, ignore_errors=True)
-            (partial / name).rename(store / name)
+        shutil.rmtree(store, ignore_errors=True)
+        partial.rename(store)
     except OSError as problem:
         if problem.errno in (errno.ENOSPC, errno.EDQUOT):
             raise EnvironmentProblem(

@@ -22,7 +22,7 @@ from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numb
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _TRAJECTORY = "lowres_wide.traj"
-_STAMP = r"(?:[^/]*_)?(\d+\.\d+)"
+_STAMP = r"(?:[^/]*_)?(\d{1,12}\.\d{1,12})"  # seconds
 _COLOUR, _DEPTH = rf"lowres_wide/{_STAMP}\.png", rf"lowres_depth/{_STAMP}\.png"
 _CONFIDENCE, _PINCAM = rf"confidence/{_STAMP}\.png", rf"lowres_wide_intrinsics/{_STAMP}\.pincam"
 _APART_S = 0.009  # half a frame at 60 Hz: interpolating all through the 0.1 s between two poses would smooth the hand away

@@ -14,19 +14,24 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.protocol import Colour, RawDepth, RawFrame, UnreadableFrame
 
 MAX_PIXELS = 64_000_000
+MOST_FRAMES = 10_000_000  # 46 hours at 60 Hz; frames are numbered from 0
+_FORMATS = ("JPEG", "PNG")  # what phones and data sets write
 
 
 def image_size(content: bytes, name: str) -> tuple[int, int]:
-    """(width, height) from an image's header, without decoding it; raises UnreadableFrame."""
+    """(width, height) from the header of a JPEG or PNG, without decoding it; raises UnreadableFrame.
+
+    Asked before any decoder sees the content: Pillow and OpenCV know some fifty formats, and Pillow runs Ghostscript for one.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below is ours
-            with Image.open(io.BytesIO(content)) as image:
+            with Image.open(io.BytesIO(content), formats=_FORMATS) as image:
                 width, height = image.size
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as problem:
-        raise UnreadableFrame(f"{name}: not an image ({len(content)} bytes)") from problem
+        raise UnreadableFrame(f"{name}: neither a JPEG nor a PNG image ({len(content)} bytes)") from problem
     if width * height > MAX_PIXELS:
         raise UnreadableFrame(f"{name}: {width}x{height} pixels, at most {MAX_PIXELS // 10**6} megapixels are expected")
     return width, height
@@ -81,13 +86,15 @@ def colour_pixels(colour: Colour, name: str) -> Image:
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
-def numbered(names: Iterable[str], pattern: str) -> dict[int, str]:
-    """File names by the number that `pattern`'s first group finds in them."""
+def numbered(names: Iterable[str], pattern: str, *, below: int = MOST_FRAMES) -> dict[int, str]:
+    """File names by the number that `pattern`'s first group finds in them; one that is not `below` is no frame's."""
+    longest = len(str(below))
     found: dict[int, str] = {}
     for name in sorted(names):
         match = re.fullmatch(pattern, name)
-        if match:
-            found.setdefault(int(match.group(1)), name)
+        digits = match.group(1).lstrip("0") or "0" if match else ""
+        if 0 < len(digits) <= longest and int(digits) < below:
+            found.setdefault(int(digits), name)
     return found
 
 

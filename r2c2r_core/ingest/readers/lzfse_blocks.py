@@ -36,7 +36,7 @@ def unpacked(content: bytes, name: str) -> bytes:
         return content
     try:
         return bytes(lzfse.decompress(content))
-    except lzfse.error as problem:
+    except (lzfse.error, MemoryError) as problem:  # garbage in LZVN ends as the latter
         raise UnreadableFrame(f"{name}: damaged LZFSE data ({len(content)} bytes)") from problem
 
 

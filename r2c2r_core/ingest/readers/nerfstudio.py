@@ -10,6 +10,7 @@ import posixpath
 import re
 from collections.abc import Mapping
 from functools import partial
+from tokenize import TokenError
 from typing import Any
 
 import cv2
@@ -23,7 +24,7 @@ from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import MAX_PIXELS, colour_file, colour_pixels, depth_file, first_size
 from r2c2r_core.ingest.readers.lens import Lens, undistorted
 from r2c2r_core.ingest.readers.protocol import Colour, Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
-from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_json
+from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_json_object
 
 _TRANSFORMS = "transforms.json"
 _PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
@@ -32,7 +33,7 @@ _CAMERA, _LENS = ("fl_x", "fl_y", "cx", "cy"), ("k1", "k2", "p1", "p2", "k3")
 
 def open_nerfstudio(files: Files) -> Recording:
     """The recording that a transforms.json describes; raises CaptureError."""
-    document = read_json(files, _TRANSFORMS)
+    document = read_json_object(files, _TRANSFORMS)
     entries = _entries(files, document)
     colour, depth, masks = (_named(files, entries, key) for key in ("file_path", "depth_file_path", "mask_path"))
     if not depth:
@@ -154,7 +155,10 @@ def _mask(files: Files, name: str, shape: tuple[int, ...]) -> np.ndarray:
 def _depth_size(files: Files, depth: Mapping[int, str]) -> tuple[int, int]:
     if not any(name.endswith(".npy") for name in depth.values()):
         return first_size(files, depth.values(), "depth image")
-    height, width = _array(files, min(depth.values())).shape
+    try:
+        height, width = _array(files, min(depth.values())).shape
+    except UnreadableFrame as problem:
+        raise CaptureError(f"{files.source}: {problem}", hint="export the recording again") from problem
     return width, height
 
 
@@ -168,10 +172,21 @@ def _array(files: Files, name: str) -> np.ndarray:
         shape, _, dtype = read_header(stream)
         if len(shape) == 3 and shape[2] == 1:
             shape = shape[:2]
-        if len(shape) != 2 or not 0 < shape[0] * shape[1] <= MAX_PIXELS or dtype.kind not in "fiu":
+        if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] > MAX_PIXELS or dtype.kind not in "fiu":
             raise ValueError(f"{dtype} of shape {shape}")
         return np.load(io.BytesIO(content), allow_pickle=False).reshape(shape)
-    except (ValueError, EOFError, OSError) as problem:
+    # the header is a Python literal, and numpy lets through whatever its parser raises
+    except (
+        ValueError,
+        EOFError,
+        OSError,
+        SyntaxError,
+        TypeError,
+        KeyError,
+        MemoryError,
+        RecursionError,
+        TokenError,
+    ) as problem:
         raise UnreadableFrame(f"{name}: not a readable depth array ({problem})") from problem
 
 

@@ -5,6 +5,7 @@ fx, fy, cx, cy, width, height and t_00..t_23, row-major camera-to-world with ARK
 millimetres, confidence 0, 127 or 255. Frames are named by their time; their number here is its rank. (PolyCam/polyform.)
 """
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -16,7 +17,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
 
 _IMAGES, _CAMERAS = r"images/(\d+)\.(?:jpe?g|png)", r"cameras/(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.png", r"keyframes/confidence/(\d+)\.png"
@@ -26,12 +27,12 @@ _CONFIDENCE_LEVELS = (64, 192)  # between 0, 127 and 255
 def open_polycam(files: Files) -> Recording:
     """The recording in a Polycam raw export; raises CaptureError."""
     names = files.names()
-    corrected = all(numbered(names, f"keyframes/corrected_{kind}") for kind in (_IMAGES, _CAMERAS))
+    corrected = all(_by_time(names, f"keyframes/corrected_{kind}") for kind in (_IMAGES, _CAMERAS))
     kind = "keyframes/corrected_" if corrected else "keyframes/"
-    by_time = [numbered(names, pattern) for pattern in (kind + _IMAGES, kind + _CAMERAS, _DEPTH, _CONFIDENCE)]
+    by_time = [_by_time(names, pattern) for pattern in (kind + _IMAGES, kind + _CAMERAS, _DEPTH, _CONFIDENCE)]
     ranks = {time_us: rank for rank, time_us in enumerate(sorted(set().union(*by_time)))}
     colour, cameras, depth, confidence = ({ranks[t]: name for t, name in held.items()} for held in by_time)
-    documents = {number: read_json(files, name) for number, name in cameras.items()}
+    documents = {number: read_json_object(files, name) for number, name in cameras.items()}
     size = first_size(files, colour.values(), "colour image")
     depth_size = first_size(files, depth.values(), "depth image")
     rgb_cameras = {number: camera for number, d in documents.items() if (camera := _camera(d, size)) is not None}
@@ -53,6 +54,10 @@ def open_polycam(files: Files) -> Recording:
         notices=tuple(notices),
         other_names=tuple(cameras[f.index] for f in frames),
     )
+
+
+def _by_time(names: Iterable[str], pattern: str) -> dict[int, str]:
+    return numbered(names, pattern, below=10**18)  # microseconds: files are numbered by the clock, not by frame
 
 
 def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None:

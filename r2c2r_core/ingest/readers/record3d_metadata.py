@@ -15,7 +15,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
-from r2c2r_core.ingest.readers.texts import integer_centred, parse_json, pose_of_quaternion
+from r2c2r_core.ingest.readers.texts import integer_centred, parse_json_object, pose_of_quaternion
 
 _TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
 
@@ -61,7 +61,7 @@ class Record3DMetadata:
             notices.append(f"{len(beyond)} frames at the end have no pose and were left out")
         if lost := len(wanted) - len(beyond) - len(posed):
             notices.append(f"{lost} frames have an unusable pose and were left out")
-        if missing := sum(1 for n in range(wanted[-1] + 1) if n not in set(wanted)):
+        if missing := wanted[-1] + 1 - len(wanted):  # numbers are distinct
             notices.append(
                 f"{missing} of {wanted[-1] + 1} frame numbers are missing; the others are matched to poses by number"
             )
@@ -70,7 +70,7 @@ class Record3DMetadata:
 
 def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
     """Read the JSON; `source` names it in messages. Raises CaptureError."""
-    metadata = parse_json(content, source)
+    metadata = parse_json_object(content, source)
     width, height = _positive(metadata, "w", source), _positive(metadata, "h", source)
     raw_poses = _table(metadata, "poses", 7, source)
     if raw_poses is None or not len(raw_poses):

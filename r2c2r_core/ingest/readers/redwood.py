@@ -18,7 +18,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json, read_numbers
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object, read_numbers
 
 _COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.png"
 _LOG = r"(?:scene/)?trajectory\.log"
@@ -69,7 +69,7 @@ def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool
 def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None]:
     """From a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
-        document = read_json(files, name)
+        document = read_json_object(files, name)
         matrix, width, height = (document.get(key) for key in ("intrinsic_matrix", "width", "height"))
         try:
             k = np.array(matrix, np.float64).reshape(3, 3).T

@@ -15,7 +15,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Colour, Part, RawFrame, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_calibration
 from r2c2r_core.ingest.readers.video import Video
@@ -62,16 +62,22 @@ def _video_frame(video: Video, frame: RawFrame) -> Colour:
 
 def _odometry(files: Files) -> dict[int, dict[str, float]]:
     """The rows of odometry.csv by frame number; a value that is no number is NaN."""
-    table = csv.DictReader(lines_of(files, _ODOMETRY), skipinitialspace=True)
-    columns = [name.strip() for name in table.fieldnames or ()]
+    try:
+        header, *lines = csv.reader(lines_of(files, _ODOMETRY) or [""], skipinitialspace=True)
+    except csv.Error as problem:
+        raise CaptureError(
+            f"{files.source}/{_ODOMETRY}: {problem}", hint="copy the recording from the phone again"
+        ) from problem
+    columns = [name.strip() for name in header]
     lacking = [c for c in ("timestamp", "frame", *_POSE) if c not in columns]
     if lacking:
         raise CaptureError(
             f"{files.source}/{_ODOMETRY}: no column {', '.join(lacking)} among {', '.join(columns)[:80] or 'none'}",
             hint="the first line names the columns; copy the recording from the phone again",
         )
-    rows = ({c: _number(value) for c, value in zip(columns, row.values(), strict=False)} for row in table)
-    return {int(row["frame"]): row for row in rows if 0 <= row["frame"] < 1e7}
+    absent = dict.fromkeys(columns, np.nan)
+    rows = ({**absent, **{c: _number(value) for c, value in zip(columns, line, strict=False)}} for line in lines)
+    return {int(row["frame"]): row for row in rows if 0 <= row["frame"] < MOST_FRAMES}
 
 
 def _camera(row: dict[str, float], common: Intrinsics) -> Intrinsics:
@@ -81,9 +87,9 @@ def _camera(row: dict[str, float], common: Intrinsics) -> Intrinsics:
     return integer_centred(fx, fy, cx, cy, (common.width, common.height))
 
 
-def _number(text: object) -> float:
+def _number(text: str) -> float:
     try:
-        return float(text) if isinstance(text, str) else np.nan
+        return float(text)
     except ValueError:
         return np.nan
 

@@ -21,6 +21,7 @@ from r2c2r_core.ingest.readers import (
 from r2c2r_core.ingest.readers.plausible import plausible
 from r2c2r_core.ingest.readers.protocol import Reader, Recording
 from r2c2r_core.ingest.upright import upright
+from r2c2r_core.plugins import added
 
 READERS: tuple[Reader, ...] = (
     record3d.READER,
@@ -35,7 +36,14 @@ READERS: tuple[Reader, ...] = (
     redwood.READER,
     nerfstudio.READER,
 )
+"""The project's own; `readers()` also has those of other packages."""
+
 _DEEPEST, _WIDEST = 6, 50  # folders that are looked into
+
+
+def readers() -> tuple[Reader, ...]:
+    """Every format that is recognised, the project's own first."""
+    return (*READERS, *added("r2c2r.readers", Reader))
 
 
 def open_recording(source: Path) -> Recording:
@@ -54,7 +62,7 @@ def open_recording(source: Path) -> Recording:
 
 
 def _reader_of(root: Files) -> Reader | None:
-    return next((reader for reader in READERS if not reader.missing(root.names())), None)
+    return next((reader for reader in readers() if not reader.missing(root.names())), None)
 
 
 def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
@@ -70,7 +78,7 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
     return CaptureError(
         f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}",
-        hint=f"it holds {reader.expects}; also looked for {', '.join(r.name for r in READERS if r is not reader)}",
+        hint=f"it holds {reader.expects}; also looked for {', '.join(r.name for r in readers() if r is not reader)}",
     )
 
 
@@ -84,7 +92,7 @@ def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
 
 def _nearest_miss(roots: list[Files]) -> tuple[Reader, tuple[str, ...]] | None:
     """The format that lacks the smallest share of its parts, if at least half of them are there."""
-    misses = [(reader, reader.missing(root.names())) for root in roots for reader in READERS]
+    misses = [(reader, reader.missing(root.names())) for root in roots for reader in readers()]
     reader, missing = min(misses, key=lambda miss: (len(miss[1]) / len(miss[0].parts), -len(miss[0].parts)))
     return (reader, missing) if len(missing) <= len(reader.parts) / 2 else None
 
@@ -98,4 +106,4 @@ def _found(files: Files) -> str:
 
 
 def _formats() -> str:
-    return "; ".join(f"{reader.name} ({reader.expects})" for reader in READERS)
+    return "; ".join(f"{reader.name} ({reader.expects})" for reader in readers())

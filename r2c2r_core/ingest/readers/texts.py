@@ -1,17 +1,15 @@
 """Numbers in text files: matrices, poses and cameras as the folder formats write them."""
 
-import json
 from typing import Any
 
 import numpy as np
 
 from r2c2r_core.arrays import Matrix3
+from r2c2r_core.documents import parse_json
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.files import Files
-
-_MOST_JSON_BYTES = 64 * 2**20  # an hour of poses is half of it
 
 
 def read_numbers(content: bytes) -> np.ndarray | None:
@@ -62,20 +60,15 @@ def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int,
     )
 
 
-def read_json(files: Files, name: str) -> dict[str, Any]:
+def read_json_object(files: Files, name: str) -> dict[str, Any]:
     """A JSON object; raises CaptureError."""
-    return parse_json(files.read(name), f"{files.source}/{name}")
+    return parse_json_object(files.read(name), f"{files.source}/{name}")
 
 
-def parse_json(content: bytes, source: str) -> dict[str, Any]:
+def parse_json_object(content: bytes, source: str) -> dict[str, Any]:
     """A JSON object; `source` names it in messages. Raises CaptureError."""
     hint = "export the recording again"
-    if len(content) > _MOST_JSON_BYTES:
-        raise CaptureError(f"{source}: {len(content) >> 20} MiB of JSON, 64 at most are expected", hint=hint)
-    try:
-        document = json.loads(content, parse_int=float)  # 400 digits become inf, not a number too long to convert
-    except (ValueError, RecursionError) as problem:
-        raise CaptureError(f"{source}: not JSON ({problem})", hint=hint) from problem
+    document = parse_json(content, source, CaptureError, hint=hint, lenient=True)
     if not isinstance(document, dict):
         raise CaptureError(f"{source}: a JSON {type(document).__name__}, an object was expected", hint=hint)
     return document

@@ -22,6 +22,7 @@ from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 _POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
 _APART_S = 0.02
 _GAP_S = 0.1  # poses farther apart than this are not interpolated
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _KNOWN_CAMERAS = {  # vision.in.tum.de, intrinsic page; fx, fy, cx, cy at 640x480
     "freiburg1": (517.3, 516.5, 318.6, 255.3),
     "freiburg2": (520.9, 521.0, 325.1, 249.7),
@@ -125,9 +126,9 @@ def _calibration(files: Files) -> _Calibration:
     """From a settings file beside the images, else from the sequence's name, else the generic Kinect's, with a notice."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith((".yaml", ".yml"))):
         text = files.read(name).decode("utf-8", errors="replace")
-        found = {k: float(v) for k, v in re.findall(r"^\s*(?:Camera1?\.)?(fx|fy|cx|cy)\s*:\s*([-+.\deE]+)", text, re.MULTILINE)}
+        found = {k: float(v) for k, v in re.findall(rf"^\s*(?:Camera1?\.)?(fx|fy|cx|cy)\s*:\s*({_NUMBER})", text, re.MULTILINE)}
         if len(found) == 4 and found["fx"] > 0 and found["fy"] > 0:
-            factor = re.search(r"^\s*(?:RGBD\.)?Dep[t]?h?MapFactor\s*:\s*([-+.\deE]+)", text, re.MULTILINE)
+            factor = re.search(rf"^\s*(?:RGBD\.)?Dep[t]?h?MapFactor\s*:\s*({_NUMBER})", text, re.MULTILINE)
             units = float(factor.group(1)) if factor and float(factor.group(1)) > 1.0 else 5000.0
             return _Calibration((found["fx"], found["fy"], found["cx"], found["cy"]), units, None, name)
     for name, camera in _KNOWN_CAMERAS.items():

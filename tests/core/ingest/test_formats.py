@@ -110,7 +110,7 @@ def test_a_film_can_be_asked_backwards(tmp_path):
 @pytest.mark.parametrize(
     ("change", "found"),
     [
-        (lambda c: b"", "not a readable video"),
+        (lambda c: b"", "an MP4 was expected"),
         (lambda c: c[: len(c) // 2], "not a readable video"),
         (lambda c: c.replace(b"hvc1", b"zzzz"), r"cannot decode the codec|not a readable video"),
     ],

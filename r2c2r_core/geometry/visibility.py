@@ -1,0 +1,61 @@
+"""What a depth image says about points whose place is known: the one place where a depth is looked up by projection."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Points
+from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
+from r2c2r_core.geometry.transforms import Rigid3
+
+Lengths = np.ndarray | np.floating | float  # metres, one or an array of them
+
+_SURE = 3.0  # standard deviations: of normal noise 0.1 % lies further out on one side
+_NEAREST_M = 0.1  # no depth camera of a phone measures nearer (ARKit LiDAR and Kinect: 0.2 to 0.4 m)
+
+
+class Sighting(NamedTuple):
+    """Points as one camera sees them."""
+
+    z_m: np.ndarray  # (n,) along the optical axis
+    seen_m: np.ndarray  # (n,) depth measured in their pixels; 0 where unknown, outside the image or too near to be seen
+    inside: np.ndarray  # (n,) bool: before the camera and inside the image
+
+
+def look_up(points_world: Points, world_from_camera: Rigid3, camera: Intrinsics, depth_m: DepthMetres) -> Sighting:
+    """Where world points (n, 3) lie for a camera, and the depth its image has there; `camera` has the image's size."""
+    local = world_from_camera.inverse.apply(points_world)
+    measured, inside = sample_nearest(depth_m, project(local, camera))
+    inside &= local[:, 2] > _NEAREST_M
+    return Sighting(local[:, 2], np.where(inside, measured, 0.0), inside)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthNoise:
+    """Standard deviation of a recording's depth at distance z: floor_m + per_m * z, metres (estimated at ingest).
+
+    The defaults are a phone's LiDAR: 4 mm and 3 mm more for each metre.
+    """
+
+    floor_m: float = 0.004
+    per_m: float = 0.003
+
+    def sigma(self, z_m: Lengths) -> np.ndarray:
+        """One standard deviation at z-depths (...), metres."""
+        return np.asarray(self.floor_m + self.per_m * z_m)
+
+    def _reach(self, z_m: Lengths, margin_m: float) -> np.ndarray:
+        return np.asarray(margin_m + _SURE * self.sigma(z_m))
+
+    def agrees(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
+        """Where depth was measured and lies at z, give or take a margin and the noise. Arrays (...), 0 for unknown depth."""
+        return np.asarray((seen_m > 0) & (np.abs(seen_m - z_m) < self._reach(z_m, margin_m)))
+
+    def occluded(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
+        """Where something measured stands nearer than z by more than a margin and the noise."""
+        return np.asarray((seen_m > 0) & (seen_m < z_m - self._reach(z_m, margin_m)))
+
+    def seen_through(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
+        """Where depth was measured behind z by more than a margin and the noise: nothing opaque is at z."""
+        return np.asarray(seen_m > z_m + self._reach(z_m, margin_m))

@@ -1,0 +1,135 @@
+"""Recordings made to harm: what a file may make the reader open, wait for, or count."""
+
+import io
+import os
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.readers import video
+from r2c2r_core.ingest.readers.images import image_size
+from r2c2r_core.ingest.readers.protocol import UnreadableFrame
+from r2c2r_core.ingest.readers.table import open_recording
+
+from .tiny import TinyRoom, jpeg, write_r3d
+from .tiny_formats import HEVC, write_nerfstudio, write_stray
+
+ROOM = TinyRoom(count=3)
+CONCAT = b"ffconcat version 1.0\nfile secret.mp4\n"
+SDP = b"v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=video 9666 RTP/AVP 96\na=rtpmap:96 H264/90000\n"
+HLS = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nsecret.mp4\n#EXT-X-ENDLIST\n"
+
+
+@pytest.mark.parametrize("forged", [CONCAT, SDP, HLS, b""], ids=["concat", "sdp", "hls", "empty"])
+def test_a_video_that_names_other_files_is_refused(forged: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(HEVC, tmp_path / "secret.mp4")
+    monkeypatch.chdir(tmp_path)
+    folder = write_stray(tmp_path / "scan", ROOM)
+    (folder / "rgb.mp4").write_bytes(forged)
+    with pytest.raises(CaptureError, match="an MP4 was expected"):
+        open_recording(folder)
+
+
+def test_ffmpeg_itself_knows_no_format_that_names_other_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(HEVC, tmp_path / "secret.mp4")
+    monkeypatch.chdir(tmp_path)
+    opened = {
+        content[:8]: cv2.VideoCapture(io.BufferedReader(io.BytesIO(content)), cv2.CAP_FFMPEG, []).isOpened()
+        for content in (CONCAT, HEVC.read_bytes())
+    }
+    assert list(opened.values()) == [False, True]
+    assert "format_whitelist" in os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"]
+    assert video.Video is not None
+
+
+def test_only_jpeg_and_png_reach_a_decoder() -> None:
+    picture = np.zeros((4, 5, 3), np.uint8)
+    assert image_size(jpeg(picture), "a.jpg") == (5, 4)
+    assert image_size(cv2.imencode(".png", picture)[1].tobytes(), "a.png") == (5, 4)
+    postscript = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 5 4\n%%EndComments\n"
+    for foreign in (postscript, *(cv2.imencode(suffix, picture)[1].tobytes() for suffix in (".bmp", ".tiff", ".ppm", ".webp"))):
+        with pytest.raises(UnreadableFrame, match="neither a JPEG nor a PNG"):
+            image_size(foreign, "a.jpg")
+
+
+def test_a_pipe_is_no_recording(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "scan.r3d")
+    with pytest.raises(CaptureError, match="a pipe"):
+        open_recording(tmp_path / "scan.r3d")
+
+
+def renamed(source: Path, target: Path, name: Callable[[str], str]) -> Path:
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for member in old.namelist():
+            new.writestr(name(member), old.read(member))
+    return target
+
+
+@pytest.mark.parametrize("number", ["1000000000000", "9" * 250, "9" * 5000], ids=["10^12", "250 digits", "5000 digits"])
+def test_a_frame_number_that_no_recording_reaches_is_no_frame(number: str, tmp_path: Path) -> None:
+    whole = write_r3d(tmp_path / "whole.r3d", ROOM)
+    scan = renamed(whole, tmp_path / "scan.r3d", lambda name: name.replace("rgbd/2.", f"rgbd/{number}."))
+    assert [frame.index for frame in open_recording(scan).frames] == [0, 1]
+
+
+def test_frames_far_apart_are_counted_without_counting_to_them(tmp_path: Path) -> None:
+    whole = write_r3d(tmp_path / "whole.r3d", ROOM)
+    scan = renamed(whole, tmp_path / "scan.r3d", lambda name: name.replace("rgbd/2.", "rgbd/9999999."))
+    recording = open_recording(scan)
+    assert any("9999998 of 10000000" not in notice and "missing" in notice for notice in recording.notices)
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda text: text.replace("timestamp", "frame", 1), "no column timestamp"),
+        (lambda text: text + "\n" + "9" * 200_000, "field larger than field limit"),
+    ],
+    ids=["doubled column", "long field"],
+)
+def test_a_damaged_odometry_is_explained(damage: Callable[[str], str], says: str, tmp_path: Path) -> None:
+    folder = write_stray(tmp_path / "scan", ROOM)
+    (folder / "odometry.csv").write_text(damage((folder / "odometry.csv").read_text()))
+    with pytest.raises(CaptureError, match=says):
+        open_recording(folder)
+
+
+def test_a_doubled_column_leaves_the_others_where_they_are(tmp_path: Path) -> None:
+    folder = write_stray(tmp_path / "scan", ROOM)
+    expected = [frame.capture_from_camera.translation for frame in open_recording(folder).frames]
+    lines = (folder / "odometry.csv").read_text().splitlines()
+    (folder / "odometry.csv").write_text("\n".join([f"x, {lines[0]}", *(f"0, {line}" for line in lines[1:])]))
+    assert np.allclose([frame.capture_from_camera.translation for frame in open_recording(folder).frames], expected)
+
+
+def array_file(header: str, body: bytes = b"") -> bytes:
+    text = header.encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + body
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x93NUMPY",
+        array_file("{'descr': '<f4', 'fortran_order': False, 'shape': (64, 48), }"),
+        array_file("{'descr': '|O', 'fortran_order': False, 'shape': (2, 2), }", b"\x80\x04N."),
+        array_file("{'descr': '<f4', 'fortran_order': False, 'shape': (-2, -3), }", bytes(24)),
+        array_file("{'descr': '<f4', 'fortran_order': False, 'shape': (9999999999, 9999999999), }"),
+        array_file("{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (2, 2), }", bytes(16)),
+        array_file("{"),
+        array_file("{'descr': '<U', 'fortran_order': 1}"),
+        array_file("(" * 3000),
+    ],
+)
+def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
+    folder = write_nerfstudio(tmp_path / "scan", ROOM, npy=True)
+    min((folder / "depths").glob("*.npy")).write_bytes(content)
+    with pytest.raises(CaptureError, match="not a readable depth array"):
+        open_recording(folder)
