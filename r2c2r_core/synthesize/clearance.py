@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.walls import depths_in
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
 
@@ -65,12 +66,12 @@ def free_travel(
     moving = link_boxes(item, child)
     near = others & _within_reach(obstacles.boxes, item, joint, moving)
     corners = _corners(moving)
-    near_walls = [wall for wall, depth in zip(walls, _wall_depths(corners, walls), strict=True) if depth < _BEHIND_M]
-    before = np.maximum(_wall_depths(corners, near_walls), 0.0)
+    near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < _BEHIND_M]
+    before = np.maximum(depths_in(near_walls, corners), 0.0)
 
     def blocker_at(position: float) -> str | None:
         motion = motion_at(item, joint, position)
-        if (_wall_depths(motion.apply(corners), near_walls) > before + _WALL_TOUCH_M).any():
+        if (depths_in(near_walls, motion.apply(corners)) > before + _WALL_TOUCH_M).any():
             return "a wall"
         return _blocker(_moved(moving, motion), obstacles, near, objects)
 
@@ -177,11 +178,6 @@ def _moved(boxes: Boxes, motion: Rigid3) -> Boxes:
 def _corners(boxes: Boxes) -> np.ndarray:
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
     return (boxes.centres[:, None] + np.einsum("nij,nkj->nki", boxes.axes, signs[None] * boxes.halves[:, None])).reshape(-1, 3)
-
-
-def _wall_depths(points: np.ndarray, walls: Sequence[Wall]) -> np.ndarray:
-    """How far the points pass behind each wall; negative where all are in front of it."""
-    return np.array([float((wall.offset_m - points @ wall.normal).max()) for wall in walls])
 
 
 def _amount(joint: Joint, position: float) -> str:

@@ -15,13 +15,16 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.boxes import upright_box
 from r2c2r_core.geometry.free_boxes import powell_box, smallest_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.kitchen.category import Category, Size
+from r2c2r_core.kitchen.fronts import front_y
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import Source
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
-from r2c2r_core.synthesize.fixtures.spec import FixtureSpec
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
 
@@ -35,6 +38,7 @@ _SURE_SHARE, _SURE_M = 0.08, 0.004  # a depth known this well, of itself or in m
 _LEAST_SWINGS, _AGREED = 3, 0.75  # frames that show a door open, and the share of them that must agree on its side
 _SAME_STOP_RAD = np.deg2rad(4.0)
 _AS_TIGHT = 1.03  # a square is as tight as this when turned by 0.9 degrees, a round thing however it is turned
+_EDGE_SHARE = 0.25  # of the width, from the middle: handles of two doors meet in the middle
 _TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
 
 
@@ -44,7 +48,7 @@ class MeasuredObject:
 
     name: str
     category: str
-    spec: FixtureSpec
+    spec: Category
     world_from_object: Rigid3
     dimensions_m: Vector3
     sources: tuple[Source, Source, Source]
@@ -75,7 +79,7 @@ def measure_object(
     track: MaskTrack,
     placement: Placement,
     asset: MeshAsset,
-    spec: FixtureSpec,
+    spec: Category,
     override: ObjectOverride,
     *,
     seed: int = 0,
@@ -89,22 +93,22 @@ def measure_object(
     if box_search == "upright" and capture.room.up_source == "assumed":
         box_search = "hull"
     rotation = front_rotation(outward) if yaw_known else _mesh_rotation(samples, outward, box_search)
-    low, high = mesh_range(samples, rotation, with_front=spec.opening not in ("rigid", "fixed"))
+    low, high = mesh_range(samples, rotation, with_front=spec.opens not in ("rigid", "fixed"))
     handle = None
     front = track.front if track.front is not None and _fits(track.front, high - low, warnings) else None
     sources: list[Source] = ["measured", "inferred", "measured"]
     if front is not None:
         low, high = _with_front(low, high, front, rotation)
         handle = front.handle
-    elif track.box is not None and spec.opening != "rigid":
+    elif track.box is not None and spec.opens != "rigid":
         low, high = _with_box(low, high, track, rotation)
-    if spec.opening == "rigid":
+    if spec.opens == "rigid":
         sources[1] = _depth_source(capture, asset, low, high, rotation, warnings)
     else:
         low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
         if track.box is not None and sources[1] == "inferred" and _face_seen(capture, low, high, rotation):
             sources[1] = "measured"
-    if handle is None and spec.opening not in ("rigid", "fixed"):
+    if handle is None and spec.opens not in ("rigid", "fixed"):
         handle = handle_of_mesh(samples, rotation, low, high)
     pose = Rigid3(rotation, rotation @ ((low + high) / 2))
     measured = MeasuredObject(
@@ -125,7 +129,13 @@ def measure_object(
         placed_pose=pose,
         warnings=tuple(warnings),
     )
-    return _corrected(replace(measured, spec=spec.variant(float(measured.dimensions_m[0]), handle)), override)
+    return _corrected(replace(measured, spec=_at_width(spec, float(measured.dimensions_m[0]), handle)), override)
+
+
+def _at_width(spec: Category, width_m: float, handle: FrontHandle | None) -> Category:
+    """What a category is at a width: a wide refrigerator has two doors, unless its handle is at one edge."""
+    at_edge = handle is not None and abs(handle.centre[0]) > _EDGE_SHARE * width_m
+    return category_of(spec.wider[1]) if spec.wider is not None and width_m >= spec.wider[0] and not at_edge else spec
 
 
 def _drawn_out(track: MaskTrack) -> float | None:
@@ -164,26 +174,13 @@ def mesh_range(samples: SurfaceSamples, rotation: np.ndarray, *, with_front: boo
     """Low and high ends along the object's axes; with a front, its plane is the low end of y and the handle is left out."""
     points = samples.points @ rotation
     if with_front:
-        front_y = front_face_y(points, samples.normals @ rotation)
-        points = points[points[:, 1] > front_y - 0.004]
+        front = front_y(points, samples.normals @ rotation)
+        points = points[points[:, 1] > front - 0.004]
         low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
-        low[1] = front_y
+        low[1] = front
         return low, high
     low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
     return low, high
-
-
-def front_face_y(points: Points, normals: Points) -> float:
-    """Where the front face lies along y: the foremost large flat of the faces that look towards -y."""
-    looking = points[normals[:, 1] < -0.8, 1]
-    if len(looking) < 20:
-        return float(np.quantile(points[:, 1], _TRIM))
-    bins = np.arange(looking.min() - 0.006, looking.max() + 0.018, 0.006)
-    counts = np.histogram(looking, bins)[0]
-    smooth = counts + np.append(counts[1:], 0)
-    first = int(np.flatnonzero(smooth >= 0.4 * smooth.max())[0])
-    near = looking[(looking >= bins[first]) & (looking <= bins[first + 2])] if first + 2 < len(bins) else looking
-    return float(np.median(near))
 
 
 def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch) -> np.ndarray:
@@ -238,34 +235,27 @@ def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarra
 
 
 def _believable_depth(
-    capture: Capture, track: MaskTrack, spec: FixtureSpec, low: Vector3, high: Vector3, rotation: np.ndarray
+    capture: Capture, track: MaskTrack, spec: Category, low: Vector3, high: Vector3, rotation: np.ndarray
 ) -> tuple[Vector3, Vector3, Source]:
     """The depth, up to the wall where it ends near or beyond it, and within what the category allows."""
-    depth, (least, most) = float(high[1] - low[1]), spec.depth_range_m
+    depth = float(high[1] - low[1])
     low, high = low.copy(), high.copy()
-    to_wall = distance_to_wall(capture, rotation, low, high)
+    to_wall = distance_to_wall(capture, rotation, low, high, spec.depth)
     source: Source = "inferred"
     # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
     near = _TO_WALL_M if track.kind == "front" else 0.0
-    if to_wall is not None and to_wall >= least and depth > to_wall - near:
+    if to_wall is not None and depth > to_wall - near:
         depth = to_wall
-    if not least <= depth <= most:
-        reaches = to_wall is not None and least <= to_wall <= most
-        depth, source = (float(to_wall), "inferred") if reaches and to_wall is not None else (spec.dimensions_m[1], "default")
+    if not spec.depth.holds(depth):
+        depth, source = (to_wall, "inferred") if to_wall is not None else (spec.depth.usual, "default")
     high[1] = low[1] + depth
     return low, high, source
 
 
-def distance_to_wall(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3) -> float | None:
-    """From the front plane back to the nearest wall that faces the same way, if there is one within 1.2 m."""
+def distance_to_wall(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> float | None:
+    """From the front of a box along the columns of `rotation` back to the wall that a thing of this depth may stand against."""
     front_centre = rotation @ np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    outward = -rotation[:, 1]
-    behind = [
-        float(wall.normal @ front_centre - wall.offset_m)
-        for wall in capture.room.walls
-        if float(wall.normal @ outward) > np.cos(np.deg2rad(8.0))
-    ]
-    return min((d for d in behind if 0.1 < d < 1.2), default=None)
+    return wall_behind(capture.room.walls, front_centre, -rotation[:, 1], depth)
 
 
 def _depth_source(

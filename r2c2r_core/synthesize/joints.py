@@ -35,20 +35,20 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
     hinges: dict[str, Hinge] = {}
     undecided: list[MeasuredObject] = []
     for item in objects:
-        if item.spec.opening not in ("side", "bottom"):
+        if item.spec.opens not in ("side", "bottom"):
             continue
         asked = overrides.of(item.name).hinge
-        seen = handle_hinge(item) if item.spec.opening == "side" else None
+        seen = handle_hinge(item) if item.spec.opens == "side" else None
         if asked is not None:
             hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person", confidence=1.0)
-        elif item.swung is not None and item.spec.opening == "side":
+        elif item.swung is not None and item.spec.opens == "side":
             reason = f"seen open on its {item.swung.hinge} edge"
             hinges[item.name] = Hinge(
                 side=item.swung.hinge, source="measured", reason=reason, confidence=_SEEN_OPEN, by_handle=True
             )
         elif seen is not None:
             hinges[item.name] = seen
-        elif item.spec.opening == "bottom":
+        elif item.spec.opens == "bottom":
             hinges[item.name] = Hinge(side="bottom", source="inferred", reason="the category opens downwards", confidence=None)
         else:
             undecided.append(item)
@@ -85,8 +85,8 @@ def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hi
         return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
     if left is None and right is not None and _side(right, hinges) is None:
         return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
-    side = item.spec.default_hinge or "left"
-    return Hinge(side=side, source="default", reason="nothing in the scan tells the side", confidence=0.5)
+    assert item.spec.hinge is not None  # of every category with a single door
+    return Hinge(side=item.spec.hinge, source="default", reason="nothing in the scan tells the side", confidence=0.5)
 
 
 def _paired(

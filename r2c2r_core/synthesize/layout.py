@@ -5,6 +5,7 @@ gives runs their shared lines and seams and takes overlaps apart with the least 
 bounded by what measuring can be wrong by; how far each object moved is reported.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from r2c2r_core.synthesize.fillers import leave_fillers
 from r2c2r_core.synthesize.runs import align_runs
 from r2c2r_core.synthesize.solve import solved
 from r2c2r_core.synthesize.ties import ties_of
+
+_log = logging.getLogger(__name__)
 
 GAP_M = 0.002  # left between neighbours
 REST_GAP_M = 0.0005  # under a thing that stands on something: no contact at rest, no visible fall
@@ -56,7 +59,7 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
 
 def anchor(item: MeasuredObject) -> Vector3:
     """The point whose move counts: the front's centre for furniture (its depth is often inferred), else the box centre."""
-    rigid = item.spec.opening in ("rigid", "fixed")
+    rigid = item.spec.opens in ("rigid", "fixed")
     return item.world_from_object.translation if rigid else item.front_centre
 
 
@@ -78,6 +81,20 @@ def settled(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_fou
 
 def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject], list[str]]:
     """Objects with their ties kept and at least GAP_M between any two boxes: pairs are added until none overlaps."""
+    items, warnings = list(objects), []
+    try:
+        items = _solved_in_rounds(objects)
+    except (np.linalg.LinAlgError, ArithmeticError) as error:  # one bad box must not cost the kitchen
+        _log.warning("the layout was not solved", exc_info=error)
+        warnings.append(f"the layout was not solved ({error}): everything stands where it was measured; check sizes and poses")
+    for first, second, depth in overlapping_pairs(items):
+        if depth > GAP_M:
+            names = f"{items[first].name} and {items[second].name}"
+            warnings.append(f"{names} still overlap by {1000 * (depth - GAP_M):.0f} mm: correct a size or a pose")
+    return items, warnings
+
+
+def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
     ties, apart = ties_of(objects), list[tuple[int, int]]()
     items = solved(objects, ties, apart, GAP_M)
     for _ in range(_ROUNDS):
@@ -86,12 +103,7 @@ def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject
             break
         apart += pairs
         items = solved(objects, ties, apart, GAP_M)
-    warnings = []
-    for first, second, depth in overlapping_pairs(items):
-        if depth > GAP_M:
-            names = f"{items[first].name} and {items[second].name}"
-            warnings.append(f"{names} still overlap by {1000 * (depth - GAP_M):.0f} mm: correct a size or a pose")
-    return items, warnings
+    return items
 
 
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:

@@ -1,6 +1,7 @@
 """Masses and inertias from panels and densities (sim-ready.md: about the centre of mass, never the identity)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,4 +61,4 @@ def _combined(masses: np.ndarray, centres: Points, own: np.ndarray) -> Inertial:
 
 def moved_boxes(boxes: Sequence[Box], target_from_source: Rigid3) -> tuple[Box, ...]:
     """The boxes expressed in another frame."""
-    return tuple(Box(name=b.name, size_m=b.size_m, link_from_box=target_from_source @ b.link_from_box) for b in boxes)
+    return tuple(replace(box, link_from_box=target_from_source @ box.link_from_box) for box in boxes)

@@ -40,7 +40,7 @@ def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], tak
     """A board under every row of a run; `facets` are of the world."""
     local, front, top = facets.turned(run.rotation), run.least(1), run.least(2) - CLEAR_M
     corners = [run.corners(item) for item in objects]
-    clicked = [c for c, item in zip(corners, objects, strict=True) if item.spec.opening == "fixed" and c[:, 2].max() < top]
+    clicked = [c for c, item in zip(corners, objects, strict=True) if item.spec.opens == "fixed" and c[:, 2].max() < top]
     others = [*corners, *(slab.corners(run.rotation) for slab in taken)]
     found: list[Slab] = []
     for low, high in _rows(run):

@@ -32,7 +32,7 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
     front tells.
     """
     items = list(objects)
-    turned = [i for i, o in enumerate(items) if o.spec.opening != "rigid" and not o.fixed_by_person]
+    turned = [i for i, o in enumerate(items) if o.spec.opens != "rigid" and not o.fixed_by_person]
     known: list[float] = []
     for line in _directions(items, [i for i in turned if not items[i].spec.stands]):
         yaw = _run_yaw(items, line, manhattan_yaw_rad)
@@ -112,7 +112,7 @@ def _length(items: Sequence[MeasuredObject], plane: Sequence[int], outward: Vect
 
 def built_in(item: MeasuredObject) -> bool:
     """Whether the object's front belongs to a run: worktops overhang it, free-standing appliances stand as they like."""
-    return not item.spec.stands and item.spec.opening != "fixed"
+    return not item.spec.stands and item.spec.opens != "fixed"
 
 
 def _facing(item: MeasuredObject, yaw_rad: float) -> MeasuredObject:

@@ -114,7 +114,7 @@ def _sigmas(item: MeasuredObject) -> np.ndarray:
     """What measuring each face can be wrong by, one sigma."""
     if item.fixed_by_person:
         return np.full(6, _FIXED_M)
-    if item.spec.opening == "rigid":
+    if item.spec.opens == "rigid":
         return np.full(6, _THING_M)
     if item.spec.stands:
         return np.full(6, _APPLIANCE_M)
@@ -135,7 +135,7 @@ def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[
 
 def _trim(item: MeasuredObject, axis: int) -> float:
     """How much a measured size may be wrong by."""
-    if item.spec.opening == "rigid" or item.fixed_by_person:
+    if item.spec.opens == "rigid" or item.fixed_by_person:
         return 0.0
     return min(_APPLIANCE_TRIM_M if item.spec.stands else _TRIM_M, _TRIM_SHARE * float(item.dimensions_m[axis]))
 
@@ -144,12 +144,12 @@ def _shrink(item: MeasuredObject, axis: int) -> float:
     """How much a size may be given up."""
     size = float(item.dimensions_m[axis])
     if axis == 1 and _unseen_back(item):
-        return max(size - max(_LEAST_DEPTH_SHARE * size, min(item.spec.depth_range_m[0], size)), _trim(item, axis))
+        return max(size - max(_LEAST_DEPTH_SHARE * size, min(item.spec.depth.low, size)), _trim(item, axis))
     return _trim(item, axis)
 
 
 def _unseen_back(item: MeasuredObject) -> bool:
-    return item.sources[1] in ("inferred", "default") and item.spec.opening != "rigid" and not item.fixed_by_person
+    return item.sources[1] in ("inferred", "default") and item.spec.opens != "rigid" and not item.fixed_by_person
 
 
 def _separation(

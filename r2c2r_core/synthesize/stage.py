@@ -7,17 +7,21 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import ObjectOverride, Overrides
-from r2c2r_core.model.materials import THINGS, UNKNOWN_THING
+from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
+from r2c2r_core.model.materials import JointFeel
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
+from r2c2r_core.synthesize.fixtures.boards import Boards
+from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
-from r2c2r_core.synthesize.fixtures.table import fixture_for, normalised
+from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
 from r2c2r_core.synthesize.layout import arrange
 from r2c2r_core.synthesize.opening import open_all
@@ -34,10 +38,10 @@ _FULLY_OPEN = 0.75  # of the usual travel: a drawer drawn out this far was drawn
 class SynthesizeConfig:
     """Settings of this stage."""
 
-    version: int = 2  # of the stage's code, so that a changed method re-runs
-    seed: int = 0
-    box: BoxSearch = "upright"  # "powell" is the paper's, for comparison (benchmarks/boxes.json)
-    surroundings: bool = True  # worktops and plinths that the scan shows and nobody clicked
+    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
+    box: BoxSearch = setting("upright", "upright, or powell (the paper's): how a box is fitted (benchmarks/boxes.json)")
+    surroundings: bool = setting(True, "whether worktops and plinths that the scan shows and nobody clicked are added")
+    fixtures: str = setting(CARCASSES.default, "boards, or scene-synthesizer (its extra), the paper's: what makes carcasses")
 
 
 def build_scene(
@@ -51,11 +55,12 @@ def build_scene(
     progress: Progress = SILENT,
 ) -> ArticulatedScene:
     """Measure every object, arrange them, and build each as a fixture that opens."""
+    carcass = CARCASSES.load(config.fixtures)
     measured = []
     for track, placement, asset in progress.part(0.0, 0.5).each(
         list(zip(tracks, placements, assets, strict=True)), "measuring"
     ):
-        spec, notice = fixture_for(track.category)
+        spec, notice = named(track.category)
         item = measure_object(
             capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed, box_search=config.box
         )
@@ -66,17 +71,17 @@ def build_scene(
     built = []
     shapes = list(zip(layout.objects, placements, assets, strict=True))
     for item, placement, asset in progress.part(0.5, 0.9).each(shapes, "building"):
-        if item.spec.build is None:
+        if item.spec.fixture is None:
             built.append(_thing(item, placement, asset, config.seed))
         else:
-            built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name)))
+            built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
     progress.at(0.9, "opening every joint")
 
     def rebuild(index: int, hinge: Hinge) -> SceneObject:
         item = layout.objects[index]
-        return _fixture(item, hinge, overrides.of(item.name))
+        return _fixture(item, hinge, overrides.of(item.name), carcass)
 
-    kept = frozenset(j.name for o in built for j in o.joints if overrides.of(o.name).joint_upper is not None)
+    kept = frozenset(name for item in built for name in _uppers_said(item, overrides.of(item.name)))
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
     made = surroundings_of(capture, layout.objects) if config.surroundings else []
     opened += standing_clear(opened, made, _painted, capture.room.walls, kept)
@@ -88,17 +93,26 @@ def build_scene(
     )
 
 
-def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride) -> SceneObject:
-    """A fixture of the table as links and joints."""
-    assert item.spec.build is not None  # things are built from their mesh
-    order = Order(dimensions_m=item.dimensions_m, hinge=hinge.side if hinge else None, handle=item.handle, handles=item.handles)
-    build = item.spec.build(order)
+def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride, carcass: CarcassBuilder) -> SceneObject:
+    """A category's fixture as links and joints."""
+    fixture = fixture_of(item.spec)
+    assert fixture is not None  # things are built from their mesh
+    order = Order(
+        dimensions_m=item.dimensions_m,
+        material=item.spec.material,
+        hinge=hinge.side if hinge else item.spec.hinge,
+        handle=item.handle,
+        handles=item.handles,
+        carcass=carcass,
+    )
+    build = fixture.build(order)
     base, *movers = build.parts
     motions = {motion.part: motion for motion in build.motions}
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
-    joints = [_joint(item, motion, hinge, override) for motion in build.motions]
-    warnings = [*item.warnings, *build.notes]
+    said, unheard = _limits_said(item.name, [motion.part for motion in build.motions], override)
+    joints = [_joint(item, motion, fixture.feel, hinge, said.get(motion.part)) for motion in build.motions]
+    warnings = [*item.warnings, *build.notes, *unheard]
     if (seen_open := _seen_open(item, hinge)) and all(joint.sources["limits"] == "default" for joint in joints):
         warnings.append(f"seen open to {seen_open}, which need not be all it opens")
     if hinge is not None and hinge.source == "default":
@@ -122,7 +136,7 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
 
 def _painted(item: MeasuredObject, slab: Slab) -> SceneObject:
     """A fixture of one board, in its colour in the scan: no mesh will dress it."""
-    board = _fixture(item, None, ObjectOverride())
+    board = _fixture(item, None, ObjectOverride(), Boards())
     return replace(board, links=tuple(replace(link, colour=slab.colour) for link in board.links))
 
 
@@ -132,7 +146,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     fitted = (vertices - (low + high) / 2) * (item.dimensions_m / np.maximum(high - low, 1e-6))
     pieces = convex_pieces(Solid(vertices=fitted, faces=asset.mesh.faces), item.dimensions_m, seed=seed)
-    material = THINGS.get(normalised(item.category), UNKNOWN_THING)
+    material = item.spec.material
     link = Link(
         name=f"{item.name}_base",
         object_from_link=Rigid3(),
@@ -145,7 +159,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
     return SceneObject(
         name=item.name,
         category=item.category,
-        fixture=item.spec.name,
+        fixture="object",
         dimensions_m=item.dimensions_m,
         dimension_sources=item.sources,
         world_from_object=item.world_from_object,
@@ -178,13 +192,41 @@ def _link_origin(motion: Motion) -> Vector3:
     return motion.origin_object if motion.type == "revolute" else np.zeros(3)
 
 
-def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> Joint:
+def _limits_said(name: str, parts: Sequence[str], override: ObjectOverride) -> tuple[dict[str, JointLimits], tuple[str, ...]]:
+    """What a person said about the joint of each part, and what no joint could take."""
+    said, unheard = {}, []
+    if override.joint_lower is not None or override.joint_upper is not None:
+        if len(parts) == 1:
+            said[parts[0]] = JointLimits(override.joint_lower, override.joint_upper)
+        else:
+            meant = f"under joints, name any of {', '.join(parts)}" if parts else "it has none"
+            unheard.append(f"joint_limits is for an object of one joint and was not used: {meant}")
+    for joint, limits in override.joints.items():
+        part = next((part for part in parts if joint in (part, _joint_name(name, part))), None)
+        if part is None:
+            unheard.append(f"limits of a joint {joint} were not used: its joints are {', '.join(parts) or 'none'}")
+        else:
+            said[part] = limits
+    return said, tuple(unheard)
+
+
+def _uppers_said(item: SceneObject, override: ObjectOverride) -> set[str]:
+    """Names of the object's joints whose upper limit a person gave."""
+    names = {joint.child.removeprefix(f"{item.name}_"): joint.name for joint in item.joints}
+    said, _ = _limits_said(item.name, list(names), override)
+    return {names[part] for part, limits in said.items() if limits.upper is not None}
+
+
+def _joint_name(object_name: str, part: str) -> str:
+    return f"{object_name}_{part}_joint"
+
+
+def _joint(item: MeasuredObject, motion: Motion, feel: JointFeel, hinge: Hinge | None, said: JointLimits | None) -> Joint:
     """The joint of one moving part; what a person gave, or the scan showed, replaces the category's limits."""
     axis: Source = hinge.source if hinge is not None else "inferred"
-    lower, upper, limits = _limits(item, motion, hinge, override)
-    feel = item.spec.feel
+    lower, upper, limits = _limits(item, motion, hinge, said)
     return Joint(
-        name=f"{item.name}_{motion.part}_joint",
+        name=_joint_name(item.name, motion.part),
         type=motion.type,
         parent=f"{item.name}_base",
         child=f"{item.name}_{motion.part}",
@@ -201,16 +243,25 @@ def _joint(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: 
     )
 
 
-def _limits(item: MeasuredObject, motion: Motion, hinge: Hinge | None, override: ObjectOverride) -> tuple[float, float, Source]:
-    """Lower and upper limit and where they come from: a person, the scan of an opened front, or the category."""
-    if override.joint_lower is not None or override.joint_upper is not None:
-        upper = motion.upper if override.joint_upper is None else override.joint_upper
-        return override.joint_lower or 0.0, upper, "person"
+def _limits(item: MeasuredObject, motion: Motion, hinge: Hinge | None, said: JointLimits | None) -> tuple[float, float, Source]:
+    """Lower and upper limit and where they come from: a person, the scan of an opened front, or the category.
+
+    What a person said of one end leaves the other as it was found.
+    """
+    upper, source = _opening(item, motion, hinge)
+    if said is None or said == (None, None):
+        return 0.0, upper, source
+    lower = 0.0 if said.lower is None else said.lower
+    return lower, max(lower, upper if said.upper is None else said.upper), "person"
+
+
+def _opening(item: MeasuredObject, motion: Motion, hinge: Hinge | None) -> tuple[float, Source]:
+    """How far it opens: as the scan shows, or as its category does."""
     slides = motion.type == "prismatic"
     seen, most = (item.opened_m, float(item.dimensions_m[1])) if slides else (_swing_rad(item, hinge), np.pi)
     if item.spec.several_fronts or seen is None:  # of which drawer, nobody knows
-        return 0.0, motion.upper, "default"
-    return (0.0, seen, "measured") if _FULLY_OPEN * motion.upper <= seen <= most else (0.0, motion.upper, "default")
+        return motion.upper, "default"
+    return (seen, "measured") if _FULLY_OPEN * motion.upper <= seen <= most else (motion.upper, "default")
 
 
 def _swing_rad(item: MeasuredObject, hinge: Hinge | None) -> float | None:

@@ -8,12 +8,12 @@ import numpy as np
 
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.clearance import gathered, link_boxes, open_freely
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.facets import facets_of
-from r2c2r_core.synthesize.fixtures.table import fixture_for
 from r2c2r_core.synthesize.plinths import plinth_runs, plinths
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.worktops import runs_of, worktop
@@ -36,7 +36,7 @@ class Surrounding:
         return MeasuredObject(
             name=self.name,
             category=self.category,
-            spec=fixture_for(self.category)[0],
+            spec=category_of(self.category),
             world_from_object=pose,
             dimensions_m=slab.high - slab.low,
             sources=slab.sources,

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.fixtures.spec import FRONT_GAP_M
+from r2c2r_core.synthesize.fixtures.carcass import FRONT_GAP_M
 from r2c2r_core.synthesize.runs import built_in
 from r2c2r_core.synthesize.solve import Face, Tie
 
@@ -34,9 +34,9 @@ def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
 
 def _closed(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
     """Worktops lie on the highest unit below them, and plinths end under the lowest one above: no slit in between."""
-    units = [i for i, item in enumerate(items) if built_in(item) and item.spec.opening != "rigid"]
+    units = [i for i, item in enumerate(items) if built_in(item) and item.spec.opens != "rigid"]
     for i, item in enumerate(items):
-        if item.spec.opening != "fixed" or item.fixed_by_person:
+        if item.spec.opens != "fixed" or item.fixed_by_person:
             continue
         near = [j for j in units if _one_above_the_other(items[j], item)]
         below = [j for j in near if abs(_edge(item, 2, -1.0) - _edge(items[j], 2, 1.0)) < _SLIT_M]
@@ -61,7 +61,7 @@ def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
     """Built-in fronts in one plane, as the runs left them."""
     planes: list[list[int]] = []
     for i, item in enumerate(items):
-        if not built_in(item) or item.spec.opening == "rigid" or item.fixed_by_person:
+        if not built_in(item) or item.spec.opens == "rigid" or item.fixed_by_person:
             continue
         home = next((p for p in planes if _same_plane(items[p[0]], item)), None)
         if home is None:

@@ -47,7 +47,7 @@ class UnitRun:
 
 def is_front(item: MeasuredObject) -> bool:
     """Whether it is a built-in unit that opens."""
-    return built_in(item) and item.spec.opening != "rigid"
+    return built_in(item) and item.spec.opens != "rigid"
 
 
 def grouped(units: Sequence[MeasuredObject], side: int) -> list[UnitRun]:

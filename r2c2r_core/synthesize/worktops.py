@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject, distance_to_wall
@@ -147,7 +148,7 @@ def _rear(capture: Capture, top: _Top) -> tuple[float, Source]:
     run, behind = top.run, top.level.middles[:, 1]
     front, back = run.least(1), run.most(1)
     low, high = np.array([run.least(0), front, run.least(2)]), np.array([run.most(0), back, run.most(2)])
-    to_wall = distance_to_wall(capture, run.rotation, low, high)
+    to_wall = distance_to_wall(capture, run.rotation, low, high, category_of("counter").depth)
     if to_wall is not None and front + to_wall < back + _BEHIND_M:
         return max(front + to_wall, back), "measured"
     least, reached = top.shown * (run.most(0) - run.least(0)), back

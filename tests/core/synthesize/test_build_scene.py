@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.model.capture import Wall
-from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import Swing
-from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
@@ -118,6 +118,33 @@ def test_limits_given_by_a_person_are_kept() -> None:
     assert (joint.sources["limits"], joint.sources["axis"]) == ("person", "person")
 
 
+def test_limits_of_one_of_several_joints_name_it() -> None:
+    pair = next(unit for unit in KITCHEN if unit.name == "pair")
+    asked = {"left_door": JointLimits(None, 1.0), "pair_right_door_joint": JointLimits(0.1, None), "lid": JointLimits(0.0, 1.0)}
+    item = built(pair, overrides=Overrides(objects={"pair": ObjectOverride(joints=asked)})).objects[0]
+    usual = {joint.name: joint.upper for joint in built(pair).objects[0].joints}
+    left, right = sorted(item.joints, key=lambda joint: joint.name)
+    assert (left.lower, left.upper, left.sources["limits"]) == (0.0, 1.0, "person")
+    assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "person")
+    assert any("limits of a joint lid were not used: its joints are left_door, right_door" in w for w in item.warnings)
+
+
+def test_limits_that_name_no_joint_move_none_of_several() -> None:
+    pair = next(unit for unit in KITCHEN if unit.name == "pair")
+    item = built(pair, overrides=Overrides(objects={"pair": ObjectOverride(joint_lower=0.0, joint_upper=0.3)})).objects[0]
+    assert all(joint.upper > 0.3 and joint.sources["limits"] != "person" for joint in item.joints)
+    assert any("joint_limits is for an object of one joint and was not used" in w for w in item.warnings)
+
+
+def test_a_lower_limit_by_a_person_keeps_the_measured_upper_one() -> None:
+    track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
+    track = replace(track, opened_m={5: 0.43})
+    asked = Overrides(objects={"a": ObjectOverride(joint_lower=0.05)})
+    joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
+    assert (joint.lower, joint.sources["limits"]) == (0.05, "person")
+    assert joint.upper == pytest.approx(0.43, abs=1e-6)
+
+
 def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     wall = Wall(normal=np.array([1.0, 0.0, 0.0]), offset_m=-0.31, area_m2=6.0)
     scene = built(KITCHEN[0], walls=(wall,))
@@ -196,25 +223,20 @@ def test_a_wall_that_only_just_touches_an_edge_is_not_in_the_way() -> None:
 
 
 def test_an_unknown_category_is_a_rigid_object_with_advice() -> None:
-    scene = built(Unit("m", "Micro wave", (0, 0, 0.05), (0.09, 0.09, 0.1), kind="thing"))
-    assert scene.objects[0].category == "Micro wave"
+    scene = built(Unit("m", "Mircowave", (0, 0, 0.05), (0.09, 0.09, 0.1), kind="thing"))
+    assert scene.objects[0].category == "Mircowave"
     assert scene.objects[0].fixture == "object"
     assert scene.objects[0].movable
     assert "did you mean microwave" in scene.objects[0].warnings[0]
 
 
 def test_every_fixture_builds_at_its_default_size() -> None:
-    for spec in FIXTURES:
-        if spec.build is not None:
-            unit = Unit("a", spec.name, (0, 0, 1.2), spec.dimensions_m, kind="appliance")
+    for spec in CATEGORIES:
+        if spec.fixture is not None:
+            unit = Unit("a", spec.name, (0, 0, 1.2), spec.usual_m, kind="appliance")
             scene = built(unit)
             assert scene.objects[0].fixture == spec.name
             assert deepest_contact(compile_scene(scene)) < 5e-4
-
-
-@pytest.mark.parametrize(("said", "meant"), [("Double-door cabinet", "double_door_cabinet"), ("Fridge", "refrigerator")])
-def test_categories_are_recognised_however_they_are_written(said: str, meant: str) -> None:
-    assert fixture_for(said)[0].name == meant
 
 
 def test_building_twice_gives_the_same_scene() -> None:

@@ -5,10 +5,10 @@ import pytest
 import trimesh
 
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
-from r2c2r_core.synthesize.fixtures.table import fixture_for
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 
@@ -16,7 +16,7 @@ def measure(
     unit: Unit, *, override: ObjectOverride | None = None, walls: tuple[Wall, ...] = (), seed: int = 0
 ) -> MeasuredObject:
     track, placement, asset = placed_unit(unit, np.random.default_rng(seed))
-    spec, _ = fixture_for(unit.category)
+    spec = category_of(unit.category)
     return measure_object(capture(walls), track, placement, asset, spec, override or ObjectOverride())
 
 
@@ -25,7 +25,7 @@ def test_a_yawed_box_is_measured_within_one_percent_without_its_handle(yaw: floa
     unit = Unit("a", "cabinet", (0.3, 0.2, 0.5), (0.6, 0.58, 0.7), yaw=yaw, handle=Handle(0.24, 0.2), with_track_front=False)
     at = (0.3 + 3 * np.sin(yaw), 0.2 - 3 * np.cos(yaw), 1.4)
     track, placement, asset = placed_unit(unit, np.random.default_rng(1))
-    found = measure_object(capture(camera_at=at), track, placement, asset, fixture_for("cabinet")[0], ObjectOverride())
+    found = measure_object(capture(camera_at=at), track, placement, asset, category_of("cabinet"), ObjectOverride())
     np.testing.assert_allclose(found.dimensions_m, unit.size, rtol=0.01)
     np.testing.assert_allclose(found.world_from_object.rotation, unit.world_from_object.rotation, atol=0.01)
     np.testing.assert_allclose(found.world_from_object.translation, unit.centre, atol=0.004)
@@ -41,7 +41,7 @@ def test_the_mesh_alone_tells_where_its_handle_is() -> None:
 def test_what_the_frames_measured_replaces_the_meshs_width_and_height() -> None:
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0), stretch=(1.06, 1.0, 0.95))
-    found = measure_object(capture(), track, placement, asset, fixture_for("cabinet")[0], ObjectOverride())
+    found = measure_object(capture(), track, placement, asset, category_of("cabinet"), ObjectOverride())
     np.testing.assert_allclose(found.dimensions_m[[0, 2]], [0.6, 0.7])
     assert found.sources == ("measured", "inferred", "measured")
 
@@ -84,7 +84,7 @@ def carton_seen(points: np.ndarray, parameters: dict[str, float] | None = None) 
     scan = capture()
     scan = replace(scan, surface=replace(scan.surface, vertices_world=points))
     asset = replace(asset, parameters=parameters or {})
-    return measure_object(scan, track, placement, asset, fixture_for("box")[0], ObjectOverride())
+    return measure_object(scan, track, placement, asset, category_of("box"), ObjectOverride())
 
 
 def face(axis: int, at: float) -> np.ndarray:
@@ -130,6 +130,6 @@ def test_a_round_thing_faces_as_its_box_does_however_it_was_placed(turn_deg: flo
     drum = replace(asset, mesh=replace(asset.mesh, vertices=upright, faces=np.asarray(solid.faces)))
     yaws = []
     for item in (drum, asset):
-        found = measure_object(capture(), track, placement, item, fixture_for("box")[0], ObjectOverride())
+        found = measure_object(capture(), track, placement, item, category_of("box"), ObjectOverride())
         yaws.append(np.degrees(np.arctan2(*found.world_from_object.rotation[[1, 0], 0])) % 90)
     assert yaws == pytest.approx([0.0, turn_deg], abs=1.0)

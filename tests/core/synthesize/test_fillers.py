@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.kitchen.fillers import PARAMS
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.fillers import FILLER_M, leave_fillers
-from r2c2r_core.synthesize.fixtures.table import fixture_for
+from r2c2r_core.synthesize.fillers import leave_fillers
 
 
 def door(name: str, outward: tuple[float, float], front: tuple[float, float], width: float) -> MeasuredObject:
@@ -17,7 +18,7 @@ def door(name: str, outward: tuple[float, float], front: tuple[float, float], wi
     return MeasuredObject(
         name=name,
         category="cabinet",
-        spec=fixture_for("cabinet")[0],
+        spec=category_of("cabinet"),
         world_from_object=pose,
         dimensions_m=size,
         sources=("measured", "inferred", "measured"),
@@ -44,11 +45,18 @@ def corner(width: float) -> list[MeasuredObject]:
 
 def test_a_door_does_not_reach_behind_the_run_it_meets() -> None:
     a, b = leave_fillers(corner(0.63))
-    assert right_edge(a)[0] == pytest.approx(0.60 - FILLER_M, abs=1e-9)
+    assert right_edge(a)[0] == pytest.approx(0.60 - PARAMS.width_m, abs=1e-9)
     assert a.front_centre[1] == pytest.approx(0.0, abs=1e-9)  # the plane stays
     assert a.sources == ("inferred", "inferred", "measured")
     assert "80 mm" in a.warnings[0]
     assert b.dimensions_m[0] < 0.5  # its own edge ran into the plane of `a` as well
+
+
+def test_a_diagonal_unit_leaves_its_neighbour_as_wide_as_it_is() -> None:
+    half = np.sqrt(0.5)
+    straight = door("a", (0.0, -1.0), (0.3, 0.0), 0.6)
+    diagonal = door("b", (-half, -half), (0.6 + 0.2 * half, -0.2 * half), 0.4)
+    assert [item.dimensions_m[0] for item in leave_fillers([straight, diagonal])] == [0.6, 0.4]
 
 
 def test_the_handle_stays_where_it_was_in_the_world() -> None:

@@ -9,11 +9,14 @@ import pytest
 from r2c2r_core.export.cavities import cavity_open
 from r2c2r_core.export.lint import lint
 from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.kitchen.categories import CATEGORIES
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.synthesize.fixtures.seams import seams_between
-from r2c2r_core.synthesize.fixtures.spec import Order
-from r2c2r_core.synthesize.fixtures.table import FIXTURES, fixture_for
+from r2c2r_core.synthesize.fixtures.spec import Build, Order
+from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.handles import handles_of_mesh
 from r2c2r_core.synthesize.surface import sampled
 from tests.core.export.conftest import write_folder
@@ -21,15 +24,16 @@ from tests.core.synthesize.kitchen_units import Handle, Unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
 from tests.core.synthesize.test_build_scene import built
 
-BUILT = [spec for spec in FIXTURES if spec.build is not None]
+BUILT = [spec for spec in CATEGORIES if spec.fixture is not None]
 PARTS = {
     "drawer": {"drawer"},
     "drawer_stack": {"drawer_1", "drawer_2", "drawer_3"},
     "double_door_cabinet": {"left_door", "right_door"},
+    "double_door_wall_cabinet": {"left_door", "right_door"},
     "double_sink_cabinet": {"left_door", "right_door"},
     "side_by_side_refrigerator": {"left_door", "right_door"},
     "fridge_freezer": {"upper_door", "lower_door"},
-    **{name: set() for name in ("counter", "hood", "open_shelf", "fixed_panel")},
+    **{name: set() for name in ("counter", "hood", "open_shelf", "fixed_panel", "washing_machine")},
 }
 
 
@@ -37,10 +41,7 @@ PARTS = {
 def every_fixture() -> ArticulatedScene:
     """Two metres apart, each at its usual size, standing on the floor."""
     return built(
-        *(
-            Unit(s.name, s.name, (2.0 * k, 0, s.dimensions_m[2] / 2), s.dimensions_m, kind="appliance")
-            for k, s in enumerate(BUILT)
-        )
+        *(Unit(s.name, s.name, (2.0 * k, 0, s.height.usual / 2), s.usual_m, kind="appliance") for k, s in enumerate(BUILT))
     )
 
 
@@ -135,10 +136,18 @@ def handle_at(z: float, *, x: float = 0.0) -> FrontHandle:
     return FrontHandle(left_m=x - 0.08, right_m=x + 0.08, bottom_m=z - 0.01, top_m=z + 0.01, protrusion_m=0.03, confidence=0.9)
 
 
-def order_with(fixture: str, *handles: FrontHandle) -> Order:
-    return Order(
-        dimensions_m=np.array(fixture_for(fixture)[0].dimensions_m), hinge="left", handle=handles[0], handles=tuple(handles)
+def build_with(name: str, *handles: FrontHandle, hinge: HingeSide = "left") -> Build:
+    category = category_of(name)
+    fixture = fixture_of(category)
+    assert fixture is not None
+    order = Order(
+        dimensions_m=np.array(category.usual_m),
+        material=category.material,
+        hinge=hinge,
+        handle=next(iter(handles), None),
+        handles=handles,
     )
+    return fixture.build(order)
 
 
 @pytest.mark.parametrize("heights", [(0.24, 0.24, 0.24), (0.14, 0.29, 0.29), (0.13, 0.19, 0.19, 0.21)])
@@ -154,11 +163,8 @@ def test_seams_are_told_by_handles_near_the_upper_edges() -> None:
 
 
 def test_a_stack_has_a_drawer_for_each_row_of_handles() -> None:
-    spec = fixture_for("chest of drawers")[0]
-    assert spec.build is not None
-    build = spec.build(
-        order_with("drawer_stack", handle_at(0.29), *(handle_at(z, x=x) for z in (0.075, -0.215) for x in (-0.1, 0.1)))
-    )
+    rows = (handle_at(z, x=x) for z in (0.075, -0.215) for x in (-0.1, 0.1))
+    build = build_with("chest of drawers", handle_at(0.29), *rows)
     fronts = [part.boxes[0] for part in build.parts[1:]]
     np.testing.assert_allclose([box.size_m[2] for box in fronts], [0.14, 0.29, 0.29], atol=0.004)
     held = [[box.name for box in part.boxes if box.name.startswith("handle")] for part in build.parts[1:]]
@@ -167,17 +173,13 @@ def test_a_stack_has_a_drawer_for_each_row_of_handles() -> None:
 
 
 def test_a_stack_whose_handles_were_missed_is_not_one_huge_drawer() -> None:
-    spec = fixture_for("drawer_stack")[0]
-    assert spec.build is not None
-    build = spec.build(order_with("drawer_stack", handle_at(0.0)))
+    build = build_with("drawer_stack", handle_at(0.0))
     assert len(build.motions) == 3
     assert "by default" in build.notes[0]
 
 
 def test_the_doors_of_a_fridge_freezer_meet_between_their_handles() -> None:
-    spec = fixture_for("fridge_freezer")[0]
-    assert spec.build is not None
-    build = spec.build(order_with("fridge_freezer", handle_at(0.4), handle_at(0.2)))
+    build = build_with("fridge_freezer", handle_at(0.4), handle_at(0.2))
     upper, lower = (part.boxes[0] for part in build.parts[1:])
     assert upper.link_from_box.translation[2] - upper.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
     assert lower.link_from_box.translation[2] + lower.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
@@ -186,10 +188,7 @@ def test_the_doors_of_a_fridge_freezer_meet_between_their_handles() -> None:
 def test_a_flap_or_a_door_opens_about_the_side_that_is_asked_for() -> None:
     for side, axis in (("left", (0, 0, -1)), ("right", (0, 0, 1)), ("top", (-1, 0, 0)), ("bottom", (1, 0, 0))):
         for name in ("cabinet", "wall_cabinet", "sink_cabinet"):
-            spec = fixture_for(name)[0]
-            assert spec.build is not None
-            order = Order(dimensions_m=np.array(spec.dimensions_m), hinge=side, handle=None)  # type: ignore[arg-type]  # of the table
-            assert tuple(spec.build(order).motions[0].axis_object) == axis
+            assert tuple(build_with(name, hinge=side).motions[0].axis_object) == axis
 
 
 def test_each_bar_that_stands_out_of_a_mesh_is_a_handle() -> None:

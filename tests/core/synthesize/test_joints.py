@@ -1,18 +1,16 @@
 import numpy as np
 import pytest
 
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectOverride, Overrides
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
-from r2c2r_core.synthesize.fixtures.table import fixture_for
 from r2c2r_core.synthesize.joints import choose_hinges
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 
 def measured(*units: Unit) -> list[MeasuredObject]:
     rng = np.random.default_rng(0)
-    return [
-        measure_object(capture(), *placed_unit(unit, rng), fixture_for(unit.category)[0], ObjectOverride()) for unit in units
-    ]
+    return [measure_object(capture(), *placed_unit(unit, rng), category_of(unit.category), ObjectOverride()) for unit in units]
 
 
 def door(name: str, x: float, handle: Handle | None, category: str = "cabinet", **more: object) -> Unit:

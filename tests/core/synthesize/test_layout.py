@@ -1,8 +1,10 @@
 import numpy as np
+import pytest
 
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.synthesize import layout as layout_module
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
-from r2c2r_core.synthesize.fixtures.table import fixture_for
 from r2c2r_core.synthesize.layout import GAP_M, REST_GAP_M, Layout, arrange, overlapping_pairs
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
@@ -12,7 +14,7 @@ def arranged(*units: Unit, overrides: dict[str, ObjectOverride] | None = None, m
     items: list[MeasuredObject] = []
     for unit in units:
         override = (overrides or {}).get(unit.name, ObjectOverride())
-        items.append(measure_object(capture(), *placed_unit(unit, rng), fixture_for(unit.category)[0], override))
+        items.append(measure_object(capture(), *placed_unit(unit, rng), category_of(unit.category), override))
     return arrange(items, manhattan, floor_found=True)
 
 
@@ -187,3 +189,13 @@ def test_furniture_does_not_give_way_to_what_stands_on_it() -> None:
     )
     assert layout.moves_m["d"] < 5e-4  # the microwave is 20 mm too low
     assert overlapping_pairs(layout.objects) == []
+
+
+def test_a_layout_that_cannot_be_solved_stands_as_measured_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(layout_module, "solved", singular)
+    layout = arranged(*run_of_doors(0.0, 0.0))
+    assert len(layout.objects) == len(run_of_doors(0.0, 0.0))
+    assert any("the layout was not solved (Singular matrix)" in line for line in layout.warnings)
