@@ -4,6 +4,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt8
 
 Points = Float[np.ndarray, "n 3"]
+PointField = Float[np.ndarray, "*shape 3"]  # one point, a list or an image of them
+PixelField = Float[np.ndarray, "*shape 2"]
 Vector3 = Float[np.ndarray, "3"]
 Vector2 = Float[np.ndarray, "2"]
 Pixels = Float[np.ndarray, "n 2"]

@@ -1,37 +1,54 @@
 """The `r2c2r` command: reads the arguments, hands over to one of `commands/`, and turns failures into one line.
 
-Exit codes: 0 done, 1 the work failed or a check fell short, 2 wrong usage or unreadable input. Errors are one line on
-stderr; a traceback only with --debug. Results go to stdout, progress to stderr.
+Exit codes: 0 done, 1 the work failed or a check fell short, 2 wrong usage or unreadable input, 143 ended by SIGTERM.
+Errors are one line on stderr; a traceback only with --debug. Results go to stdout, progress to stderr.
 """
 
 import argparse
+import errno
+import io
 import os
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NoReturn
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU bill
 
 from r2c2r_core import __version__
-from r2c2r_core.commands import check, dataset, demo, doctor, evaluate, info, run, sample, serve, user
 from r2c2r_core.errors import R2C2RError
+from r2c2r_core.texts import shown
 
-COMMANDS = (serve, demo, user, sample, info, run, check, evaluate, dataset, doctor)
+STOPPED = "r2c2r: stopped; finished stages are kept, the same command goes on"
+
+
+class Terminated(BaseException):
+    """SIGTERM came: what is open is closed and what is temporary removed on the way out."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Parse, run one command, and turn failures into one line and an exit code."""
-    options = _parser().parse_args(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a file's name need not be text: it is shown, whatever it is
+        sys.stdout.reconfigure(errors="backslashreplace")
+    options = argparse.Namespace(debug=False)
     try:
-        return int(options.command(options))
+        with _ended_by_sigterm():
+            options = _parser().parse_args(arguments)
+            return int(options.command(options))
     except R2C2RError as error:
         if options.debug:
             traceback.print_exc()
-        print(f"r2c2r: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"r2c2r: {shown(' '.join(str(error).split()))}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("r2c2r: stopped; finished stages are kept, the same command goes on", file=sys.stderr)
+        print(STOPPED, file=sys.stderr)
         return 1
+    except Terminated:
+        print(STOPPED, file=sys.stderr)
+        return 128 + signal.SIGTERM
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of our output left; say no more
         return 1
@@ -39,8 +56,72 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             traceback.print_exc()
         where = error.filename or "input/output"
-        print(f"r2c2r: {where}: {error.strerror or error}; free some space or choose another folder", file=sys.stderr)
+        print(f"r2c2r: {shown(str(where))}: {error.strerror or error}; {_way_out(error.errno)}", file=sys.stderr)
         return 1
+    except MemoryError as error:
+        if options.debug:
+            traceback.print_exc()
+        print(
+            f"r2c2r: out of memory ({error or 'no more to be had'}); close other programs, or use a shorter recording",
+            file=sys.stderr,
+        )
+        return 1
+    except Exception as error:  # the last line of defence: whatever it was, a person gets one line
+        if options.debug:
+            traceback.print_exc()
+        found = shown(" ".join(f"{type(error).__name__}: {error}".split()))[:300]
+        print(f"r2c2r: a fault of r2c2r ({found}); run again with --debug and report what it prints", file=sys.stderr)
+        return 1
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """SIGTERM unwinds what is under way, as an interrupt does; a second one ends the process at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _commands() -> tuple[Any, ...]:
+    """The commands in the order of the help; imported here, so that an interrupt meanwhile is one line too."""
+    from r2c2r_core.commands import (
+        backup,
+        check,
+        check_data,
+        dataset,
+        demo,
+        doctor,
+        evaluate,
+        info,
+        key,
+        restore,
+        run,
+        sample,
+        schema,
+        serve,
+        user,
+    )
+
+    return serve, key, demo, user, backup, restore, check_data, sample, info, run, check, evaluate, dataset, schema, doctor
+
+
+def _way_out(number: int | None) -> str:
+    """The next step after a failure of the system, by its errno."""
+    if number == errno.ENAMETOOLONG:
+        return "use a shorter name"
+    if number in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return "choose a file or folder that you may use"
+    return "free some space or choose another folder"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -48,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"r2c2r {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     parsers = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in COMMANDS:
+    for command in _commands():
         command.add(parsers)
     return parser
 

@@ -1,12 +1,14 @@
-"""What goes wrong with disks, in one line each."""
+"""What goes wrong with disks, in one line each, and who may read what is on them."""
 
 import errno
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from r2c2r_core.errors import EnvironmentProblem
+from r2c2r_core.errors import EnvironmentProblem, InputError
 
+_SHOWN = 200  # characters of a path that cannot be
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -21,3 +23,49 @@ def explained_io(path: Path) -> Iterator[None]:
             raise EnvironmentProblem(f"{path}: the disk is full", hint=hint) from error
         where = error.filename or path
         raise EnvironmentProblem(f"{where}: {error.strerror or error}", hint="choose a folder you may write to") from error
+
+
+def resolved(path: Path) -> Path:
+    """The absolute path, links followed; raises InputError where no file can be: a circle of links, a NUL, too long a name."""
+    try:
+        found = path.expanduser().resolve()
+        os.lstat(found)
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"{str(path)[:_SHOWN]!r}: no path of a file ({error})", hint="check the path") from error
+    except OSError as error:
+        if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+            raise InputError(f"{str(path)[:_SHOWN]!r}: {error.strerror}", hint="check the path") from error
+    return found
+
+
+def is_below(path: Path, folder: Path) -> bool:
+    """Whether a path, links followed, stays in the folder; what leads nowhere does not."""
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # RuntimeError: a circle of links, before Python 3.13
+        return False
+
+
+def keep_private(folder: Path, marker: str) -> None:
+    """From here on what this process and its workers write is for its owner alone, and so is the folder.
+
+    A folder that was there is closed too where it is empty or holds `marker`: any other may be more than ours.
+    Raises EnvironmentProblem where the folder cannot be made.
+    """
+    os.umask(0o077)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        names = {path.name for path in folder.iterdir()}
+        if names and marker not in names:
+            return
+        for path in (folder, *folder.glob(f"{marker}*")):
+            with suppress(PermissionError):  # somebody else's: `r2c2r doctor` says so
+                path.chmod(path.stat().st_mode & 0o700)
+    except OSError as error:
+        raise EnvironmentProblem(f"{folder}: {error.strerror}", hint="choose another folder with --data") from error
+
+
+def open_to_others(path: Path) -> str | None:
+    """The mode of a file or folder as chmod writes it, when others of this machine may use it; None where they may not."""
+    mode = path.stat().st_mode & 0o777
+    return f"{mode:o}" if mode & 0o077 else None

@@ -7,9 +7,11 @@ import sys
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from r2c2r_core.registry import Registry
+from r2c2r_core.alone import network_can_be_left
+from r2c2r_core.disk import open_to_others
+from r2c2r_core.registry import Backend, Registry
 
 OPEN3D_LIBRARIES = ("EGL", "GL", "X11", "usb-1.0", "udev", "idn2")
 """Without any of these `import open3d` fails (measured by hiding each)."""
@@ -32,15 +34,18 @@ class MachineFinding:
 
 
 def examine_machine(data_dir: Path) -> list[MachineFinding]:
-    """System libraries, backends with their licences, loaders, GPU, default port, free disk."""
+    """System libraries, backends with their licences, loaders, GPU, default port, free disk, privacy."""
     return [
         MachineFinding("python", "ok", sys.version.split()[0]),
         _system_libraries(),
         *_backends(),
+        *_plugins(),
         *_loaders(),
         _gpu(),
         _port(8000),
         _disk(data_dir),
+        _privacy(data_dir),
+        _decoders(),
     ]
 
 
@@ -63,8 +68,9 @@ def _backends() -> list[MachineFinding]:
     from r2c2r_core.align.protocol import MATCHERS
     from r2c2r_core.generate.stage import GENERATORS
     from r2c2r_core.segment.stage import SEGMENTERS
+    from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
 
-    registries: tuple[Registry, ...] = (SEGMENTERS, GENERATORS, MATCHERS)
+    registries: tuple[Registry[Any], ...] = (SEGMENTERS, GENERATORS, MATCHERS, CARCASSES)
     findings = []
     for registry in registries:
         for backend in registry.backends:
@@ -72,6 +78,25 @@ def _backends() -> list[MachineFinding]:
             detail = f"{reason}; licence: {backend.licence}"
             findings.append(MachineFinding(f"{registry.seam} {backend.name}", "ok" if ready else "absent", detail))
     return findings
+
+
+def _plugins() -> list[MachineFinding]:
+    """What other packages add, a line each; one that does not load says why."""
+    from r2c2r_core.export.writers.table import Format
+    from r2c2r_core.ingest.readers.protocol import Reader
+    from r2c2r_core.kitchen.category import Category
+    from r2c2r_core.plugins import GROUPS, plugins
+
+    kinds: dict[str, type] = {"r2c2r.readers": Reader, "r2c2r.fixtures": Category, "r2c2r.formats": Format}
+    return [
+        MachineFinding(
+            f"plug-in {plugin.name}",
+            "problem" if plugin.fault else "ok",
+            f"{plugin.group}, {plugin.package}{f': {plugin.fault}' if plugin.fault else ''}",
+        )
+        for group in GROUPS
+        for plugin in plugins(group, kinds.get(group, Backend))
+    ]
 
 
 def _loaders() -> list[MachineFinding]:
@@ -109,3 +134,19 @@ def _disk(data_dir: Path) -> MachineFinding:
     free = shutil.disk_usage(existing).free
     state: Literal["ok", "problem"] = "ok" if free > _LOW_DISK_BYTES else "problem"
     return MachineFinding("disk", state, f"{free / 1e9:.1f} GB free at {existing}")
+
+
+def _privacy(data_dir: Path) -> MachineFinding:
+    """Whether others of this machine may look into the data folder."""
+    mode = open_to_others(data_dir) if data_dir.exists() else None
+    if mode:
+        return MachineFinding("data folder", "problem", f"others may use it ({mode}): chmod go= {data_dir}")
+    return MachineFinding("data folder", "ok", f"{data_dir} is for its owner alone")
+
+
+def _decoders() -> MachineFinding:
+    """Whether what decodes uploads of the app is cut off from the network."""
+    if network_can_be_left():
+        return MachineFinding("decoders", "ok", "uploads are decoded without network")
+    detail = "uploads are decoded with the network in reach: this system lets no process leave it (unshare, Linux only)"
+    return MachineFinding("decoders", "absent", detail)

@@ -1,30 +1,91 @@
-"""What a run has computed and may use again: keys, stored nouns, failures of single objects, and where to stop."""
+"""What a run has computed and may use again: keys, stored nouns, failures of single objects, and where to stop.
+
+A stage is a plain function of a module: its inputs, then `progress`. What it gives is kept under a key that follows from the
+stage's source and its inputs, so whoever calls it says what the result depends on by saying what it is made from.
+"""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args
 
-from r2c2r_core.errors import PromptError, StageError
-from r2c2r_core.progress import Progress
+import cv2
+
+from r2c2r_core.errors import EnvironmentProblem, PromptError, R2C2RError, StageError
+from r2c2r_core.pool import Failed, Pool, Task
+from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.sources import source_key
 from r2c2r_core.workspace import Workspace, content_key
 
 T = TypeVar("T")
-S = TypeVar("S")
 
 Stage = Literal["ingest", "segment", "generate", "align", "synthesize", "warp", "export"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
+_STANDS_ON = {"generate": ("align",)}  # the placing of candidates is given to it
+_OBJECT_FAILS = (StageError, PromptError, ValueError, ArithmeticError, LookupError, RuntimeError, cv2.error)
+"""What one object's measurements may end in (LinAlgError is a ValueError, Qhull's a RuntimeError); anything else is wrong for
+all: a programming error, a full disk, a missing backend, a person who cancelled."""
+
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Kept(Generic[T]):
-    """A noun and the key that says what it was made from."""
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a noun is stored."""
 
-    value: T
+    root: Path
+    stage: str
+    name: str
     key: str
+
+
+class Kept(Generic[T]):
+    """A value and the key that says what it was made from; an empty key: nothing depends on it.
+
+    One that is stored goes to another process by its place: it is read there when it is asked for.
+    """
+
+    __slots__ = ("_value", "key", "place")
+
+    def __init__(self, value: T, key: str, place: _Place | None = None) -> None:
+        self._value: list[T] = [value]
+        self.key = key
+        self.place = place
+
+    @property
+    def value(self) -> T:
+        """The noun."""
+        if not self._value:
+            assert self.place is not None
+            return _stored(self.place)
+        return self._value[0]
+
+    def __getstate__(self) -> tuple[list[T], str, _Place | None]:
+        return ([] if self.place else self._value), self.key, self.place
+
+    def __setstate__(self, state: tuple[list[T], str, _Place | None]) -> None:
+        self._value, self.key, self.place = state
+
+
+def aside(value: T) -> Kept[T]:
+    """An input that does not change what comes out: a folder to keep things in, what an earlier run made."""
+    return Kept(value, "")
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """An input that is made once a process, for all objects: `make` of these inputs, and `progress`."""
+
+    make: Callable[..., Any]
+    inputs: tuple[Any, ...]
+
+    @property
+    def key(self) -> str:
+        """As of what it is made from."""
+        return content_key(_keys(self.inputs))
 
 
 class Reached(Exception):  # a signal, not an error
@@ -38,61 +99,109 @@ class Ledger:
     work: Workspace
     progress: Progress
     until: Stage = "export"
+    pool: Pool = field(default_factory=lambda: Pool(1))
     seconds: dict[str, float] = field(default_factory=dict)  # by stage: what its results took when they were computed
     failures: dict[str, str] = field(default_factory=dict)  # by object: one line
 
-    def one(self, stage: Stage, inputs: tuple[object, ...], compute: Callable[[Progress], T]) -> Kept[T]:
-        """The stage's single result, computed when its inputs changed."""
-        progress = self._begin(stage)
-        key = content_key(stage, _code_key(stage), inputs)
-        value, seconds = self.work.once(stage, "scene", key, lambda: compute(progress))
-        self.seconds[stage] = seconds
-        progress.at(1.0, "done")
-        return Kept(value, key)
-
-    def each(
+    def one(
         self,
         stage: Stage,
-        items: Mapping[str, Kept[S]],
-        inputs: Callable[[str], tuple[object, ...]],
-        compute: Callable[[str, S, Progress], T],
-    ) -> dict[str, Kept[T]]:
-        """The stage's result for every object; an object that fails is left out and recorded, the others go on."""
-        progress = self._begin(stage)
-        results: dict[str, Kept[T]] = {}
-        for position, (name, item) in enumerate(items.items()):
-            part = progress.part(position / len(items), (position + 1) / len(items))
-            part.at(0.0, name)
-            key = content_key(stage, _code_key(stage), item.key, inputs(name))
-            try:
-                results[name] = self._once(stage, name, key, item.value, compute, part)
-            except (StageError, PromptError) as error:
-                _log.warning("%s: %s: %s", stage, name, error)
-                self.failures[name] = f"{stage}: {error}"
+        compute: Callable[..., T],
+        *inputs: Any,
+        name: str = "scene",
+        span: tuple[float, float] = (0.0, 1.0),
+    ) -> Kept[T]:
+        """The stage's single result, computed when its inputs changed; `span` is its share of the stage's work."""
+        progress = self._begin(stage).part(*span)
+        kept = self._once(_Job(self.work.root, stage, name, compute, inputs), progress)
         progress.at(1.0, "done")
-        return results
+        return kept
 
-    def stored(self, stage: Stage, name: str, item: Kept[S], inputs: tuple[object, ...]) -> Any | None:
-        """What an earlier run made of the item with these inputs, when nothing has taken its place yet."""
-        found = self.work.find(stage, name, content_key(stage, _code_key(stage), item.key, inputs))
+    def each(
+        self, stage: Stage, compute: Callable[..., T], names: Collection[str], *inputs: Any, alone: bool = False
+    ) -> dict[str, Kept[T]]:
+        """The stage's result for every object; an object that fails is left out and recorded, the others go on.
+
+        Of an input that is a mapping each object is given its own. `alone`: in this process, whatever the pool.
+        """
+        progress = self._begin(stage)
+        jobs = {name: _Job(self.work.root, stage, name, compute, _own(name, inputs)) for name in names}
+        results = {name: kept for name, job in jobs.items() if (kept := self._found(job)) is not None}
+        wanted = {name: job for name, job in jobs.items() if name not in results}
+        parallel = not alone and min(len(wanted), self.pool.workers) > 1
+        results |= self._side_by_side(wanted, progress) if parallel else self._one_by_one(wanted, progress)
+        progress.at(1.0, "done")
+        return {name: results[name] for name in names if name in results}
+
+    def stored(self, stage: Stage, compute: Callable[..., T], name: str, *inputs: Any) -> T | None:
+        """What an earlier run made of the object with these inputs, when nothing has taken its place yet."""
+        found = self.work.find(stage, name, _Job(self.work.root, stage, name, compute, _own(name, inputs)).key)
         return None if found is None else found[0]
 
-    def sort_out(self, stage: Stage, items: Mapping[str, Kept[S]], decide: Callable[[str, S], T]) -> dict[str, Kept[T]]:
-        """Quick decisions on a stage's results, with the same treatment of failures; their keys stay."""
-        results: dict[str, Kept[T]] = {}
+    def decide(self, stage: Stage, choose: Callable[..., T], items: Mapping[str, Kept[Any]], *inputs: Any) -> dict[str, T]:
+        """Quick decisions on a stage's results, kept nowhere, with the same treatment of failures."""
+        results: dict[str, T] = {}
         for name, item in items.items():
             try:
-                results[name] = Kept(decide(name, item.value), item.key)
-            except StageError as error:
-                self.failures[name] = f"{stage}: {error}"
+                results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
+            except _OBJECT_FAILS as error:
+                self._failed(stage, name, error)
         return results
 
-    def _once(
-        self, stage: Stage, name: str, key: str, item: S, compute: Callable[[str, S, Progress], T], part: Progress
-    ) -> Kept[T]:
-        value, seconds = self.work.once(stage, name, key, lambda: compute(name, item, part))
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + seconds
-        return Kept(value, key)
+    def _one_by_one(self, jobs: "dict[str, _Job]", progress: Progress) -> dict[str, Kept[Any]]:
+        results = {}
+        for position, (name, job) in enumerate(jobs.items()):
+            part = progress.part(position / len(jobs), (position + 1) / len(jobs))
+            part.at(0.0, name)
+            try:
+                results[name] = self._once(job, part)
+            except _OBJECT_FAILS as error:
+                self._failed(job.stage, name, error)
+        _opened.cache_clear()
+        return results
+
+    def _side_by_side(self, jobs: "dict[str, _Job]", progress: Progress) -> dict[str, Kept[Any]]:
+        """In the pool; what all share is prepared first, so that the workers find on disk what takes long."""
+        opening, rest = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
+        shared = {input.key: input for job in jobs.values() for input in job.inputs if isinstance(input, Shared)}
+        for input in shared.values():
+            _open(input, opening)
+        _opened.cache_clear()
+        results = {}
+        tasks = {name: Task(store_noun, (job,)) for name, job in jobs.items()}
+        for name, answer in self.pool.run(tasks, rest if shared else progress):
+            if not isinstance(answer, Failed):
+                self.work.computed.append(f"{jobs[name].stage}/{name}")
+                kept = self._found(jobs[name])
+                assert kept is not None, "it was stored a moment ago"
+                results[name] = kept
+            elif isinstance(answer.error, _OBJECT_FAILS):
+                self._failed(jobs[name].stage, name, answer.error, answer.where)
+            else:
+                _log.error("%s: %s", name, answer.where)
+                raise answer.error
+        return results
+
+    def _found(self, job: "_Job") -> Kept[Any] | None:
+        found = self.work.find(job.stage, job.name, job.key)
+        return None if found is None else self._kept(job, *found)
+
+    def _once(self, job: "_Job", progress: Progress) -> Kept[Any]:
+        return self._kept(job, *_compute(self.work, job, progress))
+
+    def _kept(self, job: "_Job", noun: Any, seconds: float) -> Kept[Any]:
+        self.seconds[job.stage] = self.seconds.get(job.stage, 0.0) + seconds
+        return Kept(noun, job.key, _Place(job.root, job.stage, job.name, job.key))
+
+    def _failed(self, stage: str, name: str, error: Exception, where: str = "") -> None:
+        """One line for a person; the traceback of what nobody foresaw goes to the log."""
+        if isinstance(error, R2C2RError):
+            _log.warning("%s: %s: %s", stage, name, error)
+            self.failures[name] = f"{stage}: {error}"
+            return
+        _log.warning("%s: %s: %s%s", stage, name, error, where and f"\n{where}", exc_info=None if where else error)
+        said = (str(error).strip() or "no message").splitlines()[0]
+        self.failures[name] = f"{stage}: {name}: {type(error).__name__}: {said}; see the log, or leave it out"
 
     def _begin(self, stage: Stage) -> Progress:
         if STAGES.index(stage) > STAGES.index(self.until):
@@ -102,11 +211,89 @@ class Ledger:
         return progress
 
 
-def _code_key(stage: str) -> str:
-    """The stage's version: a digest of its source and of the geometry and nouns it stands on."""
-    return source_key(stage, "geometry", "model")
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """One noun to be made: where it will be stored, and of what."""
+
+    root: Path
+    stage: Stage
+    name: str
+    compute: Callable[..., Any]
+    inputs: tuple[Any, ...]
+
+    @property
+    def key(self) -> str:
+        """Of the stage's source, of the geometry and nouns it stands on, and of the inputs."""
+        rooms = (self.stage, *_STANDS_ON.get(self.stage, ()), "kitchen", "geometry", "model")
+        return content_key(self.stage, self.name, self.compute.__name__, source_key(*rooms), _keys(self.inputs))
 
 
-def keys_of(results: Mapping[str, Kept[Any]]) -> list[list[str]]:
-    """The keys of many results, as an input of the next stage."""
-    return [[name, kept.key] for name, kept in results.items()]
+def store_noun(job: _Job, *, progress: Progress) -> None:
+    """Make a noun in a worker process, and store it."""
+    _compute(Workspace(job.root), job, progress)
+
+
+def _compute(work: Workspace, job: _Job, progress: Progress) -> tuple[Any, float]:
+    return work.once(job.stage, job.name, job.key, lambda: job.compute(*_values(job.inputs, progress), progress=progress))
+
+
+def _own(name: str, inputs: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The inputs of one object: of a mapping, what is its own."""
+    return tuple(item[name] if isinstance(item, Mapping) else item for item in inputs)
+
+
+def _keys(inputs: Any) -> Any:
+    """What the inputs are made from, for content_key."""
+    if isinstance(inputs, Kept | Shared):
+        return inputs.key
+    if isinstance(inputs, tuple | list):
+        return [_keys(item) for item in inputs]
+    return inputs
+
+
+def _values(inputs: tuple[Any, ...], progress: Progress) -> list[Any]:
+    return [_value(item, progress) for item in inputs]
+
+
+def _value(item: Any, progress: Progress) -> Any:
+    if isinstance(item, Kept):
+        return item.value
+    if isinstance(item, Shared):
+        return _open(item, progress)
+    if isinstance(item, tuple | list):
+        return type(item)(_value(part, progress) for part in item)
+    return item
+
+
+@lru_cache(maxsize=4)  # the recording, and what belongs to the object at hand
+def _stored(place: _Place) -> Any:
+    found = Workspace(place.root).find(place.stage, place.name, place.key)
+    if found is None:
+        raise EnvironmentProblem(
+            f"{place.root}: what {place.stage} made of {place.name} is gone",
+            hint="leave the folder alone while a run is at work",
+        )
+    return found[0]
+
+
+def _open(shared: Shared, progress: Progress) -> Any:
+    return _opened(_Once(shared, progress))
+
+
+@lru_cache(maxsize=1)
+def _opened(once: "_Once") -> Any:
+    return once.shared.make(*_values(once.shared.inputs, once.progress), progress=once.progress)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Once:
+    """A shared input, known by its key, and who hears about its making."""
+
+    shared: Shared
+    progress: Progress
+
+    def __hash__(self) -> int:
+        return hash(self.shared.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Once) and self.shared.key == other.shared.key

@@ -5,9 +5,12 @@ import importlib.util
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar, cast
 
 from r2c2r_core.errors import BackendUnavailable, InputError
+from r2c2r_core.plugins import Group, added
+
+T = TypeVar("T")
 
 LicenceClass = Literal["open", "restricted"]  # restricted: gated, non-commercial, or bound to a field of use
 MODEL_FILES = ("config.json", "*.safetensors")  # how transformers keeps a model
@@ -38,19 +41,32 @@ class Backend:
     licence_class: LicenceClass = "open"
     summary: str = ""
 
+    @property
+    def alone(self) -> bool:
+        """Whether one process has to do all: each would load the weights again, or wait for the same server."""
+        return self.weights is not None or bool(self.server)
+
 
 @dataclass(frozen=True, slots=True)
-class Registry:
-    """The backends of one seam; the first one needs no extra and is the default."""
+class Registry(Generic[T]):
+    """The backends of one seam, all of them a T; the first one needs no extra and is the default."""
 
     seam: str
-    backends: tuple[Backend, ...]
+    own: tuple[Backend, ...]
     setting: str = "segment.weights"  # where a configuration names the weights
+    group: Group | None = None  # of entry points, by which other packages add to it
+
+    @property
+    def backends(self) -> tuple[Backend, ...]:
+        """The project's own, then those that other packages add; a name that is taken stays whose it is."""
+        taken = {backend.name for backend in self.own}
+        further = added(self.group, Backend) if self.group is not None else ()
+        return (*self.own, *(backend for backend in further if backend.name not in taken))
 
     @property
     def default(self) -> str:
         """Name of the backend used when nobody chose one."""
-        return self.backends[0].name
+        return self.own[0].name
 
     def get(self, name: str) -> Backend:
         """The table's line called `name`; raises InputError naming the choices."""
@@ -99,7 +115,7 @@ class Registry:
         wanted = self.get(name).weights
         return "" if wanted is None else weights or os.environ.get(wanted.variable) or wanted.usual
 
-    def load(self, name: str, **options: Any) -> Any:
+    def load(self, name: str, **options: Any) -> T:
         """A new instance of the backend; raises BackendUnavailable with the extra to install or the weights to fetch.
 
         A backend with weights takes their folder as `weights`.
@@ -108,7 +124,7 @@ class Registry:
         if folder is not None:
             options["weights"] = folder
         module_name, class_name = self.get(name).target.split(":")
-        return getattr(importlib.import_module(module_name), class_name)(**options)
+        return cast(T, getattr(importlib.import_module(module_name), class_name)(**options))
 
 
 def find_weights(named: str, holds: tuple[str, ...] = MODEL_FILES) -> Path | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.progress import Progress
+from r2c2r_core.texts import shown
 
 
 @contextlib.contextmanager
@@ -20,9 +21,10 @@ def show_progress() -> Iterator[Progress]:
 
 
 def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Aligned plain-text columns."""
-    widths = [max(len(row[k]) for row in [titles, *rows]) for k in range(len(titles))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in [titles, *rows]]
+    """Aligned plain-text columns; what a terminal would obey is shown instead."""
+    cells = [[" ".join(shown(cell).split("\n")) for cell in row] for row in [titles, *rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(titles))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
     return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
 
 
@@ -38,7 +40,7 @@ def certificate_text(certificate: Certificate) -> str:
         f"{certificate.realtime_factor:.0f} x real time",
         f"certificate {'passed' if certificate.passed else 'FAILED'}",
     ]
-    return "\n".join(lines)
+    return shown("\n".join(lines))
 
 
 class _Live:
@@ -53,7 +55,7 @@ class _Live:
         filled = int(24 * fraction)
         bar = "#" * filled + "." * (24 - filled)
         elapsed = time.monotonic() - self.started
-        sys.stderr.write(f"\r\033[K{stage:<11}[{bar}] {100 * fraction:3.0f} %  {elapsed:5.0f} s  {text[:60]}")
+        sys.stderr.write(f"\r\033[K{stage:<11}[{bar}] {100 * fraction:3.0f} %  {elapsed:5.0f} s  {shown(text[:60])}")
         sys.stderr.flush()
 
     def close(self) -> None:
@@ -69,7 +71,7 @@ class _Lines:
         step = (stage, text.rstrip("0123456789/ "))  # counting up is not a new step
         if step != self.last:
             self.last = step
-            sys.stderr.write(f"{stage} {100 * fraction:.0f} % {text}".rstrip() + "\n")
+            sys.stderr.write(f"{stage} {100 * fraction:.0f} % {shown(text)}".rstrip() + "\n")
             sys.stderr.flush()
 
     def close(self) -> None:

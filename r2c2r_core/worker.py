@@ -1,8 +1,8 @@
-"""One stage in a process of its own: `python -m r2c2r_core.worker WORKDIR --until STAGE`.
+"""One stage in a process of its own: `python -m r2c2r_core.worker WORKDIR --until STAGE [--request FILE]`.
 
-Reads WORKDIR/request.json and prints JSON lines: {"stage", "fraction", "text"} while working, then either
-{"done", "computed", "failures", "passed"} or {"error": {"kind", "message", "hint"}}. A stage's memory returns with its
-process, and killing it loses at most the noun being computed.
+Reads the request (WORKDIR/request.json unless another is named) and prints JSON lines: {"stage", "fraction", "text"} while
+working, then either {"done", "computed", "failures", "passed"} or {"error": {"kind", "message", "hint"}}. A stage's memory
+returns with its process, and killing it loses at most the noun being computed.
 """
 
 import argparse
@@ -12,16 +12,20 @@ import signal
 import sys
 import traceback
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU bill
 
-from r2c2r_core.config import ReconstructConfig, config_from
-from r2c2r_core.errors import Cancelled, InputError, R2C2RError
+from r2c2r_core.config import config_from
+from r2c2r_core.disk import resolved
+from r2c2r_core.documents import read_json
+from r2c2r_core.errors import Cancelled, EnvironmentProblem, InputError, R2C2RError
 from r2c2r_core.ledger import STAGES
+from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
 from r2c2r_core.pipeline import Request, Tools, reconstruct
 from r2c2r_core.progress import Progress
+from r2c2r_core.schema.document import checked
+from r2c2r_core.schema.request import RequestFile
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.workspace import Workspace
 
@@ -31,6 +35,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="r2c2r_core.worker", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("--until", choices=STAGES, default="export")
+    parser.add_argument("--request", type=Path, help="what to compute; WORKDIR/request.json unless given")
+    parser.add_argument("--workers", type=int, default=0, help="processes side by side; 0: as cores and memory allow")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
@@ -39,10 +45,16 @@ def main(arguments: list[str] | None = None) -> int:
     )
     try:
         work = Workspace(options.workdir)
-        outcome = reconstruct(read_request(options.workdir), work, until=options.until, progress=progress)
+        request = read_request(options.request or options.workdir / "request.json")
+        outcome = reconstruct(request, work, until=options.until, workers=options.workers, progress=progress)
     except R2C2RError as error:
         _say(error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
         return 130 if isinstance(error, Cancelled) else error.exit_code
+    except (MemoryError, OSError) as error:
+        traceback.print_exc(file=sys.stderr)
+        met = memory_met() if isinstance(error, MemoryError) else _system_said(error)
+        _say(error={"kind": type(met).__name__, "message": met.message, "hint": met.hint})
+        return met.exit_code
     except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the person
         traceback.print_exc(file=sys.stderr)
         _say(error={"kind": type(error).__name__, "message": f"unexpected: {error}", "hint": "see the job's log"})
@@ -52,28 +64,23 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def read_request(workdir: Path) -> Request:
-    """The request a workdir was set up with; source, prompts and overrides may be relative to it."""
-    path = workdir / "request.json"
-    try:
-        document: dict[str, Any] = json.loads(path.read_text())
-        source = (workdir / document["source"]).resolve()
-        prompts = workdir / document.get("prompts", "prompts.json")
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: not a request ({error})", hint='expected {"source": …, "prompts": …}') from error
-    overrides = workdir / document.get("overrides", "overrides.json")
+def _system_said(error: OSError) -> EnvironmentProblem:
+    return EnvironmentProblem(f"{error.filename or 'a file'}: {error.strerror or error}", hint="see the job's log")
+
+
+def read_request(path: Path) -> Request:
+    """The request in a file; source, prompts and overrides may be relative to its folder."""
+    hint = 'expected {"source": …, "prompts": …}'
+    request = checked(RequestFile, read_json(path, hint=hint), str(path), InputError, hint=hint)
+    overrides = path.parent / request.overrides
     return Request(
-        source=source,
-        prompts=read_prompts(prompts),
+        source=resolved(path.parent / request.source),
+        prompts=read_prompts(path.parent / request.prompts),
         overrides=read_overrides(overrides) if overrides.exists() else NO_OVERRIDES,
-        config=config_from(document["config"], str(path)) if "config" in document else ReconstructConfig(),
-        tools=Tools(**document.get("tools", {})),
-        seed=int(document.get("seed", 0)),
+        config=config_from(request.config, str(path)),
+        tools=Tools(**request.tools.model_dump(exclude_none=True)),
+        seed=request.seed,
     )
-
-
-def _say_progress(stage: str, fraction: float, text: str) -> None:
-    _say(stage=stage, fraction=round(fraction, 4), text=text)
 
 
 def _say(**message: object) -> None:
@@ -82,4 +89,5 @@ def _say(**message: object) -> None:
 
 
 if __name__ == "__main__":
+    limit_this_process()
     sys.exit(main())

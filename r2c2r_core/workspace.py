@@ -1,10 +1,10 @@
 """A reconstruction on disk: where each noun lies, under which key, and whether it can be used again.
 
 WORKDIR/
-├── request.json prompts.json overrides.json     inputs, when the app runs the pipeline
-├── capture/                                     frames, normalised (ingest/stage.py)
+├── capture/<key>/                               frames, normalised (ingest/store.py); the key says what they were read from
 ├── cache/                                       what a segmenter prepared
 ├── nouns/<stage>/<name>.noun                    one file per stage and object, written atomically
+├── seconds.json                                 what each stage took
 └── bundle.zip                                   the result
 
 A noun's key is the hash of its stage's version and configuration and of its inputs' keys, so a changed setting or click
@@ -16,10 +16,11 @@ import fcntl
 import hashlib
 import json
 import os
+import shutil
 import threading
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -28,10 +29,12 @@ import numpy as np
 
 from r2c2r_core.codec import decode_header, decode_noun, encode_noun
 from r2c2r_core.disk import explained_io
-from r2c2r_core.errors import EnvironmentProblem
-from r2c2r_core.model.capture import Capture
+from r2c2r_core.errors import CaptureError, EnvironmentProblem
+from r2c2r_core.model.capture import Capture, Scan
 
 T = TypeVar("T")
+
+_UNREADABLE = (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile)
 
 
 class Workspace:
@@ -43,10 +46,20 @@ class Workspace:
         with explained_io(root):
             (root / "nouns").mkdir(parents=True, exist_ok=True)
 
+    def store(self, key: str) -> Path:
+        """Folder of the normalised frames that were read with this key."""
+        return self.root / "capture" / key
+
     @property
     def frames(self) -> Path:
-        """Folder of the normalised frames."""
-        return self.root / "capture"
+        """Folder of the frames of the capture stored last."""
+        return frames_folder(self.root)
+
+    def keep_frames(self, key: str) -> None:
+        """Drop the frames of every other reading: no noun stands for them any more."""
+        for path in self.store("").iterdir():
+            if path.name != key:
+                shutil.rmtree(path, ignore_errors=True)
 
     @property
     def cache(self) -> Path:
@@ -57,6 +70,17 @@ class Workspace:
     def bundle(self) -> Path:
         """The finished bundle."""
         return self.root / "bundle.zip"
+
+    def keep_seconds(self, seconds: Mapping[str, float]) -> None:
+        """Store what each stage took: here and not in the bundle, whose bytes depend on its inputs alone."""
+        write_atomically(self.root / "seconds.json", json.dumps({k: round(v, 3) for k, v in seconds.items()}).encode())
+
+    def seconds(self) -> dict[str, float]:
+        """What each stage of the last finished run took; empty where none did."""
+        try:
+            return {str(stage): float(taken) for stage, taken in json.loads((self.root / "seconds.json").read_bytes()).items()}
+        except (OSError, ValueError, TypeError, AttributeError):
+            return {}
 
     def noun_path(self, stage: str, name: str) -> Path:
         """File of one noun."""
@@ -75,24 +99,24 @@ class Workspace:
         return noun, seconds
 
     def find(self, stage: str, name: str, key: str) -> tuple[Any, float] | None:
-        """The stored noun and its seconds, when its key matches; a damaged file counts as absent."""
+        """The stored noun and its seconds, when its key matches; one that is damaged, or lacks a frame, counts as absent."""
         path = self.noun_path(stage, name)
         try:
             if decode_header(path)["key"] != key:
                 return None
             noun, header = decode_noun(path.read_bytes())
-        except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+            return self._attached(noun, header), float(header["seconds"])
+        except (*_UNREADABLE, CaptureError):
             return None
-        return self._attached(noun), float(header["seconds"])
 
     def load_latest(self, stage: str, name: str) -> Any | None:
         """The stored noun whatever its key (for looking at, never for computing on); None when there is none."""
         path = self.noun_path(stage, name)
         try:
-            noun, _ = decode_noun(path.read_bytes())
-        except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+            noun, header = decode_noun(path.read_bytes())
+        except _UNREADABLE:
             return None
-        return self._attached(noun)
+        return self._attached(noun, header)
 
     def names(self, stage: str) -> list[str]:
         """Names of the nouns a stage has stored."""
@@ -100,7 +124,8 @@ class Workspace:
 
     def save(self, stage: str, name: str, noun: object, header: dict[str, Any]) -> None:
         """Store a noun atomically."""
-        if isinstance(noun, Capture):
+        if isinstance(noun, Capture | Scan):
+            header = {**header, "frames": getattr(noun.images, "store", Path()).name}
             noun = replace(noun, images=None)  # type: ignore[arg-type]  # re-attached by _attached when loaded
         write_atomically(self.noun_path(stage, name), encode_noun(noun, header))
 
@@ -120,12 +145,21 @@ class Workspace:
                 ) from error
             yield
 
-    def _attached(self, noun: Any) -> Any:
-        if not isinstance(noun, Capture):
+    def _attached(self, noun: Any, header: Mapping[str, Any]) -> Any:
+        if not isinstance(noun, Capture | Scan):
             return noun
         from r2c2r_core.ingest.stage import open_images
 
-        return replace(noun, images=open_images(self.frames, noun.frames))
+        return replace(noun, images=open_images(self.store(header.get("frames", "")), noun.frames))
+
+
+def frames_folder(root: Path) -> Path:
+    """Folder of the frames of the capture stored last below a workspace; `capture` itself where none is stored."""
+    try:
+        header = decode_header(root / "nouns" / "ingest" / "scene.noun")
+    except _UNREADABLE:
+        header = {}
+    return root / "capture" / str(header.get("frames", ""))
 
 
 def content_key(*parts: object) -> str:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.align.protocol import NO_MATCH, Features, Matches
+from r2c2r_core.align.protocol import NO_MATCH, Features, Matcher, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.errors import BackendUnavailable
 
@@ -40,7 +40,7 @@ class Pair(NamedTuple):
     mask: Any  # (1, 2, n)
 
 
-class GlueMatcher:
+class GlueMatcher(Matcher):
     """A matcher of SuperPoint keypoints; its two kinds differ in the class and in how it is called."""
 
     class_name: str  # in transformers

@@ -5,13 +5,14 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.align.observe import depth_noise
+from r2c2r_core.align.observe import placing_noise
 from r2c2r_core.align.shape import Shape
-from r2c2r_core.align.view import View
+from r2c2r_core.align.view import OCCLUDER_GAP_M, View
 from r2c2r_core.arrays import DepthMetres, Mask, Points
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3
+from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.model.track import FrontPanel
 
 _SLAB_M = 0.015  # of a front's depth counts as its face: a door is 18-20 mm thick
@@ -66,7 +67,7 @@ def render_pose(shape: Shape, vertices_world: Points, behind: np.ndarray, view: 
     raster = rasterize(vertices_world, shape.faces, attributes, view.camera, view.world_from_camera.inverse)
     depth = raster.depth_m
     hit = depth > 0
-    hidden = hit & ~view.mask & (view.depth_m > 0) & (view.depth_m < depth - 0.03 - 0.02 * depth)
+    hidden = hit & ~view.mask & view.noise.occluded(view.depth_m, depth, OCCLUDER_GAP_M)
     return Rendered(depth, hit & (raster.attributes[..., 0] < _SLAB_M), hidden | ~view.inside)
 
 
@@ -79,17 +80,9 @@ def behind_face(pose: Similarity3, shape: Shape, vertices_world: Points, front: 
 
 
 def face_depth(pose: Similarity3, shape: Shape, front: FrontPanel) -> float:
-    """Where the mesh's broad front face lies along the panel's +Y: the commonest depth of what faces outwards."""
+    """Where the mesh's front plane lies along the panel's +Y."""
     to_front = front.world_from_front.inverse
-    facing = to_front.turn(shape.normals @ pose.rotation.T)[:, 1] < -0.85
-    y = to_front.apply(pose.apply(shape.points))[:, 1]
-    if np.count_nonzero(facing) < 20:
-        return float(np.quantile(y, 0.02))
-    y = y[facing]
-    counts, edges = np.histogram(y, bins=max(int(np.ptp(y) / 0.006), 1))
-    top = int(np.argmax(np.convolve(counts, [1, 1, 1], mode="same")))
-    near = np.abs(y - (edges[top] + edges[top + 1]) / 2) < 0.01
-    return float(np.median(y[near])) if near.any() else float(np.median(y))
+    return front_y(to_front.apply(pose.apply(shape.points)), to_front.turn(shape.normals @ pose.rotation.T))
 
 
 def _judge_view(pose: Similarity3, shape: Shape, vertices: Points, behind: np.ndarray, view: View) -> ViewScore:
@@ -112,7 +105,7 @@ def _depth_agreement(rendered: Rendered, both: Mask, view: View) -> float:
         return 0.0
     slope = cv2.dilate(rendered.depth_m, np.ones((3, 3))) - cv2.erode(rendered.depth_m, np.ones((3, 3)))
     sloped = np.minimum(0.25 * view.depth_px * slope[inner], 0.05)  # nearest depth pixel on a slanted surface
-    sigma = np.hypot(depth_noise(rendered.depth_m[inner]), sloped)
+    sigma = np.hypot(placing_noise(view.noise, rendered.depth_m[inner]), sloped)
     error = (view.depth_m[inner] - rendered.depth_m[inner]) / (3.0 * sigma)
     return float(1.0 - np.minimum(error**2, 1.0).mean())
 

@@ -11,8 +11,11 @@ from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.geometry.camera import pixel_centres, sample_through, unproject
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.views import MaskView, choose_views, stands_open
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Depth, Frame
 from r2c2r_core.model.track import MaskTrack
+
+_MESH_M = 0.004  # median distance from scan to mesh over the sample kitchens (benchmarks/baseline.json)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +42,7 @@ def observe(capture: Capture, track: MaskTrack, *, view_count: int, size_px: int
     for frame in frames:
         points.append(frame.world_from_camera.apply(found[frame]))
         towards.append(unit(frame.world_from_camera.translation - points[-1]))
-        noise.append(depth_noise(found[frame][:, 2]))
+        noise.append(placing_noise(capture.depth_noise, found[frame][:, 2]))
         seen_in.append(np.full(len(points[-1]), frame.index))
     all_points = np.concatenate(points)
     keep = main_body(all_points)
@@ -66,9 +69,9 @@ def _silhouette_size(views: tuple[View, ...], centre: Vector3) -> float:
     return float(np.median(np.hypot(boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]) * distance)) if len(views) else 0.0
 
 
-def depth_noise(depth_m: np.ndarray) -> np.ndarray:
-    """Standard deviation to expect of a phone's depth, metres: 4 mm and 3 mm more for each metre of distance."""
-    return 0.004 + 0.003 * depth_m
+def placing_noise(noise: DepthNoise, depth_m: np.ndarray) -> np.ndarray:
+    """Standard deviation to expect between depth and a mesh in its right place, metres: both err."""
+    return np.hypot(noise.sigma(depth_m), _MESH_M)
 
 
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:

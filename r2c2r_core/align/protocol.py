@@ -1,5 +1,6 @@
 """What a keypoint matcher must do, and the table of matchers."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
@@ -27,21 +28,28 @@ NO_MATCH = Matches(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 class Matcher(Protocol):
-    """Finds the same spots in two images. Features are computed once an image and used in many pairs."""
+    """Finds the same spots in two images. Features are computed once an image and used in many pairs.
 
+    A backend names this class as its base, so that the type checker compares them.
+    """
+
+    @abstractmethod
     def describe(self, image: Image, mask: Mask) -> Features:
         """Keypoints of `image` inside `mask`."""
 
+    @abstractmethod
     def match(self, first: Features, second: Features) -> Matches:
         """Pairs that look alike, one to one."""
 
+    @abstractmethod
     def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
         """The pairs with each of the others; a slow matcher may give none for those that look least alike."""
 
 
-MATCHERS = Registry(
+MATCHERS: Registry[Matcher] = Registry(
     seam="matcher",
-    backends=(
+    group="r2c2r.matchers",
+    own=(
         Backend(
             name="sift",
             target="r2c2r_core.align.sift:SiftMatcher",

@@ -15,7 +15,7 @@ from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement, Spr
 _TRUSTED_IOU = 0.6
 
 
-def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes, asset: MeshAsset, matcher: str) -> Placement:
+def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes, asset: MeshAsset, method: str) -> Placement:
     """The placement of `asset` in the best pose; `others` were finished like it and lost, ordered by score."""
     rival = next((t for t in others if turned_otherwise(t, best, case.shape)), None)
     other_size = next((t for t in others if resized(t, best)), None)
@@ -36,7 +36,7 @@ def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes,
         condition=condition,
         unsure=bool(doubts),
         runner_up=None if rival is None else float(np.clip(rival.judgement.score / max(best.judgement.score, 1e-6), 0, 1)),
-        method=f"{best.hypothesis.source} + {matcher}",
+        method=method,
         warnings=(*doubts, *_warnings(best.pose, rms_m, condition, case)),
         spread=spread,
         runner_up_turn_deg=None if rival is None else angle_deg(best.pose, rival.pose),

@@ -14,8 +14,9 @@ from r2c2r_core.align.judge import behind_face, face_depth, render_pose
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation
 from r2c2r_core.align.shape import Shape
-from r2c2r_core.align.view import View
+from r2c2r_core.align.view import OCCLUDER_GAP_M, View
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.camera import ray_slopes
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 
@@ -180,8 +181,7 @@ def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: V
     residual = (view.signed_px[rows, columns] + 0.5) * metres_per_px
     g = view.outwards[rows, columns].astype(np.float64)
     usable = g.any(axis=1)
-    x = (columns + 0.5 - view.camera.cx) / view.camera.fx
-    y = (rows + 0.5 - view.camera.cy) / view.camera.fy
+    x, y = ray_slopes(columns, rows, view.camera)
     points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
     direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
     weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
@@ -193,7 +193,7 @@ def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
     """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
     grown = cv2.dilate(rendered_depth, np.ones((5, 5), np.uint8))
     return np.asarray(
-        (rendered_depth == 0) & (grown > 0) & ~view.mask & (view.depth_m > 0) & (view.depth_m < grown - 0.04 - 0.02 * grown)
+        (rendered_depth == 0) & (grown > 0) & ~view.mask & view.noise.occluded(view.depth_m, grown, OCCLUDER_GAP_M)
     )
 
 

@@ -86,6 +86,11 @@ def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
     return sorted(finished, key=lambda t: (lean_deg(t.pose, case) > 0) * _SCATTER - t.judgement.score)
 
 
+def finish_known(hypothesis: Hypothesis, case: Case) -> Trial:
+    """A pose that is known, finished as a contender is: it stays where nothing better is near."""
+    return _finish(_judged(hypothesis, case, case.observation.views), case)
+
+
 def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
     """Whether it is turned differently; a turn about the axis of a round thing is no difference."""
     if angle_deg(best.pose, trial.pose) < _TURNED_DEG:

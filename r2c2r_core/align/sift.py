@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from r2c2r_core.align.protocol import Features, Matches
+from r2c2r_core.align.protocol import Features, Matcher, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.geometry.descriptors import mutual_pairs
 
 _MARGIN_PX = 12  # kept around the mask: beyond it is background, of which the renders have none
 
 
-class SiftMatcher:
+class SiftMatcher(Matcher):
     """The weight-free matcher."""
 
     def __init__(self, *, keypoints: int = 250, ratio: float = 0.85, contrast: float = 0.02) -> None:

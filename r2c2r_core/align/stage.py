@@ -1,7 +1,8 @@
-"""Place a candidate of unknown pose and scale in the scan (paper §4.3, mended by method.md rows 1-7).
+"""Place a candidate in the scan (paper §4.3, mended by method.md rows 1-7): refined where its generator made it in the room,
+searched for where it comes from elsewhere.
 
-Geometry proposes (all turns of the mesh's box onto the measured box), features add proposals, and one score decides:
-rendered masks, depth and colours against the photos. Nothing but the mesh's surface and texture is used of the asset.
+The search: geometry proposes (all turns of the mesh's box onto the measured box), features add proposals, and one score
+decides: rendered masks, depth and colours against the photos. It uses nothing but the mesh's surface and texture.
 """
 
 from dataclasses import dataclass
@@ -15,35 +16,58 @@ from r2c2r_core.align.observe import Observation, observe
 from r2c2r_core.align.protocol import MATCHERS, Matcher
 from r2c2r_core.align.record import record_placement
 from r2c2r_core.align.render import render_views
-from r2c2r_core.align.search import Case, finish_contenders, try_poses
+from r2c2r_core.align.search import Case, Trial, finish_contenders, finish_known, try_poses
 from r2c2r_core.align.shape import Shape, prepare_shape
 from r2c2r_core.align.view import View, known_corners, look_at
-from r2c2r_core.align.voting import match_views, vote
+from r2c2r_core.align.voting import Votes, match_views, vote
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
+from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlignConfig:
     """Sizes of the search. Pixel sizes are of our own small views, not of a camera."""
 
-    views: int = 9  # photos compared
-    view_px: int = 128
-    match_photos: int = 6
-    match_views: int = 100  # rendered views (the authors': 200)
-    match_px: int = 200
-    points: int = 1600  # observed points kept
-    surface_points: int = 8000  # samples of the mesh
-    face_limit: int = 6000
-    settled: int = 36  # hypotheses rendered and compared
-    refined: int = 8  # of them refined
-    least_iou: float = 0.2  # below it nothing is trustworthy
-    weights: str = ""  # of a learned matcher: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
+    views: int = setting(9, "photos compared with", ge=1, le=200)
+    view_px: int = setting(128, "side of the compared views, in px", ge=16, le=1024)
+    match_photos: int = setting(6, "photos that keypoints are matched in", ge=1, le=200)
+    match_views: int = setting(100, "rendered views that keypoints are matched in (the authors': 200)", ge=1, le=1000)
+    match_px: int = setting(200, "side of those views, in px", ge=16, le=1024)
+    points: int = setting(1600, "observed points kept", ge=10, le=1_000_000)
+    surface_points: int = setting(8000, "samples of the mesh's surface", ge=10, le=1_000_000)
+    face_limit: int = setting(6000, "triangles that a candidate is simplified to", ge=100, le=1_000_000)
+    settled: int = setting(36, "hypotheses rendered and compared", ge=1, le=10_000)
+    refined: int = setting(8, "hypotheses of them that are refined", ge=1, le=1000)
+    least_iou: float = setting(0.2, "overlap with the masks below which no pose is trustworthy", ge=0, le=1)
+    weights: str = setting(
+        "", "of a learned matcher: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placer:
+    """Places any candidate, with these settings."""
+
+    matcher: str
+    config: AlignConfig
+    seed: int = 0
+
+    def __call__(self, capture: Capture, track: MaskTrack, asset: MeshAsset, *, progress: Progress = SILENT) -> Placement:
+        """As place_mesh does."""
+        return place_mesh(capture, track, asset, self.matcher, self.config, seed=self.seed, progress=progress)
+
+
+def place_candidate(
+    capture: Capture, track: MaskTrack, found: CandidateSet, candidate_id: str, place: Placer, *, progress: Progress = SILENT
+) -> Placement:
+    """One of an object's candidates in the room; raises PlacementFailed."""
+    return place(capture, track, found.candidate(candidate_id), progress=progress)
 
 
 def place_mesh(
@@ -62,6 +86,10 @@ def place_mesh(
     observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
     _require_evidence(observation, track)
     shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
+    if asset.world_from_mesh is not None:
+        return _refined(
+            asset, asset.world_from_mesh, Case(shape=shape, observation=observation, track=track, lifted=[]), config
+        )
     progress.at(0.15, f"{asset.object_name}: matching keypoints")
     lifted = _match(capture, track, asset.mesh, observation, _loaded(matcher, config.weights), config)
     case = Case(shape=shape, observation=observation, track=track, lifted=lifted)
@@ -79,20 +107,31 @@ def place_mesh(
         )
     progress.at(0.9, f"{asset.object_name}: finishing")
     best, *others = finish_contenders(trials, case)
+    _require_cover(best, asset, config)
+    return record_placement(best, others, case, votes, asset, f"{best.hypothesis.source} + {matcher}")
+
+
+def _refined(asset: MeshAsset, pose: Similarity3, case: Case, config: AlignConfig) -> Placement:
+    """The candidate where its generator made it, moved as little as masks, depth and colours ask."""
+    best = finish_known(Hypothesis(pose, _upright_axis(case.shape, pose), "generator"), case)
+    _require_cover(best, asset, config)
+    return record_placement(best, [], case, Votes((), {}), asset, "generator's pose, refined")
+
+
+def _require_cover(best: Trial, asset: MeshAsset, config: AlignConfig) -> None:
+    """Raise where even the best pose does not show what the masks show."""
     if best.judgement.iou < config.least_iou:
         raise PlacementFailed(
             f"{asset.object_name}: the best pose of {asset.candidate_id} covers the mask with IoU {best.judgement.iou:.2f}, "
             f"{config.least_iou:.2f} needed",
             hint="choose another candidate, or add a click on a frame that shows more of the object",
         )
-    return record_placement(best, others, case, votes, asset, matcher)
 
 
 @cache
 def _loaded(matcher: str, weights: str) -> Matcher:
     """The matcher, kept for the next object: learned ones take seconds to load."""
-    backend: Matcher = MATCHERS.load(matcher, weights=weights)
-    return backend
+    return MATCHERS.load(matcher, weights=weights)
 
 
 def _require_evidence(observation: Observation, track: MaskTrack) -> None:

@@ -7,11 +7,14 @@ import numpy as np
 from scipy import ndimage
 
 from r2c2r_core.arrays import DepthMetres, Mask, Points, Vector3
-from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, sample_nearest, unproject
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays, project, sample_nearest, unproject
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Depth, Frame
 from r2c2r_core.model.track import MaskTrack
+
+OCCLUDER_GAP_M = 0.03  # a pixel this much nearer than the object, beyond the noise, belongs to something in front of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,6 +28,7 @@ class View:
     mask: Mask
     inside: Mask  # the pixel lies in the photo
     depth_m: DepthMetres  # z-depth of this camera, 0 unknown
+    noise: DepthNoise
     depth_px: float  # width of one depth pixel, in pixels of this view
     signed_px: np.ndarray  # (h, w) float32, distance to the mask's outline, negative inside
     outwards: np.ndarray  # (h, w, 2) float32, unit direction away from the mask; 0 where the outline is as near on both sides
@@ -36,17 +40,21 @@ def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vect
     mask = unpack_mask(track.masks[frame.index])
     camera, turned = _aim(frame, track, mask, centre_world, size_px)
     new_from_old = turned.inverse.rotation @ frame.world_from_camera.rotation
-    rays = np.concatenate(
-        [(pixel_centres(camera) - [camera.cx, camera.cy]) / camera.fx, np.ones((size_px, size_px, 1))], axis=2
-    )
+    rays = pixel_rays(pixel_centres(camera), camera)
     old_rays = rays @ new_from_old  # rows times R: the inverse rotation
     old_rays = old_rays / np.maximum(old_rays[..., 2:], 1e-6)
-    rgb_px = old_rays[..., :2] * [frame.rgb_camera.fx, frame.rgb_camera.fy] + [frame.rgb_camera.cx, frame.rgb_camera.cy]
-    inside = (rgb_px >= 0).all(axis=2) & (rgb_px[..., 0] < frame.rgb_camera.width) & (rgb_px[..., 1] < frame.rgb_camera.height)
+    rgb_px = project(old_rays, frame.rgb_camera)
+    ahead = old_rays[..., 2] > 0
+    inside = (
+        ahead
+        & (rgb_px >= 0).all(axis=2)
+        & (rgb_px[..., 0] < frame.rgb_camera.width)
+        & (rgb_px[..., 1] < frame.rgb_camera.height)
+    )
     colour, small_mask = _resample(capture.images.rgb(frame.index), mask, rgb_px, camera.fx / frame.rgb_camera.fx)
     depth = _turn_depth(frame, capture.images.depth(frame.index), old_rays, new_from_old)
     small_mask &= inside
-    signed, trusted = outline(small_mask, inside, depth)
+    signed, trusted = outline(small_mask, inside, depth, capture.depth_noise)
     return View(
         frame_index=frame.index,
         camera=camera,
@@ -55,6 +63,7 @@ def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vect
         mask=small_mask,
         inside=inside,
         depth_m=depth,
+        noise=capture.depth_noise,
         depth_px=camera.fx / frame.depth_camera.fx,
         signed_px=signed,
         outwards=outward_direction(signed),
@@ -62,7 +71,7 @@ def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vect
     )
 
 
-def outline(mask: Mask, inside: Mask, depth_m: DepthMetres) -> tuple[np.ndarray, Mask]:
+def outline(mask: Mask, inside: Mask, depth_m: DepthMetres, noise: DepthNoise) -> tuple[np.ndarray, Mask]:
     """Signed distance to the mask's outline, and where the nearest outline pixel is the object's own edge.
 
     An outline pixel beside the photo's border, or beside something that stands in front, says nothing about the object.
@@ -78,7 +87,7 @@ def outline(mask: Mask, inside: Mask, depth_m: DepthMetres) -> tuple[np.ndarray,
     own_depth = own[tuple(nearest_known)]
     border = np.ones_like(mask)
     border[1:-1, 1:-1] = False
-    blocked = (~inside | border) | (~mask & (depth_m > 0) & (depth_m < own_depth - 0.03 - 0.02 * own_depth))
+    blocked = (~inside | border) | (~mask & noise.occluded(depth_m, own_depth, OCCLUDER_GAP_M))
     bad_rim = rim & ndimage.binary_dilation(blocked, iterations=3)
     _, nearest_rim = ndimage.distance_transform_edt(~rim, return_indices=True)
     return signed, ~bad_rim[tuple(nearest_rim)]
@@ -128,11 +137,10 @@ def _resample(rgb: np.ndarray, mask: Mask, rgb_px: np.ndarray, zoom: float) -> t
 
 def _turn_depth(frame: Frame, depth: Depth, old_rays: np.ndarray, new_from_old: np.ndarray) -> DepthMetres:
     """Depth of the nearest depth pixel, expressed along the turned camera's axis."""
-    camera = frame.depth_camera
-    uv = old_rays[..., :2] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+    uv = project(old_rays, frame.depth_camera)
     known = np.where(depth.valid, depth.metres, 0.0)
     value, within = sample_nearest(known, uv.reshape(-1, 2))
-    value = np.where(within, value, 0.0).reshape(old_rays.shape[:2])
+    value = np.where(within.reshape(old_rays.shape[:2]) & (old_rays[..., 2] > 0), value.reshape(old_rays.shape[:2]), 0.0)
     return (value * (old_rays @ new_from_old[2])).astype(np.float32)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.align.lift import Lifted, depth_at, lift_render
-from r2c2r_core.align.observe import depth_noise
+from r2c2r_core.align.observe import placing_noise
 from r2c2r_core.align.protocol import Features, Matcher
 from r2c2r_core.align.render import MeshView
 from r2c2r_core.align.view import View
@@ -106,7 +106,7 @@ def _lift_photo(
         photo.frame_index,
         np.concatenate(mesh_points),
         points_world[rows],
-        depth_noise(depth[rows]),
+        placing_noise(photo.noise, depth[rows]),
         rays,
         depth[rows] / photo.camera.fx,
     )

@@ -20,6 +20,8 @@ def add(parsers: Parsers) -> None:
 
 def demo(options: argparse.Namespace) -> int:
     """Sample kitchen, pipeline, certified bundle, and the app opened on it."""
+    app = web_module("serve")
+    app.require_database(options.data)
     folder: Path = options.data / "demo"
     scan, work = folder / "sample" / "scan.r3d", folder / "work"
     if not scan.exists():
@@ -28,7 +30,6 @@ def demo(options: argparse.Namespace) -> int:
     passed = write_bundle(scan, prompts, folder / "kitchen.zip", workdir=work)
     if not passed or options.no_serve:
         return 0 if passed else 1
-    app = web_module("serve")
     project = app.register_finished(options.data, name="Sample kitchen", source=scan, prompts=prompts, workdir=work)
     app.serve(host=options.host, port=options.port, data_dir=options.data, open_project=project)
     return 0

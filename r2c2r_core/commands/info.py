@@ -8,6 +8,7 @@ from typing import Any
 from r2c2r_core.commands.options import Parsers, add_command, add_json, existing, write_json
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.terminal import show_progress, table
+from r2c2r_core.texts import shown
 
 
 def add(parsers: Parsers) -> None:
@@ -43,8 +44,8 @@ def info(options: argparse.Namespace) -> int:
         _write_picture(options.picture, draw_scan(capture))
     print(table(("figure", "value"), report.rows()))
     for line in (*report.reasons, *report.notices):
-        print(f"- {line}")
-    print(f"{source}: {report.verdict}")
+        print(shown(f"- {line}"))
+    print(shown(f"{source}: {report.verdict}"))
     return 1 if report.verdict == "unusable" else 0
 
 

@@ -4,16 +4,20 @@ import argparse
 import importlib
 import json
 import os
+import re
+import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import InputError
 from r2c2r_core.workspace import write_atomically
 
 Command = Callable[[argparse.Namespace], int]
 Parsers = Any  # what ArgumentParser.add_subparsers returns: argparse has no public name for it
 
+_LEAST_SIDE_PX, _MOST_SIDE_PX = 64, 4096  # of a synthetic recording: a phone's videos end at 3840
 DATA = Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r"))
 
 
@@ -31,31 +35,50 @@ def add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the projects (default: %(default)s)")
 
 
+def add_data_folder(parser: argparse.ArgumentParser) -> None:
+    """DATA: the same folder, for commands that are about it."""
+    parser.add_argument("folder", type=Path, nargs="?", default=DATA, metavar="DATA", help="data folder (default: %(default)s)")
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
     """--json: the same findings for a program."""
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON too")
 
 
-def positive(text: str) -> int:
-    """A whole number from 1 up."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text}: expected a positive number")
-    return value
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """Reads a whole number of that range."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch(r"[+-]?\d{1,18}", text) or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"{text[:40]}: expected a whole number from {least} to {most}")
+        return int(text)
+
+    return read
+
+
+seed = whole(0, 2**31 - 1)  # what every generator of random numbers here takes
+port = whole(0, 65535)  # 0: any free one
 
 
 def size(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT in pixels, each from 64 up."""
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) >= 64 and int(height) >= 64):
-        raise argparse.ArgumentTypeError(f"{text}: expected WIDTHxHEIGHT, such as 960x720")
-    return int(width), int(height)
+    """WIDTHxHEIGHT in pixels."""
+    match = re.fullmatch(r"(\d{2,4})[xX](\d{2,4})", text)
+    if match is None or min(int(match[1]), int(match[2])) < _LEAST_SIDE_PX or max(int(match[1]), int(match[2])) > _MOST_SIDE_PX:
+        expected = f"WIDTHxHEIGHT, such as 960x720, from {_LEAST_SIDE_PX} to {_MOST_SIDE_PX} each"
+        raise argparse.ArgumentTypeError(f"{text[:40]}: expected {expected}")
+    return int(match[1]), int(match[2])
 
 
 def existing(path: Path) -> Path:
-    """A path that is there."""
-    if not path.exists():
-        raise InputError(f"{path}: no such file or folder", hint="check the path")
+    """A file or folder that is there."""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(f"{path}: no such file or folder", hint="check the path") from error
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}", hint="check the path") from error
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # a pipe would be waited for
+        raise InputError(f"{path}: {kind_of_file(mode)}", hint="give a file or a folder")
     return path
 
 

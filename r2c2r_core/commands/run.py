@@ -5,13 +5,18 @@ import math
 import shutil
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from r2c2r_core.commands.options import Parsers, add_command, existing
+from r2c2r_core.commands.options import Parsers, add_command, existing, seed, whole
 from r2c2r_core.errors import InputError
 from r2c2r_core.terminal import show_progress, table
+from r2c2r_core.texts import shown
+
+if TYPE_CHECKING:
+    from r2c2r_core.config import ReconstructConfig
 
 
 def add(parsers: Parsers) -> None:
@@ -25,7 +30,11 @@ def add(parsers: Parsers) -> None:
     added.add_argument("--config", type=Path)
     for seam in ("segmenter", "generator", "matcher"):
         added.add_argument(f"--{seam}")
-    added.add_argument("--seed", type=int, default=0)
+    added.add_argument("--fixtures", help="what makes carcasses: boards (default), or scene-synthesizer, the paper's")
+    added.add_argument("--seed", type=seed, default=0)
+    added.add_argument(
+        "--workers", type=whole(0, 64), default=0, help="objects computed side by side; 0: as cores and memory allow"
+    )
     added.add_argument("--masks", type=Path, help="write DIR/<object>/<frame:06d>.png")
 
 
@@ -39,7 +48,9 @@ def run(options: argparse.Namespace) -> int:
         overrides=options.overrides,
         config=options.config,
         tools=_given(options, "segmenter", "generator", "matcher"),
+        fixtures=options.fixtures,
         seed=options.seed,
+        workers=options.workers,
         masks=options.masks,
     )
     return 0 if passed else 1
@@ -54,12 +65,14 @@ def write_bundle(
     overrides: Path | None = None,
     config: Path | None = None,
     tools: Mapping[str, str] = MappingProxyType({}),
+    fixtures: str | None = None,
     seed: int = 0,
+    workers: int = 0,
     masks: Path | None = None,
 ) -> bool:
     """Reconstruct, say what came out, and copy the bundle there; whether it is certified and complete.
 
-    `tools` are names of backends by seam: segmenter, generator, matcher.
+    `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` wins over the configuration's.
     """
     from r2c2r_core.config import ReconstructConfig, read_config
     from r2c2r_core.disk import explained_io
@@ -74,15 +87,15 @@ def write_bundle(
         source=capture,
         prompts=read_prompts(prompts),
         overrides=read_overrides(overrides) if overrides else NO_OVERRIDES,
-        config=read_config(config) if config else ReconstructConfig(),
+        config=_with_fixtures(read_config(config) if config else ReconstructConfig(), fixtures),
         tools=Tools(**tools),
         seed=seed,
     )
-    for line in restricted_licences(request.tools):
+    for line in restricted_licences(request):
         print(f"r2c2r: {line}", file=sys.stderr)
     work = Workspace(workdir or destination.with_suffix(".work"))
     with show_progress() as progress:
-        outcome = reconstruct(request, work, progress=progress)
+        outcome = reconstruct(request, work, workers=workers, progress=progress)
     assert outcome.reconstruction is not None
     assert outcome.certificate is not None
     with explained_io(destination):
@@ -93,14 +106,19 @@ def write_bundle(
     if not outcome.computed:
         print("nothing changed: every stage was reused")
     print(_summary(outcome.reconstruction))
+    print(", ".join(f"{stage} {taken:.1f} s" for stage, taken in outcome.seconds.items()))
     for name, reason in outcome.failures.items():
-        print(f"r2c2r: {name} is not in the bundle: {reason}", file=sys.stderr)
+        print(shown(f"r2c2r: {name} is not in the bundle: {reason}"), file=sys.stderr)
     print(f"{destination}: certificate {'passed' if outcome.certificate.passed else 'FAILED'}")
     return outcome.certificate.passed and not outcome.failures
 
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, str]:
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def _with_fixtures(config: "ReconstructConfig", name: str | None) -> "ReconstructConfig":
+    return config if name is None else replace(config, synthesize=replace(config.synthesize, fixtures=name))
 
 
 def _write_masks(reconstruction: Any, folder: Path) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from r2c2r_core.commands.options import Parsers, add_command, positive, size
+from r2c2r_core.commands.options import Parsers, add_command, seed, size, whole
 from r2c2r_core.terminal import show_progress
 
 
@@ -11,14 +11,14 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "sample", sample)
     added.add_argument("out", type=Path)
-    added.add_argument("--seed", type=int, default=0)
+    added.add_argument("--seed", type=seed, default=0)
     added.add_argument("--opened", action="store_true", help="a drawer and a door stand open in the later frames")
     add_size(added)
 
 
 def add_size(parser: argparse.ArgumentParser) -> None:
     """How long and how large the recording is."""
-    parser.add_argument("--frames", type=positive, default=180)
+    parser.add_argument("--frames", type=whole(1, 10_000), default=180)
     parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH")
 
 

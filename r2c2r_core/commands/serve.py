@@ -2,7 +2,7 @@
 
 import argparse
 
-from r2c2r_core.commands.options import Parsers, add_command, add_data, positive, web_module
+from r2c2r_core.commands.options import Parsers, add_command, add_data, port, web_module, whole
 
 
 def add(parsers: Parsers) -> None:
@@ -10,20 +10,37 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "serve", serve)
     add_address(added)
     add_data(added)
-    added.add_argument("--jobs", type=positive, default=1, help="heavy jobs at a time (default: %(default)s)")
-    added.add_argument("--max-upload", type=positive, default=16, metavar="GB", help="default: %(default)s")
+    added.add_argument("--jobs", type=whole(1, 64), default=1, help="heavy jobs at a time (default: %(default)s)")
+    added.add_argument(
+        "--workers", type=whole(0, 64), default=0, help="objects of a job side by side; 0: as cores and memory allow"
+    )
+    added.add_argument("--max-upload", type=whole(1, 1024), default=16, metavar="GB", help="default: %(default)s")
+    quota = "what one person may have at a time: jobs, uploads, upload_gb, samples, projects"
+    added.add_argument("--quota", action="append", default=[], metavar="NAME=N", help=quota)
+    added.add_argument("--adopt", action="store_true", help="make projects of folders that the database does not know")
     added.add_argument("--name", action="append", default=[], metavar="HOST", help="another name people reach it by")
+    trust = "believe what the proxy at this address says of who asks, and whether by TLS (X-Forwarded-For, X-Forwarded-Proto)"
+    added.add_argument("--behind-proxy", action="append", default=[], metavar="ADDRESS", help=trust)
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
     """Where the app listens."""
     parser.add_argument("--host", default="127.0.0.1")
-    parser.add_argument("--port", type=int, default=8000)
+    parser.add_argument("--port", type=port, default=8000)
 
 
 def serve(options: argparse.Namespace) -> int:
     """The web app."""
-    limits = {"heavy_jobs": options.jobs, "max_upload_bytes": options.max_upload * 2**30}
+    limits = {"heavy_jobs": options.jobs, "workers": options.workers, "max_upload_bytes": options.max_upload * 2**30}
+    limits["quotas"] = web_module("settings").quotas_from(options.quota)
     app = web_module("serve")
-    app.serve(host=options.host, port=options.port, data_dir=options.data, names=options.name, **limits)
+    app.serve(
+        host=options.host,
+        port=options.port,
+        data_dir=options.data,
+        names=options.name,
+        behind_proxy=options.behind_proxy,
+        adopt=options.adopt,
+        **limits,
+    )
     return 0

@@ -6,7 +6,6 @@ side, so that a handle's tip counts as little as in the truth, whose boxes leave
 """
 
 import hashlib
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.disk import is_below
+from r2c2r_core.documents import read_json
 from r2c2r_core.errors import BundleError
 from r2c2r_core.evaluate.extents import extent_errors
 from r2c2r_core.evaluate.iou import mask_errors, mask_not_given
@@ -34,8 +35,8 @@ _TRIM = 0.5  # percent of the surface at each end
 def is_dataset(path: Path) -> bool:
     """Whether a folder is a dataset rather than a bundle."""
     try:
-        return bool(json.loads((path / "manifest.json").read_bytes()).get("kind") == _KIND)
-    except (OSError, ValueError, AttributeError):
+        return bool(read_json(path / "manifest.json", BundleError, hint="").get("kind") == _KIND)
+    except (BundleError, AttributeError):
         return False
 
 
@@ -53,21 +54,21 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest, after every file it names was found whole; raises BundleError naming the first that is not."""
     path = folder / "manifest.json"
     try:
-        manifest = json.loads(path.read_bytes())
-        version, files = manifest["version"], dict(manifest["files"])
+        manifest = read_json(path, BundleError, hint="write it with r2c2r dataset")
+        version, files = manifest["version"], {str(k): str(v["sha256"]) for k, v in manifest["files"].items()}
         known = [str(name) for name in manifest["objects"]]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (KeyError, TypeError, AttributeError) as error:
         raise BundleError(f"{path}: not a dataset's manifest ({error})", hint="write it with r2c2r dataset") from error
     if version != _VERSION:
         raise BundleError(f"{path}: version {version}, {_VERSION} expected", hint="write it again with r2c2r dataset")
-    for name, entry in files.items():
+    for name, sha256 in files.items():
         member = folder / name
-        if not member.resolve().is_relative_to(folder.resolve()):
+        if not is_below(member, folder):
             raise BundleError(f"{path}: '{name}' lies outside the dataset")
         if not member.is_file():
             raise BundleError(f"{member}: missing, though the manifest names it", hint="copy the dataset again")
         with member.open("rb") as handle:
-            if hashlib.file_digest(handle, "sha256").hexdigest() != entry["sha256"]:
+            if hashlib.file_digest(handle, "sha256").hexdigest() != sha256:
                 raise BundleError(f"{member}: its checksum differs from the manifest's", hint="copy the dataset again")
     return {**manifest, "objects": known}
 

@@ -1,16 +1,20 @@
 """Masks against the true ones, frame by frame at RGB resolution."""
 
+import struct
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask
+from r2c2r_core.documents import read_bounded
 from r2c2r_core.errors import BundleError
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.report import Metric
 
 MIN_TRUTH_PX = 400
+_PNG = b"\x89PNG\r\n\x1a\n"
+_MOST_PIXELS = 64_000_000  # as of a recording's images
 
 
 def mask_errors(truth: Path, found: Path) -> tuple[Metric, ...]:
@@ -50,16 +54,21 @@ def mask_not_given(reason: str) -> tuple[Metric, ...]:
 
 def read_mask(file: Path, *, like: Mask | None = None) -> Mask:
     """A mask image; raises BundleError when it cannot be read or differs in size from `like`."""
-    image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        raise BundleError(f"{file}: not a readable image", hint="write the masks again with r2c2r run --masks")
-    mask = np.asarray(image) > 127
-    if like is not None and mask.shape != like.shape:
+    again = "write the masks again with r2c2r run --masks"
+    content = read_bounded(file, BundleError, hint=again)
+    if not content.startswith(_PNG) or len(content) < len(_PNG) + 16:  # OpenCV would try some twenty other formats
+        raise BundleError(f"{file}: not a PNG image", hint=again)
+    width, height = struct.unpack(">II", content[16:24])  # IHDR
+    if width * height > _MOST_PIXELS or (like is not None and (height, width) != like.shape):
+        expected = f"at most {_MOST_PIXELS} pixels" if like is None else f"{like.shape[1]}x{like.shape[0]}, as the truth has"
         raise BundleError(
-            f"{file}: {mask.shape[1]}x{mask.shape[0]} pixels, the truth has {like.shape[1]}x{like.shape[0]}",
+            f"{file}: {width}x{height} pixels, {expected}, expected",
             hint="masks are compared at the resolution of the colour frames",
         )
-    return mask
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise BundleError(f"{file}: not a readable image", hint=again)
+    return np.asarray(image) > 127
 
 
 def _mean(values: list[float]) -> float | None:

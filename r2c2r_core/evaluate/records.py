@@ -1,7 +1,7 @@
 """Bundles and truth files as plain records, both in the bundle's world frame."""
 
-import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.documents import MOST_BYTES, parse_json, read_bounded
 from r2c2r_core.errors import BundleError
 from r2c2r_core.geometry.transforms import Rigid3
 
+_TRUTH = "give the truth.json that belongs to the recording; r2c2r sample writes one"
+_FARTHEST = 1e6  # metres; a kitchen has no such number, and squares of larger ones overflow
 _POSE_KEYS = ("capture_from_object", "world_from_object", "pose")
 
 
@@ -53,11 +56,11 @@ class BundleRecord:
 
 def read_bundle(path: Path) -> BundleRecord:
     """The manifest of a bundle, zip or folder; raises BundleError when it cannot be read."""
-    document = _parse(_manifest_bytes(path), path)
+    document = _parse(_manifest_bytes(path), path, "write the bundle again with r2c2r run")
     try:
         world_from_capture = Rigid3.from_matrix(_matrix(document["world_from_capture"]))
         objects = tuple(_object(entry, Rigid3()) for entry in document["objects"])
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise BundleError(
             f"{path}: manifest.json lacks or misstates {error}", hint="write the bundle again with r2c2r run"
         ) from error
@@ -66,26 +69,27 @@ def read_bundle(path: Path) -> BundleRecord:
 
 def read_truth(path: Path, world_from_capture: Rigid3) -> tuple[ObjectRecord, ...]:
     """The objects of a truth file, taken from the capture frame into the world; raises BundleError."""
-    try:
-        document = _parse(path.read_bytes(), path)
-    except OSError as error:
-        raise BundleError(f"{path}: cannot be read ({error.strerror})", hint="give the truth.json of the sample") from error
+    document = _parse(read_bounded(path, BundleError, hint=_TRUTH), path, _TRUTH)
     try:
         return tuple(_object(entry, world_from_capture) for entry in document["objects"])
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise BundleError(f"{path}: an object lacks or misstates {error}", hint="see the truth format in the README") from error
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise BundleError(f"{path}: an object lacks or misstates {error}", hint=_TRUTH) from error
 
 
 def _manifest_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
-            return (path / "manifest.json").read_bytes()
+            return read_bounded(path / "manifest.json", BundleError, hint="give a bundle's zip or folder")
         with zipfile.ZipFile(path) as bundle:
             names = [name for name in bundle.namelist() if name.split("/")[-1] == "manifest.json" and name.count("/") <= 1]
             if not names:
                 raise BundleError(f"{path}: no manifest.json inside", hint="give a bundle written by r2c2r run")
+            if bundle.getinfo(names[0]).file_size > MOST_BYTES:
+                raise BundleError(
+                    f"{path}: manifest.json of more than {MOST_BYTES >> 20} MiB", hint="write it again with r2c2r run"
+                )
             return bundle.read(names[0])
-    except zipfile.BadZipFile as error:
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
         raise BundleError(f"{path}: not a zip, or truncated", hint="give a bundle written by r2c2r run") from error
     except OSError as error:
         raise BundleError(
@@ -93,13 +97,10 @@ def _manifest_bytes(path: Path) -> bytes:
         ) from error
 
 
-def _parse(content: bytes, path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(content)
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BundleError(f"{path}: not valid JSON ({error})") from error
+def _parse(content: bytes, path: Path, hint: str) -> dict[str, Any]:
+    document = parse_json(content, str(path), BundleError, hint=hint)
     if not isinstance(document, dict) or not isinstance(document.get("objects"), list):
-        raise BundleError(f"{path}: expected a JSON object with a list `objects`")
+        raise BundleError(f"{path}: expected a JSON object with a list `objects`", hint=hint)
     return document
 
 
@@ -115,9 +116,13 @@ def _object(entry: dict[str, Any], world_from_file: Rigid3) -> ObjectRecord:
         world_from_object=world_from_file @ Rigid3.from_matrix(_matrix(_pose(entry))),
         joints=tuple(_joint(joint, world_from_file) for joint in joints),
         observed_axes=None if observed is None else (bool(observed[0]), bool(observed[1]), bool(observed[2])),
-        scan_fit=entry.get("scan_fit"),
+        scan_fit=_fit(entry.get("scan_fit")),
         turns_freely=entry.get("symmetry") == "axial",
     )
+
+
+def _fit(values: Any) -> dict[str, float] | None:
+    return None if values is None else {str(key): float(value) for key, value in values.items() if value is not None}
 
 
 def _pose(entry: dict[str, Any]) -> Any:
@@ -145,13 +150,13 @@ def _joint(entry: dict[str, Any], world_from_file: Rigid3) -> JointRecord:
 
 def _vector(values: Any) -> Vector3:
     vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
+    if vector.shape != (3,) or not (np.abs(vector) < _FARTHEST).all():
         raise ValueError(f"three numbers, found {values!r}")
     return vector
 
 
 def _matrix(values: Any) -> np.ndarray:
     matrix = np.asarray(values, dtype=np.float64)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise ValueError(f"a 4x4 matrix, found an array of shape {matrix.shape}")
+    if matrix.shape != (4, 4) or not (np.abs(matrix) < _FARTHEST).all():
+        raise ValueError(f"a 4x4 matrix of metres, found {values!r}")
     return matrix

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from r2c2r_core.model.report import Metric
+from r2c2r_core.texts import shown
 
 _COLUMNS = (
     ("mask_iou", "mask IoU", "{:.3f}"),
@@ -27,7 +28,7 @@ _COLUMNS = (
 def to_text(rows: Sequence[tuple[str, str, Sequence[Metric]]], scene: Sequence[Metric]) -> str:
     """A table with one line an object and the means below; rows are (name, category, metrics)."""
     lines = [("object", "category", *(title for _, title, _ in _COLUMNS))]
-    lines += [(name, category, *_cells(metrics)) for name, category, metrics in rows]
+    lines += [(shown(name), shown(category), *_cells(metrics)) for name, category, metrics in rows]
     lines.append(("mean", "", *_cells(scene)))
     widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
     return "\n".join(

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from r2c2r_core.disk import explained_io
+from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import BundleError
 from r2c2r_core.export.rules.files import is_inside
 
@@ -37,6 +38,7 @@ def write_zip(folder: Path, path: Path) -> None:
 def opened_bundle(path: Path) -> Iterator[Path]:
     """The folder of a bundle: itself, or a zip unpacked to a temporary place; raises BundleError on anything else."""
     if path.is_dir():
+        _refuse_pipes(path)
         yield _top(path, path)
         return
     if not path.is_file():
@@ -45,6 +47,13 @@ def opened_bundle(path: Path) -> Iterator[Path]:
         folder = Path(scratch)
         unpack(path, folder)
         yield _top(folder, path)
+
+
+def _refuse_pipes(folder: Path) -> None:
+    """Raise BundleError for what is neither a file, a folder nor a link to one: whoever reads a pipe waits for ever."""
+    for path in folder.rglob("*"):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise BundleError(f"{path}: {kind_of_file(path.stat().st_mode)}", hint="a bundle holds files and folders only")
 
 
 def unpack(path: Path, folder: Path) -> None:

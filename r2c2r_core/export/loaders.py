@@ -55,7 +55,7 @@ def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readbac
     except _NotThereError as error:
         return LoaderResult(loader=name, state="not tried", detail=str(error))
     except Exception as error:  # a loader may raise anything on a bundle it dislikes: that is its verdict
-        return LoaderResult(loader=name, state="failed", detail=_one_line(f"{type(error).__name__}: {error}"))
+        return LoaderResult(loader=name, state="failed", detail=_one_line(_said(error)))
     lines = differences(expected, found)
     if lines:
         more = f" (and {len(lines) - 3} more)" if len(lines) > 3 else ""
@@ -126,6 +126,13 @@ def _probe(command: list[str], scene: Path) -> dict[str, Any]:
             raise RuntimeError(f"{died}: {words[-1] if words else 'without a word'}")
         document: dict[str, Any] = json.loads(answer.read_text())
     return document
+
+
+def _said(error: Exception) -> str:
+    try:
+        return f"{type(error).__name__}: {error}"
+    except UnicodeDecodeError:  # USD quotes the file it dislikes, whatever its bytes
+        return type(error).__name__
 
 
 def _one_line(text: str) -> str:

@@ -39,10 +39,7 @@ def manifest_of(
         "objects": [
             _object_entry(reconstruction, plan, item, (fits or {}).get(item.name)) for item in reconstruction.scene.objects
         ],
-        "stages": [
-            {"name": run.name, "backend": run.backend, "config": _plain(run.config), "seconds": round(run.seconds, 3)}
-            for run in reconstruction.stages
-        ],
+        "stages": [{"name": run.name, "backend": run.backend, "config": _plain(run.config)} for run in reconstruction.stages],
     }
 
 

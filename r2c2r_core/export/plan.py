@@ -148,7 +148,7 @@ def _on_the_hinge(link: Link, joint: Joint) -> Link:
 
 
 def _moved_box(box: Box, new_from_old: Rigid3) -> Box:
-    return Box(name=box.name, size_m=box.size_m, link_from_box=new_from_old @ box.link_from_box)
+    return replace(box, link_from_box=new_from_old @ box.link_from_box)
 
 
 def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:

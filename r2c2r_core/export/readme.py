@@ -2,12 +2,12 @@
 
 from r2c2r_core.export.manifest import tool_version
 from r2c2r_core.export.plan import Plan
-from r2c2r_core.export.writers.table import FORMATS
+from r2c2r_core.export.writers.table import formats
 
 
 def readme_text(plan: Plan) -> str:
     """The text, wrapped for a terminal."""
-    losses = "\n".join(f"{entry.file}\n" + "\n".join(f"  - {line}" for line in entry.loses) for entry in FORMATS)
+    losses = "\n".join(f"{entry.file}\n" + "\n".join(f"  - {line}" for line in entry.loses) for entry in formats())
     joints = [body.joint_name for body in plan.bodies if body.joint is not None]
     example = joints[0] if joints else "JOINT"
     return _TEMPLATE.format(name=plan.name, version=tool_version(), joints=len(joints), losses=losses, example=example)

@@ -10,8 +10,9 @@ from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
 from r2c2r_core.export.rules.table import RULES, SIMULATION_RULES
 from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
-from r2c2r_core.export.writers.table import FORMATS
+from r2c2r_core.export.writers.table import formats
 from r2c2r_core.model.report import Certificate
+from r2c2r_core.texts import shown
 
 REPORT_VERSION = 1
 
@@ -28,7 +29,7 @@ def report_of(manifest: dict[str, Any], certificate: Certificate, failures: dict
         "certificate": judged,
         "objects": [_object_row(entry) for entry in manifest["objects"]],
         "failures": dict(sorted(failures.items())),
-        "losses": {entry.file: list(entry.loses) for entry in FORMATS},
+        "losses": {entry.file: list(entry.loses) for entry in formats()},
     }
 
 
@@ -253,8 +254,8 @@ def _loaders(loaders: list[dict[str, Any]]) -> str:
 
 
 def _stages(stages: list[dict[str, Any]]) -> str:
-    rows = [[_text(s["name"]), _text(s["backend"] or "–"), f"{s['seconds']:.1f} s"] for s in stages]
-    return "<h2>How it was made</h2>" + _table(["stage", "backend", "time"], rows, numeric=(2,)) if rows else ""
+    rows = [[_text(s["name"]), _text(s["backend"] or "–")] for s in stages]
+    return "<h2>How it was made</h2>" + _table(["stage", "backend"], rows) if rows else ""
 
 
 def _losses(losses: dict[str, list[str]]) -> str:
@@ -302,7 +303,7 @@ def _millimetres(value: float | None) -> str:
 
 
 def _text(value: object) -> str:
-    return html.escape(str(value), quote=True)
+    return html.escape(shown(str(value)), quote=True)
 
 
 _SHORT = {"measured": "m", "inferred": "i", "default": "d", "person": "p"}

@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -21,13 +21,15 @@ from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.review import review_html
 from r2c2r_core.export.scan_fit import scan_fits
+from r2c2r_core.export.seal import check_seal, checksums
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_meshes
-from r2c2r_core.export.writers.table import FORMATS
+from r2c2r_core.export.writers.table import write_formats
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
 
 __all__ = ["ExportConfig", "certificate_to_json", "check_bundle", "write_bundle"]
 
@@ -36,9 +38,11 @@ __all__ = ["ExportConfig", "certificate_to_json", "check_bundle", "write_bundle"
 class ExportConfig:
     """How a bundle is written."""
 
-    texture_max_px: int = 2048  # longest side; WebGL 2 promises no more everywhere
-    keep_folder: bool = False  # leave the unpacked bundle beside the zip, under the zip's name without .zip
-    pictures: bool = True  # a photo beside the model, for each object, in report.html
+    texture_max_px: int = setting(
+        2048, "longest side of a texture, in px: WebGL 2 promises no more everywhere", ge=16, le=16384
+    )
+    keep_folder: bool = setting(False, "whether the unpacked bundle stays beside the zip, under its name without .zip")
+    pictures: bool = setting(True, "whether report.html shows a photo beside the model for each object")
 
 
 def write_bundle(
@@ -61,8 +65,7 @@ def write_bundle(
         folder.mkdir()
         progress.at(0.0, "writing meshes")
         write_meshes(plan, folder, config.texture_max_px)
-        for entry in progress.part(0.05, 0.1).each(FORMATS, "writing"):
-            entry.write(plan, folder / entry.file)
+        write_formats(plan, folder, progress=progress.part(0.05, 0.1))
         fits = scan_fits(reconstruction, plan, progress=progress.part(0.1, 0.2))
         manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build(), fits)
         _write_json(folder / "manifest.json", manifest)
@@ -72,10 +75,10 @@ def write_bundle(
         pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4)) if config.pictures else {}
         certificate = certify(folder, progress=progress.part(0.4, 0.9))
         manifest = with_blockers(manifest, plan, certificate.joints)
-        _write_json(folder / "manifest.json", manifest)
         _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
         review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
         (folder / "review.html").write_text(review, encoding="utf-8")
+        _write_json(folder / "manifest.json", manifest | {"files": checksums(folder)})  # last: it vouches for the others
         progress.at(0.9, "packing")
         write_zip(folder, scratch / "bundle.zip")
         (scratch / "bundle.zip").replace(destination)
@@ -86,9 +89,16 @@ def write_bundle(
 
 
 def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
-    """Judge a bundle, zip or folder, as it is; raises BundleError on a foreign, truncated or unsafe one."""
+    """Judge a bundle, zip or folder, as it is, and whether its files are those that were certified when it was written.
+
+    Raises BundleError on a foreign, truncated or unsafe one.
+    """
     with opened_bundle(path) as folder, explained_io(path):
-        return certify(folder, sapien_python=sapien_python, progress=progress)
+        differences = check_seal(folder)
+        certificate = certify(folder, sapien_python=sapien_python, progress=progress)
+    changed = any(found.severity == "error" for found in differences)
+    findings = sorted((*certificate.findings, *differences), key=lambda found: found.severity)
+    return replace(certificate, passed=certificate.passed and not changed, findings=tuple(findings))
 
 
 def _write_reports(

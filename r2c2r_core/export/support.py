@@ -97,7 +97,7 @@ def _plate(thing: Body, points: Points) -> Body:
     link = Link(
         name=name,
         object_from_link=Rigid3(),
-        boxes=(Box(name="plate", size_m=size, link_from_box=Rigid3()),),
+        boxes=(Box(name="plate", role="carcass", size_m=size, link_from_box=Rigid3()),),
         pieces=(),
         visual=None,
         colour=(0.82, 0.82, 0.8),

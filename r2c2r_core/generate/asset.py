@@ -1,23 +1,31 @@
-"""From a posed shape to an asset: its place is thrown away, its measures kept."""
+"""From a shape to an asset: about a unit cube, with its place where that is known, and its measures."""
 
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Image, Points, TextureCoords
 from r2c2r_core.geometry.meshes import oriented_extents, volume
+from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.mesh import TexturedMesh
+
+
+def centred(
+    vertices: Points, source: np.ndarray, faces: Faces, uv: TextureCoords, texture: Image
+) -> tuple[TexturedMesh, Similarity3]:
+    """The mesh about its middle, its largest side 1, and the similarity that takes it back to where `vertices` are.
+
+    `source` names the vertex behind each skin vertex; they are moved before they are copied, so seams stay exactly shut.
+    """
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, longest = (low + high) / 2, float((high - low).max())
+    unit = (vertices - middle) / longest
+    return TexturedMesh(vertices=unit[source], faces=faces, uv=uv, texture=texture), Similarity3(longest, np.eye(3), middle)
 
 
 def unposed(
     vertices: Points, source: np.ndarray, faces: Faces, uv: TextureCoords, texture: Image, rng: np.random.Generator
 ) -> TexturedMesh:
-    """The mesh in a frame of its own: randomly turned about any axis, centred, its largest side 1 (as TRELLIS returns).
-
-    `source` names the vertex behind each skin vertex; they are turned before they are copied, so seams stay exactly shut.
-    """
-    turned = vertices @ random_rotation(rng).T
-    low, high = turned.min(axis=0), turned.max(axis=0)
-    unit = (turned - (low + high) / 2) / float((high - low).max())
-    return TexturedMesh(vertices=unit[source], faces=faces, uv=uv, texture=texture)
+    """The mesh in a frame of its own: randomly turned about any axis, centred, its largest side 1 (as TRELLIS returns)."""
+    return centred(vertices @ random_rotation(rng).T, source, faces, uv, texture)[0]
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,7 @@ from r2c2r_core.generate.charts import Atlas
 from r2c2r_core.generate.consistency import render_depth, sensor_depth
 from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.unseen import fill_unseen, own_texels, spread_colours
-from r2c2r_core.geometry.camera import sample_nearest
+from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
 
 _LEAST_COSINE = 0.2
@@ -119,16 +119,14 @@ def _look_up(view: View, in_camera: np.ndarray, depth: np.ndarray, grazing: np.n
     sides, where a mask that is a pixel too wide smears the neighbour over a hand's breadth, depth must confirm the surface.
     """
     z = in_camera[:, 2]
-    ahead = np.where(z > 0.05, z, np.float32(np.nan))
     camera = view.rgb_camera
-    uv = np.stack([camera.fx * in_camera[:, 0] / ahead + camera.cx, camera.fy * in_camera[:, 1] / ahead + camera.cy], axis=1)
+    uv = np.where(z[:, None] > 0.05, project(in_camera, camera), np.float32(np.nan))
     in_mask, inside = sample_nearest(moved_edge(view.mask, -max(1.0, _EDGE_SHARE * np.sqrt(view.mask.sum()))), uv)
     surface, _ = sample_nearest(depth, uv * (depth.shape[1] / camera.width, depth.shape[0] / camera.height))
     sensor = sensor_depth(view, depth.shape)
     measured, _ = sample_nearest(sensor, uv * (depth.shape[1] / camera.width, depth.shape[0] / camera.height))
-    tolerance = _SENSOR_GAP_M + 0.01 * z
-    hidden = (measured > 0) & (measured < z - tolerance)
-    beyond = (measured > z + tolerance) & grazing
+    hidden = view.noise.occluded(measured, z, _SENSOR_GAP_M)
+    beyond = view.noise.seen_through(measured, z, _SENSOR_GAP_M) & grazing
     return _sample_bilinear(view.rgb, uv), inside & in_mask & (z < surface + _HIDDEN_M) & ~hidden & ~beyond
 
 
@@ -166,10 +164,11 @@ def _grey(colours: Colours) -> np.ndarray:
 
 def _median_shown(grey: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """Lower median over the views that show each texel (highlights are bright)."""
-    ordered = np.sort(np.where(shown, grey, np.inf), axis=0)
+    ordered = np.where(shown, grey, np.float32(np.inf)).T.copy()  # numpy sorts rows that lie together faster
+    ordered.sort(axis=1)
     middle = np.maximum(shown.sum(axis=0) - 1, 0) // 2
-    values = np.take_along_axis(ordered, middle[None], axis=0)[0]
-    return np.asarray(np.where(np.isfinite(values), values, 0.0), dtype=np.float32)
+    values = ordered[np.arange(len(middle)), middle]
+    return np.asarray(np.where(np.isfinite(values), values, np.float32(0.0)))
 
 
 def _gain(grey: np.ndarray, median: np.ndarray, shown: np.ndarray) -> float:

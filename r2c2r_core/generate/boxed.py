@@ -11,13 +11,14 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, View, masked_points
 from r2c2r_core.generate.hypothesis import Hypothesis
-from r2c2r_core.generate.priors import DepthBehind, DepthSource, category_depth, depths_behind, distinct, next_sizes
+from r2c2r_core.generate.priors import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
 from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.relief import NO_RELIEF, BoxPart, Relief, handle_parts, measure_relief
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontPanel, ThingBox
 
 HandleStyle = Literal["bar", "block", "none"]
@@ -45,7 +46,8 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
     track, front = evidence.track, evidence.track.front
     if front is None:
         raise GenerationFailed(f"{track.name}: no front rectangle was measured", hint="add a click that faces it")
-    known = depths_behind(evidence.capture, front.world_from_front, front.width_m, front.height_m, track.category)
+    category = category_of(track.category)
+    known = depths_behind(evidence.capture, front.world_from_front, front.width_m, front.height_m, category)
     depths = distinct([*known, *next_sizes(known[0].depth_m)])
     relief = cache(partial(measure_relief, front))  # the guesses of one draw share it
 
@@ -130,13 +132,13 @@ def _scale(behind: DepthBehind, variation: Variation) -> float:
 
 def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[tuple[DepthBehind, ...], float]:
     """The depth its sides show, where they were seen; else what furniture may have. And the least, which was seen."""
-    category = evidence.track.category
+    category = category_of(evidence.track.category)
     width, thought, height = (float(v) for v in box.dimensions_m)
     end = rear_edge(low, high, evidence.pool, box.world_from_object)
     measured = end - float(low[1])
     front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, float(low[1]), 0.0]]))[0])
     assumed = depths_behind(evidence.capture, front, width, height, category)
-    if measured > _MOST_HIDDEN * category_depth(category) and _side_seen(box, evidence.pool):
+    if measured > _MOST_HIDDEN * category.depth.usual and _side_seen(box, evidence.pool):
         return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
     reached = DepthBehind(measured, "points")
     return distinct([b if b.depth_m >= measured else reached for b in assumed]), measured

@@ -6,13 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.errors import GenerationFailed
-from r2c2r_core.generate.asset import shape_metrics, unposed
+from r2c2r_core.generate.asset import centred, shape_metrics
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.consistency import JUDGES, self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
+from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.standing import stands
 from r2c2r_core.generate.things import thing_hypotheses
@@ -25,7 +26,7 @@ _FINEST_TEXEL_M = 0.0012  # a phone at 1 m sees 1.3 mm per pixel
 _THING_PX = 512
 
 
-class Completion:
+class Completion(MeshGenerator):
     """Boxes for furniture, clean solids or carved ones for things."""
 
     def __init__(self) -> None:
@@ -41,12 +42,12 @@ class Completion:
         shape, variation = guess.shape, guess.variation
         # a bare side may show in a few frames only, so furniture is pictured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
-        turned = _generator(evidence, candidate_id, seed)
         picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m)
+        mesh, local_from_mesh = centred(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture)
         return MeshAsset(
             object_name=evidence.track.name,
             candidate_id=candidate_id,
-            mesh=unposed(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture, turned),
+            mesh=mesh,
             generator="completion",
             seed=seed,
             watertight=True,
@@ -54,6 +55,7 @@ class Completion:
             metrics={**_metrics(shape, evidence), "seen_fraction": picture.seen_fraction},
             parameters={**variation.parameters, **shape.parameters},
             warnings=shape.warnings,
+            world_from_mesh=shape.world_from_local @ local_from_mesh,
             assumes=guess.assumes,
         )
 

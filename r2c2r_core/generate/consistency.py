@@ -7,9 +7,10 @@ import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Faces, Mask, Points
 from r2c2r_core.generate.evidence import View
-from r2c2r_core.geometry.camera import sample_nearest
+from r2c2r_core.geometry.camera import sample_through
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.geometry.visibility import DepthNoise
 
 _RENDER_PX = 240  # long side of the view; finer changes the IoU by less than its noise
 _OCCLUDER_GAP_M = 0.05
@@ -29,10 +30,10 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
         depth = render_depth(vertices_world, faces[maskable], view)
         sensor = sensor_depth(view, depth.shape)
         mask = mask_at(view, depth.shape)
-        overlap = _visible_iou(depth, sensor, mask)
+        overlap = _visible_iou(depth, sensor, mask, view.noise)
         if not maskable.all():
             whole = render_depth(vertices_world, faces, view)
-            overlap = max(overlap, _visible_iou(whole, sensor, mask))
+            overlap = max(overlap, _visible_iou(whole, sensor, mask, view.noise))
         overlaps.append(overlap)
         both = (depth > 0) & (sensor > 0) & mask
         if both.sum() >= 20:
@@ -51,7 +52,7 @@ def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) 
     scores = []
     for view in views:
         depth = render_depth(vertices_world, faces, view)
-        scores.append(_visible_iou(depth, sensor_depth(view, depth.shape), mask_at(view, depth.shape)))
+        scores.append(_visible_iou(depth, sensor_depth(view, depth.shape), mask_at(view, depth.shape), view.noise))
     return float(np.mean(scores))
 
 
@@ -72,15 +73,11 @@ def mask_at(view: View, shape: tuple[int, ...]) -> Mask:
 def sensor_depth(view: View, shape: tuple[int, ...]) -> DepthMetres:
     """The measured depth at the pixels of the view's colour crop resized to `shape`; 0 where unknown."""
     rgb = view.rgb_camera.resized(shape[1], shape[0])
-    depth = view.depth_camera
-    u = (np.arange(shape[1]) + 0.5 - rgb.cx) / rgb.fx * depth.fx + depth.cx
-    v = (np.arange(shape[0]) + 0.5 - rgb.cy) / rgb.fy * depth.fy + depth.cy
-    uv = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    values, inside = sample_nearest(view.depth_m, uv)
-    return np.where(inside, values, 0.0).reshape(shape).astype(np.float32)
+    values, inside = sample_through(view.depth_m, view.depth_camera, rgb)
+    return np.where(inside, values, 0.0).astype(np.float32)
 
 
-def _visible_iou(depth: DepthMetres, sensor: DepthMetres, mask: Mask) -> float:
+def _visible_iou(depth: DepthMetres, sensor: DepthMetres, mask: Mask, noise: DepthNoise) -> float:
     """IoU of the silhouette with the mask, leaving out pixels where something nearer hides the mesh."""
-    hidden = (sensor > 0) & (depth > 0) & (sensor < depth - _OCCLUDER_GAP_M) & ~mask
+    hidden = (depth > 0) & noise.occluded(sensor, depth, _OCCLUDER_GAP_M) & ~mask
     return mask_iou((depth > 0) & ~hidden, mask)

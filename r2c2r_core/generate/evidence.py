@@ -11,6 +11,7 @@ from r2c2r_core.geometry.camera import Intrinsics, depth_points, sample_through
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands_open, view_scores
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 
@@ -30,6 +31,7 @@ class View:
     world_from_camera: Rigid3
     sharpness: float  # rank among the pool, 0..1
     is_cropped: bool  # the mask touches the image border
+    noise: DepthNoise
 
     @property
     def eye_world(self) -> Vector3:
@@ -142,6 +144,7 @@ def _load_view(capture: Capture, packed: PackedMask, frame: Frame, sharpness: fl
         world_from_camera=frame.world_from_camera,
         sharpness=sharpness,
         is_cropped=is_cropped(packed),
+        noise=capture.depth_noise,
     )
 
 

@@ -106,7 +106,7 @@ def json_object(endpoint: Endpoint, content: bytes) -> dict[str, Any]:
     """The JSON object in an answer's body; raises GenerationFailed when it is none."""
     try:
         answer = json.loads(content)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise GenerationFailed(f"generator at {endpoint.where}: its answer is not JSON") from error
     if not isinstance(answer, dict):
         raise GenerationFailed(f"generator at {endpoint.where}: a JSON object expected, found {type(answer).__name__}")

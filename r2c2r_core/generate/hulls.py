@@ -18,19 +18,20 @@ from r2c2r_core.generate.carved import (
 )
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
-from r2c2r_core.generate.legs import Support, find_support, stands_on_legs
+from r2c2r_core.generate.legs import Support, find_support
 from r2c2r_core.generate.level_set import best_level, surface_at
 from r2c2r_core.generate.shape import Shape, thing_model
 from r2c2r_core.generate.symmetry import fit_revolution
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
+from r2c2r_core.kitchen.names import category_of
 
 _LEAST_SHEETS = 3.0  # a thing less wide than this many boards is solid in any case
 
 
 def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) -> tuple[Hypothesis, ...]:
     """What masks and free space leave, completed in several ways; raises GenerationFailed where there is too little depth."""
-    is_legged = stands_on_legs(evidence.track.category)
+    is_legged = category_of(evidence.track.category).on_legs
 
     @lru_cache(maxsize=1)  # the variants of one draw share it
     def carved(variation: Variation) -> _Carved:

@@ -5,7 +5,6 @@ posts that depth shows say how thick they are and how they lean (masks often lea
 the same, mirrored, where free space lets one stand.
 """
 
-import re
 from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
@@ -20,7 +19,6 @@ from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 
-_LEGGED = re.compile(r"(\w*(chair|stool|desk|bench)|table)(e?s)?")  # armchair, barstools; no vegetable, no turntable
 _CELL_M, _LEVEL_M = 0.02, 0.015
 _LEAST_AREA = 0.3  # of the thing's plan, that its slab covers
 _LOWEST, _HIGHEST_M = 0.3, 1.15  # a slab's height: share of the thing's, and metres
@@ -57,12 +55,6 @@ class Support(NamedTuple):
 
     slab: BoxPart
     posts: tuple[Post, ...]
-
-
-def stands_on_legs(category: str) -> bool:
-    """Whether things of that name are a slab on posts: by its last word, as a table lamp is a lamp."""
-    words = re.findall(r"[a-z]+", category.lower())
-    return bool(words) and _LEGGED.fullmatch(words[-1]) is not None
 
 
 def find_support(carving: Carving, views: Sequence[View]) -> Support | None:

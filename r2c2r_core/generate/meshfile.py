@@ -100,7 +100,7 @@ def _glb_pictures(path: Path) -> list[str]:
     try:
         images = json.loads(chunk).get("images", [])
         return [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]
-    except (ValueError, AttributeError, TypeError):
+    except (ValueError, AttributeError, TypeError, RecursionError):
         return []
 
 
@@ -131,9 +131,13 @@ def _triangles(scene: Any) -> list[Any]:
 def _check_geometries(label: str, geometries: Sequence[Any]) -> None:
     if not geometries:
         raise OverrideError(f"{label}: no triangles found", hint="export the mesh with faces")
+    if not all(g.vertices.ndim == 2 and g.vertices.shape[1] == 3 for g in geometries):  # an OBJ may state two numbers
+        raise OverrideError(f"{label}: vertices that are not three numbers", hint="export it again")
     count = sum(len(g.faces) for g in geometries)
     if count > _MOST_FACES:
         raise OverrideError(f"{label}: {count} triangles, at most {_MOST_FACES} expected", hint="simplify the mesh first")
+    if not all(g.faces.min() >= 0 and g.faces.max() < len(g.vertices) for g in geometries):
+        raise OverrideError(f"{label}: triangles between vertices that are not there", hint="export it again")
     if not all(np.isfinite(g.vertices).all() for g in geometries):
         raise OverrideError(f"{label}: vertices that are not numbers", hint="export it again")
 

@@ -6,32 +6,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Capture
 
-CATEGORY_DEPTH_M = {
-    "drawer": 0.58,
-    "cabinet": 0.58,
-    "double_door_cabinet": 0.58,
-    "sink_cabinet": 0.58,
-    "dishwasher": 0.58,
-    "oven": 0.58,
-    "range": 0.62,
-    "stove": 0.62,
-    "counter": 0.62,
-    "wall_cabinet": 0.33,
-    "hood": 0.45,
-    "microwave": 0.38,
-    "refrigerator": 0.65,
-    "fridge": 0.65,
-}
-"""Outer face of the front to the back (EU catalogues, backends.md §2.6: carcass 0.56 + front 0.02; wall units 0.30-0.35)."""
-
-_DEPTHS_SOLD_M = (0.30, 0.37, 0.48, 0.58, 0.62, 0.75)
-"""Of cabinets with their fronts: carcasses of 28, 35, 46, 56, 60 and 73 cm are what most makers list."""
-
-_DEFAULT_DEPTH_M = 0.5
 _ALIKE_M = 0.015  # depths nearer to each other than this are one guess
-_WALL_RANGE = (0.75, 1.35)  # of the category's depth: a wall outside is another room's, or the front of the next run
+_LEAST_WORKTOP = 0.75  # of the category's depth: a level sheet that ends before is a shelf or a board
 _WALL_GAP_M = 0.005
 _WORKTOP_ABOVE_M = 0.75  # a worktop lies this far at most above the middle drawer of its unit
 _ALONG_M, _LEVEL_M = 0.02, 0.01
@@ -48,36 +29,29 @@ class DepthBehind(NamedTuple):
     source: DepthSource
 
 
-def category_depth(category: str) -> float:
-    """The usual depth of a category, metres."""
-    key = category.strip().lower().replace("-", "_").replace(" ", "_")
-    if key in CATEGORY_DEPTH_M:
-        return CATEGORY_DEPTH_M[key]
-    return next((depth for name, depth in CATEGORY_DEPTH_M.items() if name in key), _DEFAULT_DEPTH_M)
-
-
 def depths_behind(
-    capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: str
+    capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: Category
 ) -> tuple[DepthBehind, ...]:
     """The different depths a front may have, most trusted first.
 
     To the wall behind it where one stands at a plausible distance; to where the worktop on it ends; as deep as its category
     usually is.
     """
-    usual = category_depth(category)
-    near, far = (share * usual for share in _WALL_RANGE)
-    walls = [*_wall_distances(capture, world_from_front), *_surface_distances(capture, world_from_front, width_m, height_m)]
-    found = [DepthBehind(d - _WALL_GAP_M, "wall") for d in sorted(walls, key=lambda d: abs(d - usual))[:1] if near <= d <= far]
-    worktop = _worktop_end(capture, world_from_front, width_m, height_m, near)
-    if worktop is not None and worktop <= far:
+    usual = category.depth.usual
+    wall = wall_behind(capture.room.walls, world_from_front.translation, -world_from_front.rotation[:, 1], category.depth)
+    sheet = _sheet_behind(capture, world_from_front, width_m, height_m)
+    walls = [d for d in (wall, sheet) if d is not None and category.depth.holds(d)]
+    found = [DepthBehind(d - _WALL_GAP_M, "wall") for d in sorted(walls, key=lambda d: abs(d - usual))[:1]]
+    worktop = _worktop_end(capture, world_from_front, width_m, height_m, _LEAST_WORKTOP * usual)
+    if worktop is not None and worktop <= category.depth.high:
         found.append(DepthBehind(worktop, "worktop"))
     return distinct([*found, DepthBehind(usual, "category")])
 
 
 def next_sizes(depth_m: float) -> tuple[DepthBehind, ...]:
     """The next smaller and the next larger depth that cabinets are sold in."""
-    smaller = max((d for d in _DEPTHS_SOLD_M if d < depth_m - _ALIKE_M), default=None)
-    larger = min((d for d in _DEPTHS_SOLD_M if d > depth_m + _ALIKE_M), default=None)
+    smaller = max((d for d in DEPTHS_SOLD_M if d < depth_m - _ALIKE_M), default=None)
+    larger = min((d for d in DEPTHS_SOLD_M if d > depth_m + _ALIKE_M), default=None)
     return tuple(DepthBehind(d, "catalogue") for d in (smaller, larger) if d is not None)
 
 
@@ -86,31 +60,21 @@ def distinct(depths: Sequence[DepthBehind]) -> tuple[DepthBehind, ...]:
     return tuple(b for k, b in enumerate(depths) if all(abs(b.depth_m - other.depth_m) > _ALIKE_M for other in depths[:k]))
 
 
-def _wall_distances(capture: Capture, world_from_front: Rigid3) -> list[float]:
-    """Distances along +Y of the front to the room's walls that are parallel to it."""
-    into, origin = world_from_front.rotation[:, 1], world_from_front.translation
-    return [
-        float((wall.offset_m - wall.normal @ origin) / (wall.normal @ into))
-        for wall in capture.room.walls
-        if wall.normal @ into < -0.97
-    ]
-
-
-def _surface_distances(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float) -> list[float]:
-    """Where the scan shows an upright sheet behind the front, above or below it; at most one."""
+def _sheet_behind(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float) -> float | None:
+    """Where the scan shows an upright sheet behind the front, above or below it."""
     points = world_from_front.inverse.apply(capture.surface.vertices_world)
     beside = (np.abs(points[:, 2]) > height_m / 2 + 0.08) & (np.abs(points[:, 2]) < height_m / 2 + 0.6)
     column = points[beside & (np.abs(points[:, 0]) < width_m / 2) & (points[:, 1] > 0.15) & (points[:, 1] < 1.0)]
     if len(column) < 50:
-        return []
+        return None
     counts, edges = np.histogram(column[:, 1], bins=np.arange(0.15, 1.0, 0.01))
     counts = np.convolve(counts, np.ones(3), mode="same")
     peak = int(np.argmax(counts))
     at_peak = column[np.abs(column[:, 1] - (edges[peak] + 0.005)) < 0.015]
     # a sheet is upright and wide: a worktop edge or a lone object is neither
     if len(at_peak) < 50 or np.ptp(at_peak[:, 2]) < 0.15 or np.ptp(at_peak[:, 0]) < 0.5 * width_m:
-        return []
-    return [float(np.median(at_peak[:, 1]))]
+        return None
+    return float(np.median(at_peak[:, 1]))
 
 
 def _worktop_end(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, least_m: float) -> float | None:

@@ -31,6 +31,7 @@ from r2c2r_core.generate.delivered import delivered_asset
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.exchange import Endpoint, Patience, ask, ask_json, json_object
 from r2c2r_core.generate.meshfile import MeshPart, parts_of_glb
+from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.sampling import Sampling, draw_sampling
 from r2c2r_core.generate.wire import Wish, encode_wish
 from r2c2r_core.model.mesh import MeshAsset
@@ -42,7 +43,7 @@ _POLL_S = 1.0
 _NIM_PX = 768  # it crops to 518; base64 of eight larger pictures would pass 10 MB
 
 
-class Remote:
+class Remote(MeshGenerator):
     """Makes candidates by asking a server."""
 
     def __init__(self, *, url: str, patience: Patience | None = None, progress: Progress = SILENT) -> None:

@@ -14,7 +14,8 @@ from r2c2r_core.generate.shape import Shape, thing_model
 from r2c2r_core.generate.symmetry import Revolution, fit_revolution
 from r2c2r_core.generate.unmasked import with_true_ends
 from r2c2r_core.generate.variation import Variation
-from r2c2r_core.generate.vessel import find_handle, is_open_vessel, vessel_mesh
+from r2c2r_core.generate.vessel import find_handle, vessel_mesh
+from r2c2r_core.kitchen.names import category_of
 
 
 def round_family(evidence: Evidence, everything: Variation) -> tuple[tuple[Hypothesis, ...], bool]:
@@ -54,7 +55,7 @@ def round_family(evidence: Evidence, everything: Variation) -> tuple[tuple[Hypot
         return (), False
     true_ends = with_true_ends(outline, seen.points, everything.views, seen.world_from_local)
     family = [Hypothesis("round, as wide as its outlines", body)]
-    if is_open_vessel(evidence.track.category):
+    if category_of(evidence.track.category).open_vessel:
         family = [Hypothesis("round and hollow", partial(vessel, with_handle=False)), Hypothesis("round and full", full)]
         if find_handle(true_ends, evidence.pool, seen.world_from_local) is not None:
             told = "round and hollow, with the handle its outlines show"

@@ -25,6 +25,7 @@ from r2c2r_core.generate.cutout import bounded, usable_views
 from r2c2r_core.generate.delivered import delivered_asset
 from r2c2r_core.generate.evidence import Evidence, View
 from r2c2r_core.generate.meshfile import parts_of
+from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.model.mesh import MeshAsset
 
@@ -35,7 +36,7 @@ _LEAST_IOU = 0.3  # of a pose worth believing
 _OWN_CODE = ("sam3d_objects", "torch", "torchvision", "moge")  # what its pipeline.yaml may name to be built
 
 
-class Sam3dObjects:
+class Sam3dObjects(MeshGenerator):
     """Makes candidates with InferencePipelinePointMap."""
 
     def __init__(self, *, weights: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cv2
 
-from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed, InputError, R2C2RError
+from r2c2r_core.errors import BackendUnavailable, Cancelled, GenerationFailed, R2C2RError
 from r2c2r_core.generate.consensus import Rule, choose_candidate
 from r2c2r_core.generate.evidence import Evidence, gather_evidence
 from r2c2r_core.generate.protocol import MeshGenerator
@@ -19,12 +19,14 @@ from r2c2r_core.model.mesh import CandidateSet, MeshAsset
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
+from r2c2r_core.schema.settings import setting
 
 log = logging.getLogger(__name__)
 
-GENERATORS = Registry(
+GENERATORS: Registry[MeshGenerator] = Registry(
     "generator",
-    (
+    group="r2c2r.generators",
+    own=(
         Backend(
             name="completion",
             target="r2c2r_core.generate.completion:Completion",
@@ -71,17 +73,17 @@ GENERATORS = Registry(
 class GenerateConfig:
     """How many candidates, from how many frames, and how one is chosen."""
 
-    count: int = 5  # the paper samples up to 10; 5 take about 4 s an object on one core
-    pool_frames: int = 20  # the paper divides the images into 20 intervals (§4.2)
-    rule: Rule = "medoid"  # "mean" is the paper's; see consensus.py for why not
-    weights: str = ""  # of a learned generator: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
-    url: str = field(default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""))  # of the remote generator
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= 10:
-            raise InputError(f"generate.count is {self.count}", hint="choose 1 to 10")
-        if self.pool_frames < 1:
-            raise InputError(f"generate.pool_frames is {self.pool_frames}", hint="choose at least 1")
+    # the paper samples up to 10; 5 take about 4 s an object on one core
+    count: int = setting(5, "1 to 10 candidates an object", ge=1, le=10)
+    pool_frames: int = setting(20, "frames to choose from, one an interval of the recording (paper, 4.2)", ge=1, le=1000)
+    rule: Rule = setting("medoid", "medoid, or mean (the paper's): how one candidate is chosen (consensus.py)")
+    weights: str = setting(
+        "", "of a learned generator: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+    )
+    url: str = field(
+        default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""),
+        metadata={"description": "address of the remote generator; R2C2R_GENERATOR_URL unless said", "max_length": 4000},
+    )
 
 
 def generate_candidates(
@@ -129,8 +131,7 @@ def _count_of(failures: list[str]) -> str:
 def load_generator(name: str, config: GenerateConfig, progress: Progress = SILENT) -> MeshGenerator:
     """The generator of that name with its settings; raises BackendUnavailable with the next step."""
     served = {"url": config.url, "progress": progress} if name == "remote" else {}
-    backend: MeshGenerator = GENERATORS.load(name, weights=config.weights, **served)
-    return backend
+    return GENERATORS.load(name, weights=config.weights, **served)
 
 
 def with_uploads(found: CandidateSet, uploads: tuple[Path, ...], rule: Rule) -> CandidateSet:

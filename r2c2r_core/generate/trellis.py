@@ -13,6 +13,7 @@ from r2c2r_core.generate.cutout import rgba_cutout
 from r2c2r_core.generate.delivered import delivered_asset
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.meshfile import parts_of
+from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.sampling import Sampling, draw_sampling
 from r2c2r_core.model.mesh import MeshAsset
 
@@ -20,7 +21,7 @@ _SIMPLIFY = 0.95  # share of the faces that to_glb removes (its own default; the
 _TEXTURE_PX = 1024
 
 
-class Trellis:
+class Trellis(MeshGenerator):
     """Makes candidates with TrellisImageTo3DPipeline."""
 
     def __init__(self, *, weights: Path) -> None:

@@ -18,8 +18,6 @@ from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.meshes import unite
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 
-_OPEN = ("mug", "cup", "bowl", "pot", "pan", "vase", "bucket", "jug", "pitcher", "tumbler", "planter")
-_CLOSED = ("teapot", "cupboard", "panel")
 _WALL_M, _WALL_SHARE = 0.004, 0.2  # stoneware; never more than this share of the radius
 _FLOOR = 1.5  # walls thick
 _AZIMUTHS = 36
@@ -36,12 +34,6 @@ class VesselHandle(NamedTuple):
 
     azimuth_rad: float
     reach_m: float
-
-
-def is_open_vessel(category: str) -> bool:
-    """Whether things of that name are hollow and open upwards."""
-    words = category.lower().replace("_", " ").split()
-    return any(word.rstrip("s") in _OPEN for word in words) and not any(word in _CLOSED for word in words)
 
 
 def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Points, Faces]:

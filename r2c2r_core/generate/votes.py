@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Points
 from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.variation import Variation
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
 
 _BLOCK = 4  # voxels, each way
@@ -28,7 +28,7 @@ def collect_votes(centres_world: Points, variation: Variation, truncation: float
     """Truncated distances, free-space distances and surface votes over the variation's views."""
     count, votes = len(centres_world), variation.carve_votes
     total, weight = np.zeros(count, np.float32), np.zeros(count, np.float32)
-    free_count, solid = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
+    free_count, solid = np.zeros(count, np.uint16), np.zeros(count, np.uint16)
     largest = np.full((votes, count), -np.inf, np.float32)
     outside = np.full(count, truncation, np.float32)
     points = centres_world.astype(np.float32)
@@ -98,11 +98,10 @@ def _view_distances(
     q = points_world @ camera_from_world.rotation.T.astype(np.float32) + camera_from_world.translation.astype(np.float32)
     z = q[:, 2]
     ahead = z > 0.05
-    safe = np.where(ahead, z, np.float32(1.0))
-    depth, has_depth = _lookup(view.depth_m, q, safe, view.depth_camera)
+    depth, has_depth = sample_nearest(view.depth_m, project(q, view.depth_camera))
     has_depth &= ahead & (depth > 0)
     margin_px = erosion_px * 0.5 * view.rgb_camera.fx / view.depth_camera.fx
-    outside_px, in_image = _lookup(_outside_distance(view.mask), q, safe, view.rgb_camera)
+    outside_px, in_image = sample_nearest(_outside_distance(view.mask), project(q, view.rgb_camera))
     in_image &= ahead
     inside = in_image & (outside_px < -margin_px)
     signed = depth - z
@@ -119,12 +118,3 @@ def _outside_distance(mask: np.ndarray) -> np.ndarray:
     mask = moved_edge(mask, 0.0).astype(np.uint8)
     outside = cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3)
     return np.asarray(outside - cv2.distanceTransform(mask, cv2.DIST_L2, 3), dtype=np.float32)
-
-
-def _lookup(image: np.ndarray, q: np.ndarray, z: np.ndarray, camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
-    """Values of the pixels that contain the camera-frame points, and whether they lie inside the image."""
-    u = q[:, 0] / z * np.float32(camera.fx) + np.float32(camera.cx)
-    v = q[:, 1] / z * np.float32(camera.fy) + np.float32(camera.cy)
-    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    index = np.where(inside, v, 0).astype(np.int32) * camera.width + np.where(inside, u, 0).astype(np.int32)
-    return image.ravel()[index], inside

@@ -10,8 +10,9 @@ POST /v1/mesh carries these parts:
 | context | once           | a noun file (codec.py) with the object's measures and the room: for our own generators |
 
 params: {"version": 1, "object": name, "category": text, "candidate": id, "seed": int, "views": [{"frame": int,
-"rgb_camera": camera, "depth_camera": camera, "world_from_camera": 4x4 rows, "sharpness": 0..1, "cropped": bool}]}; the n-th
-view is of the n-th image and depth; camera: {"fx", "fy", "cx", "cy", "width", "height"} in pixels of that picture, pixel
+"rgb_camera": camera, "depth_camera": camera, "world_from_camera": 4x4 rows, "sharpness": 0..1, "cropped": bool,
+"depth_noise": {"floor_m", "per_m"}}]}; the n-th view is of the n-th image and depth; depth errs by floor_m + per_m * z, one
+sigma; camera: {"fx", "fy", "cx", "cy", "width", "height"} in pixels of that picture, pixel
 centres at i + 0.5; camera axes as OpenCV (+X right, +Y down, +Z forward), world metres with +Z up. A server that knows
 only pictures reads `image` and `seed` and leaves the rest.
 """
@@ -32,6 +33,7 @@ from r2c2r_core.generate.cutout import bounded, png_of
 from r2c2r_core.generate.evidence import Evidence, View
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Depth, Room, SceneSurface
 from r2c2r_core.model.track import MaskTrack
 
@@ -122,6 +124,7 @@ def _view_entry(view: View) -> dict[str, Any]:
         "rgb_camera": asdict(view.rgb_camera),
         "depth_camera": asdict(view.depth_camera),
         "world_from_camera": view.world_from_camera.matrix.tolist(),
+        "depth_noise": asdict(view.noise),
         "sharpness": view.sharpness,
         "cropped": view.is_cropped,
     }
@@ -141,6 +144,7 @@ def _view(entry: dict[str, Any], png: bytes, depth: bytes) -> View:
         depth_m=np.load(io.BytesIO(depth), allow_pickle=False),
         depth_camera=Intrinsics(**entry["depth_camera"]),
         world_from_camera=Rigid3(matrix[:3, :3], matrix[:3, 3]),
+        noise=DepthNoise(**entry.get("depth_noise", {})),
         sharpness=float(entry["sharpness"]),
         is_cropped=bool(entry["cropped"]),
     )

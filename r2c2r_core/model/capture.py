@@ -1,6 +1,6 @@
 """A recording, levelled: posed frames and what the whole room looks like."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 
 
 class Depth(NamedTuple):
@@ -90,6 +91,22 @@ class SceneSurface:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scan:
+    """A recording as it was read, before it is levelled: `world` is the recording's own here, whichever way its up is."""
+
+    name: str
+    sha256: str
+    format: str
+    frames: tuple[Frame, ...]
+    surface: SceneSurface
+    images: FrameImages
+    up_capture: Vector3 | None  # what the recording says of gravity
+    notices: tuple[str, ...]
+    poses: PoseEvidence
+    depth_noise: DepthNoise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Capture:
     """A levelled recording."""
 
@@ -103,6 +120,7 @@ class Capture:
     images: FrameImages
     notices: tuple[str, ...]  # one line each, for a person
     poses: PoseEvidence | None = None  # None: not examined
+    depth_noise: DepthNoise = field(default_factory=DepthNoise)
 
     @property
     def as_recorded(self) -> "Capture":

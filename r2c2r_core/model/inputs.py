@@ -1,7 +1,8 @@
 """What people give: prompts and overrides. They are inputs, so a re-run flows forward and never back."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
 
 from r2c2r_core.arrays import Matrix4, Vector3
 
@@ -34,6 +35,13 @@ class Prompts:
     objects: tuple[ObjectPrompt, ...]
 
 
+class JointLimits(NamedTuple):
+    """What a person said about one joint, in rad or m; None is computed."""
+
+    lower: float | None
+    upper: float | None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjectOverride:
     """What a person corrected about one object; None is computed."""
@@ -42,8 +50,9 @@ class ObjectOverride:
     hinge: HingeSide | None = None
     dimensions_m: Vector3 | None = None  # width, depth, height
     pose: Matrix4 | None = None  # world_from_object
-    joint_lower: float | None = None
+    joint_lower: float | None = None  # of its only joint; rad or m
     joint_upper: float | None = None
+    joints: Mapping[str, JointLimits] = field(default_factory=dict)  # by the joint's name or its part's
     front_world: Vector3 | None = None  # direction the front faces, in the world
     rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
     regenerate: int = 0  # times a reviewer asked for further candidates
@@ -58,6 +67,11 @@ class Overrides:
     floor_m: float | None = None  # height of the floor along up_capture, in the capture frame
     manhattan_yaw_rad: float | None = None
     walls: tuple[Vector3, ...] | None = None  # each (x, y, offset): normal in plan, into the room; world frame
+
+    @property
+    def room(self) -> "Overrides":
+        """Only what was said of the room."""
+        return replace(self, objects={})
 
     def of(self, name: str) -> ObjectOverride:
         """The object's corrections; empty when there are none."""

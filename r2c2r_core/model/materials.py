@@ -57,32 +57,32 @@ HOOD = Material(
     weight_kg=(8.0, 16.0),
 )
 
+WASHING_MACHINE = Material(
+    density_kg_m3=210.0,
+    source="sellers' tables: front loaders for 7-9 kg of laundry 55-85 kg, ballast included; over the whole box",
+    weight_kg=(55.0, 85.0),
+)
+
 _STONEWARE = "own estimate: stoneware and porcelain weigh 2.0-2.4 g/cm3"
 
-THINGS: dict[str, Material] = {
-    "bottle": Material(
-        density_kg_m3=950.0,
-        source="own estimate: 0.25-1.5 l of water or oil (0.92-1.0 kg/l) and 20-500 g of bottle",
-        weight_kg=(0.2, 2.2),
-    ),
-    "can": Material(density_kg_m3=1000.0, source="own estimate: filled cans of 0.33-0.85 l", weight_kg=(0.3, 1.0)),
-    "mug": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; mugs of 0.25-0.4 l 250-450 g", weight_kg=(0.2, 0.5)),
-    "cup": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; cups 120-350 g", weight_kg=(0.12, 0.35)),
-    "bowl": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; bowls of 14-25 cm 300-1200 g", weight_kg=(0.2, 1.2)),
-    "plate": Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; plates of 18-28 cm 300-900 g", weight_kg=(0.2, 0.9)),
-    "box": Material(
-        density_kg_m3=350.0, source="own choice: filled cartons, flour 600 and cereal 120 kg/m3", weight_kg=(0.05, 12.0)
-    ),
-    "chair": Material(
-        density_kg_m3=120.0,
-        source="own estimate: wooden kitchen chairs weigh 4-8 kg; over the hulls of its parts, air between them",
-        weight_kg=(3.5, 8.0),
-    ),
-    "toaster": Material(density_kg_m3=300.0, source="own estimate: two-slice toasters 1-2 kg", weight_kg=(0.9, 2.5)),
-    "kettle": Material(density_kg_m3=400.0, source="own estimate: kettles of 1-1.7 l 0.8-1.5 kg, empty", weight_kg=(0.7, 3.0)),
-}
-"""By category, for things whose mesh and colliders are their own."""
-
+BOTTLE = Material(
+    density_kg_m3=950.0,
+    source="own estimate: 0.25-1.5 l of water or oil (0.92-1.0 kg/l) and 20-500 g of bottle",
+    weight_kg=(0.2, 2.2),
+)
+CAN = Material(density_kg_m3=1000.0, source="own estimate: filled cans of 0.33-0.85 l", weight_kg=(0.3, 1.0))
+MUG = Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; mugs of 0.25-0.4 l 250-450 g", weight_kg=(0.2, 0.5))
+CUP = Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; cups 120-350 g", weight_kg=(0.12, 0.35))
+BOWL = Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; bowls of 14-25 cm 300-1200 g", weight_kg=(0.2, 1.2))
+PLATE = Material(density_kg_m3=2000.0, source=f"{_STONEWARE}; plates of 18-28 cm 300-900 g", weight_kg=(0.2, 0.9))
+BOX = Material(density_kg_m3=350.0, source="own choice: filled cartons, flour 600 and cereal 120 kg/m3", weight_kg=(0.05, 12.0))
+CHAIR = Material(
+    density_kg_m3=120.0,
+    source="own estimate: wooden kitchen chairs weigh 4-8 kg; over the hulls of its parts, air between them",
+    weight_kg=(3.5, 8.0),
+)
+TOASTER = Material(density_kg_m3=300.0, source="own estimate: two-slice toasters 1-2 kg", weight_kg=(0.9, 2.5))
+KETTLE = Material(density_kg_m3=400.0, source="own estimate: kettles of 1-1.7 l 0.8-1.5 kg, empty", weight_kg=(0.7, 3.0))
 UNKNOWN_THING = Material(density_kg_m3=400.0, source="own choice: household things lie between 100 and 1000 kg/m3")
 
 _OPENED = "own choice within 2010 ADA Standards 309.4 (one hand, at most 22.2 N)"

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from r2c2r_core.arrays import Faces, Image, Points, TextureCoords
+from r2c2r_core.geometry.transforms import Similarity3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -17,7 +18,10 @@ class TexturedMesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshAsset:
-    """One candidate, in its own `mesh` frame: arbitrary rotation, translation and unit (about a unit cube)."""
+    """One candidate, in its own `mesh` frame: arbitrary rotation, translation and unit (about a unit cube).
+
+    A generator that works in the room knows where it stands; a learned one, or a person's file, does not.
+    """
 
     object_name: str
     candidate_id: str  # "c0", "c1" …, "upload0"
@@ -29,6 +33,7 @@ class MeshAsset:
     metrics: dict[str, float]  # see generate/consensus.py
     parameters: dict[str, float]
     warnings: tuple[str, ...]
+    world_from_mesh: Similarity3 | None = None  # where its generator made it; None: to be searched for
     assumes: str = ""  # what it takes for true of what nobody saw, in a few words; empty: a sample of a generator's own
 
 
@@ -46,4 +51,8 @@ class CandidateSet:
     @property
     def chosen(self) -> MeshAsset:
         """The chosen candidate."""
-        return next(c for c in self.candidates if c.candidate_id == self.chosen_id)
+        return self.candidate(self.chosen_id)
+
+    def candidate(self, candidate_id: str) -> MeshAsset:
+        """The candidate of that id."""
+        return next(c for c in self.candidates if c.candidate_id == candidate_id)

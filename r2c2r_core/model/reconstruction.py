@@ -17,7 +17,6 @@ class StageRun:
     name: str
     backend: str
     config: dict[str, object]
-    seconds: float  # compute time of the run that made the result, also when it was reused
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,13 +9,17 @@ from r2c2r_core.model.mesh import TexturedMesh
 
 Source = Literal["measured", "inferred", "default", "person"]
 JointType = Literal["revolute", "prismatic"]
+Role = Literal["front", "handle", "carcass", "inner"]
+"""What a board is to the unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
+body, or something inside that no camera sees (a shelf, a divider, a drawer's tray)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Box:
     """A panel or a handle piece: a box in its link's frame."""
 
-    name: str
+    name: str  # for people and files; what it is says its role
+    role: Role
     size_m: Vector3
     link_from_box: Rigid3
 
@@ -48,6 +52,10 @@ class Link:
     visual: TexturedMesh | None  # in the link frame
     colour: tuple[float, float, float]  # RGB 0..1 of the primitive where no mesh covers it
     inertial: Inertial
+
+    def of_role(self, role: Role) -> tuple[Box, ...]:
+        """The boxes that are this to the unit."""
+        return tuple(box for box in self.boxes if box.role == role)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.kitchen.categories import every_category
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.segment.appliances import ApplianceSize, find_rectangle, measure_depth
-from r2c2r_core.segment.categories import APPLIANCE_SIZES, CategoryHint
+from r2c2r_core.segment.appliances import find_rectangle, measure_depth
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.edges import as_lab, panel_edges
-from r2c2r_core.segment.fronts import Front, near_plane, nudged, wall_behind
+from r2c2r_core.segment.fronts import Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.handles import find_handles
 from r2c2r_core.segment.outline import outlined, photos_of
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -23,42 +24,41 @@ from r2c2r_core.segment.trimming import trimmed
 from r2c2r_core.segment.workbench import Workbench
 
 _LOW_M = 0.6  # lower appliances stand on worktops
+_OWN_WIDTH, _IN_A_RUN = 1.3, 2.5  # of the greatest width: of a plane that is its front, or that its front is part of
 _OFF_FRONT_M = 0.04  # behind its plane: a side or the top
 _PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
 
 
 def appliance_front(
-    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points, *, glimpse: bool = False
+    bench: Workbench, prompt: ObjectPrompt, kind: Category, negatives: Points, *, glimpse: bool = False
 ) -> tuple[Front, bool] | None:
     """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
 
     Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
     the photographs, which take most of the time and move the box by millimetres.
     """
-    assert hint.appliance is not None
     clicks = [click for click in prompt.points if click.label == 1]
-    found = _plane_of(bench, clicks[0], hint)
+    found = _plane_of(bench, clicks[0], kind)
     if found is None:
         return None
     region, point = found
-    room = bench.scene.capture.room
-    run = bench.run_of(region, margin_m=_margin(region, hint.appliance))
+    run = bench.run_of(region, margin_m=_margin(region, kind))
     if run is None:
         return None
     on = run.grid.cells_of(np.array([point, *_on_plane(bench, region, clicks[1:])]))
     off = run.grid.cells_of(near_plane(run, negatives))
-    cell = _rectangle(run, on, off, hint.appliance, _support_row(bench, run, point, hint.appliance))
+    cell = _rectangle(run, on, off, kind, _support_row(bench, run, point, kind))
     if cell is None:
         return None
     lab, seen_colour = as_lab(run.mosaic)
     cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
     handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
-    front = trimmed(Front(run, cell, handle, hint.depth_m), bench.scene)
-    wall = wall_behind(run, front.cell, room, hint.depth_m)
-    depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
+    front = trimmed(Front(run, cell, handle, kind.depth.usual), bench.scene)
+    wall = depth_to_wall(front, bench.scene.capture.room, kind)
+    depth, seen = measure_depth(front, bench.scene, kind.depth.usual, wall)
     front = squared(replace(front, depth_m=depth), bench.scene)
     if not glimpse:
-        front, outlined_depth = _photographed(front, bench.scene, hint.depth_m, wall)
+        front, outlined_depth = _photographed(front, bench.scene, kind.depth.usual, wall)
         seen = seen or outlined_depth
     front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
     return front, seen
@@ -75,26 +75,26 @@ def _photographed(front: Front, scene: Scene, usual_m: float, wall_m: float | No
     return front, clear or again
 
 
-def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, size: ApplianceSize, support_row: float | None) -> Cell | None:
+def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, support_row: float | None) -> Cell | None:
     """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
-    cell = find_rectangle(run, on[:1], size, off[:0], support_row)
+    cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
     if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
         on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
-        cell = find_rectangle(run, on[:1], size, off[:0], support_row)
+        cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
     if cell is None:
         return None
     missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
     wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
     if not missed and not wrong:
         return cell
-    return find_rectangle(run, np.array([on[0], *missed]), size, np.array(wrong).reshape(-1, 2), support_row) or cell
+    return find_rectangle(run, np.array([on[0], *missed]), kind, np.array(wrong).reshape(-1, 2), support_row) or cell
 
 
-def _support_row(bench: Workbench, run: Run, point: Vector3, size: ApplianceSize) -> float | None:
+def _support_row(bench: Workbench, run: Run, point: Vector3, kind: Category) -> float | None:
     """The row of the run's grid at which what a small appliance stands on lies; None for tall ones and where none was seen."""
-    if size.height[2] > _LOW_M:
+    if kind.height.high > _LOW_M:
         return None
-    support = support_height(bench.scene, point[None], ThingConfig(radius_m=size.width[1] / 2))
+    support = support_height(bench.scene, point[None], ThingConfig(radius_m=kind.width.usual / 2))
     if support is None:
         return None
     row = float(run.grid.cells_of(np.array([[point[0], point[1], support]]))[0, 1])
@@ -123,32 +123,35 @@ def _on_plane(bench: Workbench, region: PlaneRegion, clicks: list[PromptPoint]) 
     return points
 
 
-def _plane_of(bench: Workbench, click: PromptPoint, hint: CategoryHint) -> tuple[PlaneRegion, Vector3] | None:
+def _plane_of(bench: Workbench, click: PromptPoint, kind: Category) -> tuple[PlaneRegion, Vector3] | None:
     """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
     scene = bench.scene
     origin, ray = scene.ray(click.frame, click.x, click.y)
     point = scene.pick(click.frame, click.x, click.y)
     if scene.has_depth(click.frame, click.x, click.y) and point is not None:
         region = region_at(bench.planes, point)
-        front = _front_before(bench, point, hint)
+        front = _front_before(bench, point, kind)
         if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
             return front, _support_near(front, point)
         if region is not None:
             return region, point
     farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
-    assert hint.appliance is not None
-    small = tuple(plane for plane in bench.planes if plane.width_m < 2.5 * hint.appliance.width[2])
-    return region_along(small, origin, ray, farthest, hint.appliance.width[2])
+    # A plane no wider than such an appliance is rather its front than a run of cupboards that the ray passes over
+    for widest in (_OWN_WIDTH, _IN_A_RUN):
+        planes = tuple(plane for plane in bench.planes if plane.width_m < widest * kind.width.high)
+        met = region_along(planes, origin, ray, farthest, kind.width.high)
+        if met is not None:
+            return met
+    return None
 
 
-def _front_before(bench: Workbench, point: Vector3, hint: CategoryHint) -> PlaneRegion | None:
+def _front_before(bench: Workbench, point: Vector3, kind: Category) -> PlaneRegion | None:
     """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
-    assert hint.appliance is not None
     planes = [
         plane
         for plane in bench.planes
-        if plane.width_m < 1.3 * hint.appliance.width[2]
-        and _OFF_FRONT_M < _behind(plane, point) < hint.appliance.depth + 0.1
+        if plane.width_m < _OWN_WIDTH * kind.width.high
+        and _OFF_FRONT_M < _behind(plane, point) < kind.depth.usual + 0.1
         and plane.supports(point[None], 0.12)[0]
     ]
     return max(planes, key=lambda plane: _faced(bench.scene, plane, point), default=None)
@@ -171,14 +174,15 @@ def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
     return np.asarray(seen[order[: max(1, round(0.06**2 / plane.cell_m**2))]].mean(axis=0))
 
 
-def _margin(region: PlaneRegion, size: ApplianceSize) -> float:
+def _margin(region: PlaneRegion, kind: Category) -> float:
     """How far the front may reach beyond what depth saw of it."""
-    missing = max(size.width[1] - region.width_m, size.height[1] - region.height_m, 0.0)
+    missing = max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
     return round(missing + 0.05, 2) if missing > 0.08 else 0.0
 
 
 def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
     """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
-    sizes = [size for size in APPLIANCE_SIZES if region.width_m < size.width[2] and region.height_m < size.height[2]]
-    margins = {_margin(region, size) for size in sizes}
+    kinds = [kind for kind in every_category() if kind.kind == "appliance"]
+    larger = [kind for kind in kinds if region.width_m < kind.width.high and region.height_m < kind.height.high]
+    margins = {_margin(region, kind) for kind in larger}
     return tuple(sorted(margin for margin in margins if 0 < margin <= _PREPARED_MARGIN_M))

@@ -1,12 +1,11 @@
 """Engine B for appliances: the rectangle of the front by its four edges, extruded to a box; glass may lack depth."""
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import ThingBox
 from r2c2r_core.segment.back_edges import depth_at_back_edge
@@ -23,18 +22,8 @@ _COVERED = 1.2  # what depth saw of the plane weighs as much as all four edges: 
 _TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ApplianceSize:
-    """Usual outer size in metres, and how far it may deviate (least, most)."""
-
-    width: tuple[float, float, float]  # least, usual, most
-    height: tuple[float, float, float]
-    depth: float
-    spread: float = 0.15  # of sizes about the usual one, as a share
-
-
 def find_rectangle(
-    run: Run, clicks: np.ndarray, size: ApplianceSize, refused: np.ndarray, support_row: float | None = None
+    run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, support_row: float | None = None
 ) -> Cell | None:
     """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support."""
     cell_m = run.grid.cell_m
@@ -42,8 +31,8 @@ def find_rectangle(
     part = _component(run, clicks)
     upright, level = _with_ends(run.vertical, part, 0), _with_ends(run.horizontal, part, 1)
     vertical, horizontal = _sums(upright), _sums(level)
-    columns = _candidates(upright, low[1], high[1], 0.4 * size.height[0] / cell_m)
-    rows = _candidates(level, low[0], high[0], 0.4 * size.width[0] / cell_m)
+    columns = _candidates(upright, low[1], high[1], 0.4 * kind.height.low / cell_m)
+    rows = _candidates(level, low[0], high[0], 0.4 * kind.width.low / cell_m)
     if support_row is not None:
         rows = np.append(rows[rows < support_row - _SHADOW_M / cell_m], support_row)
     support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
@@ -51,12 +40,12 @@ def find_rectangle(
     for left in columns[columns < low[0]]:
         for right in columns[columns > high[0]]:
             width = (right - left) * cell_m
-            if not size.width[0] <= width <= size.width[2]:
+            if not kind.width.holds(width):
                 continue
             tops, bottoms = rows[rows < low[1]], rows[rows > high[1]]
             top, bottom = (grid.ravel() for grid in np.meshgrid(tops, bottoms, indexing="ij"))
             tall = (bottom - top) * cell_m
-            fits = (tall >= size.height[0]) & (tall <= size.height[2])
+            fits = (tall >= kind.height.low) & (tall <= kind.height.high)
             if not fits.any():
                 continue
             top, bottom, tall = top[fits], bottom[fits], tall[fits]
@@ -66,9 +55,7 @@ def find_rectangle(
                 + _along_rows(horizontal, top, left, right, run.horizontal.block)
                 + _along_rows(horizontal, bottom, left, right, run.horizontal.block)
             ) / 4
-            usual = np.exp(
-                -0.5 * ((np.log(tall / size.height[1]) / size.spread) ** 2 + (np.log(width / size.width[1]) / size.spread) ** 2)
-            )
+            usual = np.exp(-0.5 * (kind.height.deviation(tall) ** 2 + kind.width.deviation(width) ** 2))
             score = edges + 0.3 * usual + _COVERED * _covered(support, left, right, top, bottom)
             for column, row in refused:
                 score = score - 10.0 * ((left < column < right) & (top < row) & (row < bottom))

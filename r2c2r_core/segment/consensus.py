@@ -13,8 +13,8 @@ from r2c2r_core.segment.scene import Scene
 
 _FRAMES = 48  # that vote: more change nothing and cost 30 ms each
 _LEAST_VOTES = 2
-_NEAR_M, _NEAR_SHARE = 0.03, 0.015  # of the distance: a point this far behind what a frame measured is hidden there
-_BEHIND_M, _BEHIND_SHARE = 0.06, 0.03  # as much as a handle and an error of pose together
+_NEAR_M = 0.03  # a point this far behind what a frame measured is hidden there
+_BEHIND_M = 0.06  # as much as a handle and an error of pose together
 _SMALL_PART = 0.1  # of the largest: parts an occluder cuts off stay, crumbs go
 
 
@@ -78,9 +78,9 @@ def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarra
     measured = scene.filled_depth(frame.index)
     scale = np.array([measured.shape[1] / frame.rgb_camera.width, measured.shape[0] / frame.rgb_camera.height])
     known, within = sample_nearest(measured, uv * scale)
-    hidden = (known > 0) & (known < depth - _NEAR_M - _NEAR_SHARE * depth)
+    hidden = scene.noise.occluded(known, depth, _NEAR_M)
     sensed, _ = sample_nearest(scene.depth(frame.index), uv * scale)  # only the sensor: holes in glass show what is behind
-    through = sensed > depth + _BEHIND_M + _BEHIND_SHARE * depth
+    through = scene.noise.seen_through(sensed, depth, _BEHIND_M)
     return uv, ahead & within & ~hidden, through
 
 

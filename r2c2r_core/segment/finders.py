@@ -6,82 +6,84 @@ import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.appliance_clicks import appliance_front
-from r2c2r_core.segment.categories import CategoryHint
 from r2c2r_core.segment.found import Found, FoundAppliance, FoundFront, FoundThing
-from r2c2r_core.segment.fronts import find_front, seen_sides, wall_behind
+from r2c2r_core.segment.fronts import depth_to_wall, find_front, seen_sides
 from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.small import find_small, glimpse_small
-from r2c2r_core.segment.things import ThingConfig, find_thing
-from r2c2r_core.segment.workbench import Workbench
+from r2c2r_core.segment.things import ThingConfig, find_thing, sized_as
+from r2c2r_core.segment.workbench import Hits, Workbench
 
 _SMALL_M = 0.25  # things below this radius are carved by silhouettes
 
 
-def find_object(bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, positives: Points, negatives: Points) -> Found:
+def find_object(bench: Workbench, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits) -> Found:
     """The object under the clicks; raises ObjectNotSeen when neither a front nor a thing is there."""
-    if hint.kind == "front":
-        found = _front(bench, hint, positives, negatives)
+    if category.kind == "front":
+        found = _front(bench, category, positives.points, negatives.points)
         if found is not None:
             return found
-    if hint.kind == "appliance":
-        appliance = _appliance(bench, prompt, hint, negatives)
+    if category.kind == "appliance":
+        appliance = _appliance(bench, prompt, category, negatives.points)
         if appliance is not None:
             return appliance
-    thing = _thing(bench, prompt, hint, positives, negatives) if len(positives) else None
+    thing = _thing(bench, prompt, category, positives, negatives.points) if positives.clicks else None
     if thing is not None:
         warnings = (
             ()
-            if hint.kind != "front"
+            if category.kind != "front"
             else (f"no flat front under the click: treated as a thing of its own ({prompt.category})",)
         )
         return replace(thing, warnings=warnings)
     raise ObjectNotSeen(
-        f"{prompt.name}: no surface of its own under {len(positives)} click(s)",
+        f"{prompt.name}: no surface of its own under {len(positives.clicks)} click(s)",
         hint="click on its middle, or add a second click",
     )
 
 
 def glimpse_object(
-    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, positives: Points, negatives: Points
+    bench: Workbench, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits
 ) -> Found | None:
     """A first look at what is slow to find, from depth alone: small things, appliances. None for the rest, found at once."""
-    if hint.kind == "appliance":
-        return _appliance(bench, prompt, hint, negatives, glimpse=True)
-    if hint.kind != "thing" or hint.thing.radius_m >= _SMALL_M or not len(positives):
+    if category.kind == "appliance":
+        return _appliance(bench, prompt, category, negatives.points, glimpse=True)
+    config = sized_as(category)
+    if category.kind != "thing" or config.radius_m >= _SMALL_M or not positives.clicks:
         return None
-    small = glimpse_small(bench.scene, positives, negatives, hint.thing, _structure_off(bench, positives[0]))
-    return FoundThing(small, bench.scene, small=True, round=hint.thing.round) if small is not None else None
+    small = glimpse_small(bench.scene, positives.points, negatives.points, config, _structure_off(bench, positives.points[0]))
+    return FoundThing(small, bench.scene, small=True, round=config.round) if small is not None else None
 
 
-def _front(bench: Workbench, hint: CategoryHint, positives: Points, negatives: Points) -> FoundFront | None:
+def _front(bench: Workbench, category: Category, positives: Points, negatives: Points) -> FoundFront | None:
     region = region_at(bench.planes, positives[0])
     run = bench.run_of(region) if region is not None else None
     if run is None:
         return None
-    front = find_front(run, positives, negatives, pair=hint.pair, size=hint.size, stacked=hint.stacked)
+    unit = category if category.one_front else None
+    front = find_front(run, positives, negatives, pair=category.may_be_pair, unit=unit, stacked=category.one_of_a_stack)
     if front is None:
         return None
-    front = replace(front, depth_m=wall_behind(run, front.cell, bench.scene.capture.room, hint.depth_m) or hint.depth_m)
-    return FoundFront(replace(front, sides=seen_sides(front, bench.scene)), bench.scene, swings=not (hint.pair or hint.stacked))
+    depth = depth_to_wall(front, bench.scene.capture.room, category) or category.depth.usual
+    front = replace(front, depth_m=depth)
+    swings = category.opens in ("side", "bottom") and not category.may_be_pair
+    return FoundFront(replace(front, sides=seen_sides(front, bench.scene)), bench.scene, swings=swings)
 
 
 def _appliance(
-    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, negatives: Points, *, glimpse: bool = False
+    bench: Workbench, prompt: ObjectPrompt, category: Category, negatives: Points, *, glimpse: bool = False
 ) -> FoundAppliance | None:
-    front, seen = appliance_front(bench, prompt, hint, negatives, glimpse=glimpse) or (None, False)
+    front, seen = appliance_front(bench, prompt, category, negatives, glimpse=glimpse) or (None, False)
     if front is None:
         return None
     assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
     return FoundAppliance(front, bench.scene, warnings=() if seen else (assumed,))
 
 
-def _thing(
-    bench: Workbench, prompt: ObjectPrompt, hint: CategoryHint, positives: Points, negatives: Points
-) -> FoundThing | None:
-    config = hint.thing
-    positives = _on_thing(bench, prompt, positives, config)
+def _thing(bench: Workbench, prompt: ObjectPrompt, category: Category, hits: Hits, negatives: Points) -> FoundThing | None:
+    config = sized_as(category)
+    positives = _on_thing(bench, hits, config)
     if config.radius_m < _SMALL_M:
         small = find_small(bench.scene, positives, negatives, config, _structure_off(bench, positives[0]))
         if small is not None:
@@ -90,17 +92,17 @@ def _thing(
     return FoundThing(thing, bench.scene) if thing is not None else None
 
 
-def _on_thing(bench: Workbench, prompt: ObjectPrompt, positives: Points, config: ThingConfig) -> Points:
+def _on_thing(bench: Workbench, hits: Hits, config: ThingConfig) -> Points:
     """The clicks' points, those that fell on what is behind the thing drawn forward to it; farther ones are left out."""
-    points = [positives[0]]
+    first = hits.points[0]
+    points = [first]
     across = 1.2 * config.width_m + 0.02 if config.width_m is not None else 2.2 * config.radius_m
-    clicks = [click for click in prompt.points if click.label == 1]
-    for click, seen in zip(clicks[1:], positives[1:], strict=False):
+    for click, seen in zip(hits.clicks[1:], hits.points[1:], strict=True):
         point = seen
-        if np.linalg.norm((point - positives[0])[:2]) > across:
+        if np.linalg.norm((point - first)[:2]) > across:
             origin, ray = bench.scene.ray(click.frame, click.x, click.y)
-            point = origin + ray * float((positives[0] - origin)[:2] @ ray[:2]) / max(float(ray[:2] @ ray[:2]), 1e-6)
-        if np.linalg.norm((point - positives[0])[:2]) <= across:
+            point = origin + ray * float((first - origin)[:2] @ ray[:2]) / max(float(ray[:2] @ ray[:2]), 1e-6)
+        if np.linalg.norm((point - first)[:2]) <= across:
             points.append(point)
     return np.array(points)
 

@@ -6,10 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from r2c2r_core.arrays import Mask
+from r2c2r_core.kitchen.category import Kind
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import FrontPanel, Swing, ThingBox
 from r2c2r_core.segment.appliances import appliance_box, appliance_mask
-from r2c2r_core.segment.categories import Kind
 from r2c2r_core.segment.fronts import Front, front_corners, front_mask, front_panel
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.silhouettes import small_mask

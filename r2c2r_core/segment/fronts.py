@@ -6,6 +6,9 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.cut import Cell, joined
@@ -15,7 +18,7 @@ from r2c2r_core.segment.mosaic import PlaneGrid
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.units import FrontSize, drawer_cell, line_clarity, unit_cell
+from r2c2r_core.segment.units import drawer_cell, line_clarity, unit_cell
 
 _USUAL_PROTRUSION_M = 0.035
 _PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
@@ -39,18 +42,18 @@ class Front:
 
 
 def find_front(
-    run: Run, positives: Points, negatives: Points, *, pair: bool, size: FrontSize | None = None, stacked: bool = False
+    run: Run, positives: Points, negatives: Points, *, pair: bool, unit: Category | None = None, stacked: bool = False
 ) -> Front | None:
     """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
 
-    `pair` joins the two doors of a cabinet, `size` says that it is a unit of about that size, `stacked` that it is a drawer.
+    `pair` joins the two doors of a cabinet, `unit` says that it is one front of that kind, `stacked` that it is a drawer.
     """
     on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
     first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
     if first is None:
         return None
-    if size is not None:
-        first = unit_cell(run, float(on[0, 0]), float(on[0, 1]), size) or first
+    if unit is not None:
+        first = unit_cell(run, float(on[0, 0]), float(on[0, 1]), unit) or first
     if stacked:
         first = drawer_cell(run, first, float(on[0, 1]))
     cells = [first]
@@ -99,16 +102,9 @@ def front_mask(front: Front, scene: Scene, frame: Frame, opened: Points | None =
     return visible_mask(facets, scene, frame)
 
 
-def wall_behind(run: Run, cell: Cell, room: Room, usual_m: float) -> float | None:
-    """Distance from the front to the wall behind it; None where none is near the usual depth."""
-    middle = run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
-    distances = []
-    for wall in room.walls:
-        facing = float(wall.normal @ run.grid.outward)
-        distance = float(wall.normal @ middle - wall.offset_m)
-        if facing > 0.95 and 0.6 * usual_m < distance < 1.6 * usual_m:
-            distances.append(distance)
-    return min(distances, default=None)
+def depth_to_wall(front: Front, room: Room, category: Category) -> float | None:
+    """Distance from a front to the wall behind it; None where none is as far as things of that kind are deep."""
+    return wall_behind(room.walls, front_middle(front), front.run.grid.outward, category.depth)
 
 
 def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
@@ -120,14 +116,9 @@ def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
         for frame in scene.frames[:: max(1, len(scene.frames) // 40)]:
             if not side_faces(front.cell, front.run.grid, side, frame.world_from_camera.translation):
                 continue
-            camera = frame.depth_camera
-            local = frame.world_from_camera.inverse.apply(points)
-            z = np.maximum(local[:, 2], 1e-3)
-            u, v = camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy
-            inside = (local[:, 2] > 0.2) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-            depth = scene.depth(frame.index)[np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
-            known = inside & (depth > 0) & (depth > z - 0.05 - 0.01 * z - 0.25)  # far occluders say nothing
-            agree += int((known & (np.abs(depth - z) < 0.03 + 0.01 * z)).sum())
+            z, depth, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+            known = (depth > 0) & ~scene.noise.occluded(depth, z, 0.30)  # far occluders say nothing
+            agree += int(scene.noise.agrees(depth, z, 0.03).sum())
             total += int(known.sum())
         if total > 200 and agree > 0.5 * total:
             found.append(side)

@@ -9,31 +9,32 @@ from pathlib import Path
 
 import numpy as np
 
-from r2c2r_core.arrays import Mask, Points
+from r2c2r_core.arrays import Mask, Vector3
 from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack, Swing
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliance_clicks import appliance_margins
-from r2c2r_core.segment.categories import CategoryHint, hint_for
 from r2c2r_core.segment.finders import find_object, glimpse_object
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import kept
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.proposals import propose_steps
-from r2c2r_core.segment.protocol import Glimpse
+from r2c2r_core.segment.protocol import Glimpse, SegmentConfig, Segmenter
 from r2c2r_core.segment.runs import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
-from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.segment.surface import in_threads
+from r2c2r_core.segment.workbench import Hits
 from r2c2r_core.sources import source_key
 
 
-class GeometricSegmenter:
+class GeometricSegmenter(Segmenter):
     """Needs no weights and no extra."""
 
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
@@ -163,33 +164,33 @@ class GeometricSession:
     def _shows(self, view: View) -> bool:
         return bool(np.count_nonzero(view.mask) >= self.config.least_area_px)
 
-    def _clicked(self, prompt: ObjectPrompt) -> tuple[CategoryHint, Points, Points]:
-        """What the category says, and the world points clicked on it and off it."""
+    def _clicked(self, prompt: ObjectPrompt) -> tuple[Category, Hits, Hits]:
+        """Its category, and what was clicked on it and off it."""
         check_prompt(self.scene.capture, prompt)
-        hint = hint_for(prompt.category)
-        positives = self._points(prompt, 1, must_hit=hint.kind != "appliance")
-        return hint, positives, self._points(prompt, 0, must_hit=False)
+        category = category_of(prompt.category)
+        positives = self._hits(prompt, 1, must_hit=category.kind != "appliance")
+        return category, positives, self._hits(prompt, 0, must_hit=False)
 
-    def _points(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Points:
-        """World points under the clicks of one label; raises PromptError where the first must hit a surface and does not.
+    def _hits(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Hits:
+        """What the clicks of one label hit; raises PromptError where the first must hit a surface and does not.
 
         A later one on what has no depth (glass, gloss, a far wall) counts where its ray passes nearest to the first.
         """
-        points = []
-        for click in prompt.points:
-            if click.label != label:
-                continue
+        clicks: list[PromptPoint] = []
+        points: list[Vector3] = []
+        for click in (click for click in prompt.points if click.label == label):
             point = self.scene.pick(click.frame, click.x, click.y)
-            if point is not None:
-                points.append(point)
-            elif points and label == 1:
+            if point is None and points and label == 1:
                 origin, ray = self.scene.ray(click.frame, click.x, click.y)
-                points.append(origin + ray * float((points[0] - origin) @ ray))
+                point = origin + ray * float((points[0] - origin) @ ray)
+            if point is not None:
+                clicks.append(click)
+                points.append(point)
             elif must_hit:
                 raise PromptError(
                     _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
                 )
-        return np.array(points).reshape(-1, 3)
+        return Hits(tuple(clicks), np.array(points).reshape(-1, 3))
 
 
 def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:
@@ -218,7 +219,7 @@ def _import_heavy() -> None:
 
 def _cache_key(capture: Capture, config: SegmentConfig) -> str:
     parts = (
-        source_key("segment", "geometry", "model"),
+        source_key("segment", "kitchen", "geometry", "model"),
         capture.sha256,
         config,
         capture.world_from_capture.matrix.round(9).tolist(),

@@ -19,15 +19,15 @@ from r2c2r_core.segment.fuse import DepthPictures, Fused, both_masks, with_evide
 from r2c2r_core.segment.geometric import GeometricSegmenter, GeometricSession
 from r2c2r_core.segment.measure import Measured, measure
 from r2c2r_core.segment.prompts import check_prompt
+from r2c2r_core.segment.protocol import SegmentConfig, Segmenter
 from r2c2r_core.segment.sam_video import EDGETAM, SAM2, SAM3, Click, Family, Seen, VideoModel, load_model
-from r2c2r_core.segment.stage import SegmentConfig
 
 _KEPT_OBJECTS = 8  # followed so far and no further: a later click goes on where it stopped
 
 Found = tuple[int, PackedMask, float]  # frame, mask, confidence
 
 
-class LearnedSegmenter:
+class LearnedSegmenter(Segmenter):
     """A backend whose masks come from a video model in the folder `weights`."""
 
     name: str

@@ -7,22 +7,23 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Points
-from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.geometry.camera import pixel_rays, unproject
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.kitchen.category import Category, Kind
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances import appliance_box, measure_depth
-from r2c2r_core.segment.categories import CategoryHint, Kind, hint_for
 from r2c2r_core.segment.consensus import Body, vote, voting_frames
 from r2c2r_core.segment.cut import Cell, joined
 from r2c2r_core.segment.edges import as_lab, panel_edges
-from r2c2r_core.segment.fronts import Front, front_panel, wall_behind
+from r2c2r_core.segment.fronts import Front, depth_to_wall, front_panel
 from r2c2r_core.segment.handles import find_handles
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.thing_boxes import box_of
-from r2c2r_core.segment.things import support_height
+from r2c2r_core.segment.things import sized_as, support_height
 from r2c2r_core.segment.workbench import Workbench
 
 _GRID_STEP_M = 0.01  # of the votes on a plane
@@ -51,24 +52,25 @@ class Measured:
 
 def measure(bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
     """The object's front or box: `masks` say which part of the scan it is, `body` is that part of the fused surface."""
-    hint = hint_for(prompt.category)
-    if hint.kind == "thing":
-        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint))
-    front = _front(bench, prompt, masks, body, hint)
+    category = category_of(prompt.category)
+    usual_m = category.depth.usual
+    if category.kind == "thing":
+        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, category))
+    front = _front(bench, prompt, masks, body, category)
     if front is None:
         said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
-        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, hint), warnings=said)
-    wall = wall_behind(front.run, front.cell, bench.scene.capture.room, hint.depth_m)
-    if hint.kind == "front":
-        return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or hint.depth_m)))
-    depth, seen = measure_depth(front, bench.scene, hint.depth_m, wall)
+        return Measured(kind="thing", box=_thing_box(bench.scene, prompt, masks, body, category), warnings=said)
+    wall = depth_to_wall(front, bench.scene.capture.room, category)
+    if category.kind == "front":
+        return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or usual_m)))
+    depth, seen = measure_depth(front, bench.scene, usual_m, wall)
     warnings = () if seen else (f"its depth was not seen: {depth:.2f} m is usual for a {prompt.category}",)
     front = replace(front, depth_m=depth)
     return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
 
 
 def _front(
-    bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint
+    bench: Workbench, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
 ) -> Front | None:
     region = _front_plane(bench, prompt, body)
     run = bench.run_of(region, _beyond(region, bench.scene, masks)) if region is not None else None
@@ -81,7 +83,7 @@ def _front(
     lab, seen = as_lab(run.mosaic)
     cell = panel_edges(cell, lab, seen, run.seen, run.grid.cell_m)
     handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
-    return Front(run, cell, handle, hint.depth_m)
+    return Front(run, cell, handle, category.depth.usual)
 
 
 def _front_plane(bench: Workbench, prompt: ObjectPrompt, body: Body) -> PlaneRegion | None:
@@ -118,8 +120,7 @@ def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) 
         mask, frame = masks[index], scene.frame(index)
         columns = np.array([0, mask.box_width, mask.box_width, 0]) + mask.left
         rows = np.array([0, 0, mask.box_height, mask.box_height]) + mask.top
-        camera = frame.rgb_camera
-        rays = np.stack([(columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy, np.ones(4)], axis=1)
+        rays = pixel_rays(np.stack([columns, rows], axis=1).astype(np.float64), frame.rgb_camera)
         inward = region.world_from_plane.inverse.rotation @ frame.world_from_camera.rotation
         eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation[None])[0]
         rays = rays @ inward.T
@@ -188,7 +189,7 @@ def _overlap(a: Cell, b: Cell) -> float:
 
 
 def _thing_box(
-    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, hint: CategoryHint
+    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
 ) -> ThingBox | None:
     """The box of its points on its support; None where depth never saw it."""
     points = _points(scene, masks, body)
@@ -196,12 +197,12 @@ def _thing_box(
         return None
     clicked = [scene.pick(click.frame, click.x, click.y) for click in prompt.points if click.label == 1]
     hits = np.array([point for point in clicked if point is not None]).reshape(-1, 3)
-    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], hint.thing)
+    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], sized_as(category))
     if support is not None and (points[:, 2] > support).sum() >= 20:
         points = points[points[:, 2] > support]
     centres = np.stack([frame.world_from_camera.translation for frame in scene.frames])
     yaw = scene.capture.room.manhattan_yaw_rad
-    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=hint.thing.round)
+    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=category.round)
 
 
 def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:

@@ -6,14 +6,16 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 
 _PAD_M = 0.08  # around the seen part, so that its outer edges lie inside
-_IN_FRONT_M, _IN_FRONT_SHARE = 0.05, 0.01  # nearer than the plane by more is an occluder (handles are not)
+_BORDER_SHARE = 0.004  # of the width: a tile is shifted by pixels to meet the others, and what lies at its border is gone then
+_VIEW_IN_FRONT_M = 0.08  # nearer by more hides the plane from a view: handles (5 cm) and the fused surface's error do not
+_IN_FRONT_M = 0.05  # nearer than the plane by more is an occluder (handles are not)
 _LEAST_COSINE = 0.12
 
 
@@ -112,17 +114,14 @@ def choose_frames(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int
 def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) -> np.ndarray:
     to_camera = frame.world_from_camera.translation - points
     cosine = (to_camera @ outward) / np.linalg.norm(to_camera, axis=1)
+    width, height = _stored_size(scene, frame)
+    camera = frame.rgb_camera.resized(width, height)
     local = frame.world_from_camera.inverse.apply(points)
-    camera, z = frame.rgb_camera, np.maximum(local[:, 2], 0.05)
-    u, v = camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy
-    good = (
-        (local[:, 2] > 0.15) & (u > 4) & (v > 4) & (u < camera.width - 4) & (v < camera.height - 4) & (cosine > _LEAST_COSINE)
-    )
-    depth = scene.surface_depth(frame.index, _stored_size(scene, frame))
-    column = np.where(good, u * depth.shape[1] / camera.width, 0).astype(int)
-    row = np.where(good, v * depth.shape[0] / camera.height, 0).astype(int)
-    seen = depth[row, column]
-    good &= (seen == 0) | (seen > z - _IN_FRONT_M - 0.02 * z)
+    uv, z = project(local, camera), local[:, 2]
+    seen, _ = sample_nearest(scene.surface_depth(frame.index, (width, height)), uv)
+    border = _BORDER_SHARE * width
+    inside = (z > 0.15) & (uv > border).all(axis=1) & (uv < [width - border, height - border]).all(axis=1)
+    good = inside & (cosine > _LEAST_COSINE) & ~scene.noise.occluded(seen, z, _VIEW_IN_FRONT_M)
     return np.where(good, cosine * np.sqrt(max(frame.sharpness, 1e-3)) / np.maximum(z, 0.4), 0)
 
 
@@ -167,7 +166,7 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
     to_depth = grid.pixel_from_cell(frame, frame.depth_camera, out_m)
     seen = cv2.warpPerspective(depth, _for_opencv(to_depth), (grid.columns, grid.rows), flags=flags)
-    occluded = (seen > 0) & (seen < z - _IN_FRONT_M - _IN_FRONT_SHARE * z)
+    occluded = scene.noise.occluded(seen, z, _IN_FRONT_M)
     grown = cv2.dilate(occluded.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     return inside & ~grown, z
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
-from r2c2r_core.geometry.camera import Intrinsics, project
+from r2c2r_core.geometry.camera import Intrinsics, project, ray_slopes
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
 
@@ -15,12 +15,10 @@ _NEAR_M = 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerance:
-    """How far measured depth may lie from the model, metres plus a share of the distance."""
+    """How far depth may lie from the model beyond its noise, metres."""
 
     front_m: float = 0.06  # handles stand out by up to 5 cm
-    front_share: float = 0.012
     behind_m: float = 0.06
-    behind_share: float = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,13 +64,11 @@ def _shown(
 ) -> Mask:
     model = _plane_depth(frame, frame.rgb_camera, box, facet.corners_world[0], facet.normal)
     sensor, seen = _crop_depths(scene, frame, box)
-    front = tolerance.front_m + tolerance.front_share * model
-    behind = tolerance.behind_m + tolerance.behind_share * model
     if facet.confirm:
-        agrees = (seen > 0) & (np.abs(seen - model) < 0.03 + 0.015 * model)
-        return inside & _smoothed(agrees, scene, frame)
+        return inside & _smoothed(scene.noise.agrees(seen, model, 0.03), scene, frame)
     # Glass and gloss leave holes through which the fused surface shows what is behind: only the sensor may say "behind".
-    hidden = ((seen > 0) & (seen < model - front)) | (sensor > model + behind)
+    behind = scene.noise.seen_through(sensor, model, tolerance.behind_m)
+    hidden = scene.noise.occluded(seen, model, tolerance.front_m) | behind
     hidden = _smoothed(hidden, scene, frame)
     if not (hidden & inside).any():
         return inside
@@ -176,8 +172,7 @@ def _plane_depth(
     left, top, right, bottom = box
     seen = frame.world_from_camera.inverse
     local_normal, local_point = seen.rotation @ normal, seen.apply(point[None])[0]
-    x = (np.arange(left, right) + 0.5 - camera.cx) / camera.fx
-    y = (np.arange(top, bottom) + 0.5 - camera.cy) / camera.fy
+    x, y = ray_slopes(np.arange(left, right), np.arange(top, bottom), camera)
     slope = x[None] * local_normal[0] + y[:, None] * local_normal[1] + local_normal[2]
     with np.errstate(divide="ignore"):
         z = (local_point @ local_normal) / slope

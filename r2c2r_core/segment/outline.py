@@ -14,6 +14,7 @@ import numpy as np
 from r2c2r_core.arrays import DepthMetres, Image, Points
 from r2c2r_core.geometry.camera import Intrinsics, project
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.fronts import Front, front_middle
 from r2c2r_core.segment.scene import Scene
@@ -31,7 +32,7 @@ _TOP_PEAK_M, _BACK_PEAK_M = 0.014, 0.045  # how far such places may lie from it:
 _FRAMES = 16
 _TOP_REACH_M, _TOP_STEP_M, _DEPTH_STEP_M = 0.06, 0.003, 0.004
 _DEPTH_RANGE = (0.6, 1.4)  # of the usual depth
-_HIDDEN_M, _HIDDEN_SHARE = 0.05, 0.02  # and of the distance: nearer depth belongs to something in front
+_HIDDEN_M = 0.05  # depth nearer by more, beyond its noise, belongs to something in front
 
 
 class Photo(NamedTuple):
@@ -41,6 +42,7 @@ class Photo(NamedTuple):
     camera: Intrinsics
     depth_m: DepthMetres  # of the same view; 0 where unknown
     world_from_camera: Rigid3
+    noise: DepthNoise
 
 
 class Body(NamedTuple):
@@ -95,7 +97,7 @@ def outlined_body(body: Body, photos: Sequence[Photo], tops_m: np.ndarray, depth
 
 def _photo(scene: Scene, frame: Frame) -> Photo:
     lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB)
-    return Photo(lab, frame.rgb_camera, scene.filled_depth(frame.index), frame.world_from_camera)
+    return Photo(lab, frame.rgb_camera, scene.filled_depth(frame.index), frame.world_from_camera, scene.noise)
 
 
 def best_depth(body: Body, photos: Sequence[Photo], depths_m: np.ndarray) -> float | None:
@@ -179,7 +181,7 @@ def hidden(photo: Photo, uv_px: np.ndarray, z_m: np.ndarray) -> np.ndarray:
     row = np.clip(uv_px[..., 1] * rows / photo.camera.height, 0, rows - 1).astype(int)
     column = np.clip(uv_px[..., 0] * columns / photo.camera.width, 0, columns - 1).astype(int)
     seen = photo.depth_m[row, column]
-    return np.asarray((seen > 0) & (seen < z_m * (1 - _HIDDEN_SHARE) - _HIDDEN_M))
+    return photo.noise.occluded(seen, z_m, _HIDDEN_M)
 
 
 def _colours_at(lab: Image, uv_px: np.ndarray) -> np.ndarray:

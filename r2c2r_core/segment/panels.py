@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Room
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.fronts import Front, edge_strengths, find_front, front_corners
@@ -153,10 +154,7 @@ def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
 def is_on_wall(run: Run, room: Room, shallowest_m: float = _SHALLOWEST_M) -> bool:
     """Whether a run is a wall, or too near one that faces the same way to have a carcass behind it."""
     middle = run.region.world_from_plane.translation
-    return any(
-        wall.normal @ run.grid.outward > 0.95 and abs(float(wall.normal @ middle - wall.offset_m)) < shallowest_m
-        for wall in room.walls
-    )
+    return any(abs(distance) < shallowest_m for distance in distances_behind(room.walls, middle, run.grid.outward))
 
 
 def _middle(run: Run, cell: Cell) -> Points:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +9,10 @@ from r2c2r_core.arrays import Mask, Vector3
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.segment.categories import hint_for
 from r2c2r_core.segment.clicks import best_views, click_on, clump_clicks, panel_clicks
 from r2c2r_core.segment.clutter import Clump, find_clumps
 from r2c2r_core.segment.found import Found, FoundAppliance, FoundFront
@@ -21,9 +20,7 @@ from r2c2r_core.segment.fronts import front_mask
 from r2c2r_core.segment.naming import name_thing
 from r2c2r_core.segment.panels import Panel, find_panels, is_on_wall, outlined, without_sides
 from r2c2r_core.segment.planes import PlaneRegion
-
-if TYPE_CHECKING:
-    from r2c2r_core.segment.geometric import GeometricSession
+from r2c2r_core.segment.workbench import Workbench
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
 
@@ -34,32 +31,33 @@ _SHALLOWEST_BOX_M = 0.25  # microwaves are 0.3 m deep and more; what stands on a
 _SAME_PLANE_M = 0.12
 _BOX_SLACK_M = 0.03
 _TAKEN_SHARE = 0.4
-_BOX_KINDS = ("refrigerator", "microwave")
+_TALL_M, _FOOT_M = 1.25, 0.4  # the front of a refrigerator: how high at least, and how near to the floor
+_ON_WORKTOP_M, _LEAST_SEEN_M = (0.7, 1.5), 0.12  # the front of a microwave, of which glass may leave little
 
 
-def propose_steps(session: "GeometricSession") -> Steps:
+def propose_steps(bench: Workbench) -> Steps:
     """Proposals so far, surest first, after each bit of work, with the share of the work done. The last step has them all."""
     panels: list[Panel] = []
-    planes = [plane for plane in session.planes if _worth_cutting(plane)]
+    planes = [plane for plane in bench.planes if _worth_cutting(plane)]
     for position, plane in enumerate(planes):
-        run = session.run_of(plane)
-        panels += find_panels(run, session.scene.capture.room) if run is not None else []
-        panels += _boxes(session, plane)
+        run = bench.run_of(plane)
+        panels += find_panels(run, bench.scene.capture.room) if run is not None else []
+        panels += _boxes(bench, plane)
         yield 0.5 * (position + 1) / len(planes), ()
     fronts = without_sides([panel for panel in panels if panel.confidence > 0.5 * _LEAST_CONFIDENCE])
     wanted = _apart([panel for panel in fronts if panel.confidence >= _least(panel.category)])
     found: list[Proposal] = []
     shown: list[tuple[Proposal, Panel]] = []
     for position, panel in enumerate(wanted):
-        proposal = _present_panel(session, panel)
+        proposal = _present_panel(bench, panel)
         if proposal is not None:
             found.append(proposal)
             shown.append((proposal, panel))
         yield 0.5 + 0.3 * (position + 1) / len(wanted), _ranked(found)
-    clumps = find_clumps(session.scene.capture, session.planes)[:_MOST_THINGS]
+    clumps = find_clumps(bench.scene.capture, bench.planes)[:_MOST_THINGS]
     for position, clump in enumerate(clumps):
         inside = any(_holds(proposal, panel, clump) for proposal, panel in shown)
-        proposal = None if inside else _present_clump(session, clump, found)
+        proposal = None if inside else _present_clump(bench, clump, found)
         found += [proposal] if proposal is not None else []
         yield 0.8 + 0.2 * (position + 1) / len(clumps), _ranked(found)
     yield 1.0, _ranked(found)
@@ -72,7 +70,11 @@ def is_taken(outline: Mask, masks: Iterable[Mask]) -> bool:
 
 
 def _least(category: str) -> float:
-    return _LEAST_OF_BOXES if category in _BOX_KINDS else _LEAST_CONFIDENCE
+    return _LEAST_OF_BOXES if _is_box(category) else _LEAST_CONFIDENCE
+
+
+def _is_box(category: str) -> bool:
+    return category_of(category).kind == "appliance"
 
 
 def _ranked(found: list[Proposal]) -> tuple[Proposal, ...]:
@@ -86,7 +88,7 @@ def _worth_cutting(plane: PlaneRegion) -> bool:
 def _apart(panels: list[Panel]) -> list[Panel]:
     """No panel inside another on the same plane: boxes before their doors, then the surer one."""
     kept: list[Panel] = []
-    for panel in sorted(panels, key=lambda panel: (panel.category not in _BOX_KINDS, -panel.confidence)):
+    for panel in sorted(panels, key=lambda panel: (not _is_box(panel.category), -panel.confidence)):
         if not any(_covers(other, panel.centre) or _covers(panel, other.centre) or _same_box(panel, other) for other in kept):
             kept.append(panel)
     return kept
@@ -94,7 +96,7 @@ def _apart(panels: list[Panel]) -> list[Panel]:
 
 def _same_box(panel: Panel, other: Panel) -> bool:
     """Whether two faces belong to one appliance: no two of a kind stand corner to corner."""
-    if panel.category != other.category or panel.category not in _BOX_KINDS:
+    if panel.category != other.category or not _is_box(panel.category):
         return False
     return bool(np.linalg.norm(panel.centre - other.centre) < max(panel.size_m[0], other.size_m[0]))
 
@@ -115,50 +117,51 @@ def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
 # Boxes: refrigerators of several doors, microwaves
 
 
-def _boxes(session: "GeometricSession", plane: PlaneRegion) -> list[Panel]:
+def _boxes(bench: Workbench, plane: PlaneRegion) -> list[Panel]:
     """The appliance whose front a whole plane could be."""
-    room = session.scene.capture.room
+    room = bench.scene.capture.room
     if not room.floor_found:
         return []
     middle = plane.world_from_plane.translation
     bottom = float(middle[2]) - plane.height_m / 2
-    if 0.45 < plane.width_m < 1.0 and 1.25 < plane.height_m < 2.15 and bottom < 0.4:
-        category = "refrigerator"
-    elif 0.12 < plane.width_m < 0.72 and 0.12 < plane.height_m < 0.46 and 0.7 < bottom < 1.5:
-        category = "microwave"
+    tall, small = category_of("refrigerator"), category_of("microwave")
+    if tall.width.holds(plane.width_m) and _TALL_M < plane.height_m < tall.height.high and bottom < _FOOT_M:
+        kind = tall
+    elif (
+        _LEAST_SEEN_M < plane.width_m < small.width.high
+        and _LEAST_SEEN_M < plane.height_m < small.height.high
+        and _ON_WORKTOP_M[0] < bottom < _ON_WORKTOP_M[1]
+    ):
+        kind = small
     else:
         return []
-    found = _confirmed(session, category, click_on(session.scene, middle, plane.outward))
+    found = _confirmed(bench, kind.name, click_on(bench.scene, middle, plane.outward))
     if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, _SHALLOWEST_BOX_M):
         return []
-    size = hint_for(category).appliance
-    assert size is not None
     cell, cell_m = found.front.cell, found.front.run.grid.cell_m
-    off = np.log([cell.width * cell_m / size.width[1], cell.height * cell_m / size.height[1]]) / size.spread
-    front = replace(found.front, depth_m=min(found.front.depth_m, 1.5 * size.depth))
-    return [Panel(front, category, outlined(front) * float(np.exp(-(off @ off) / 8)))]
+    off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
+    front = replace(found.front, depth_m=min(found.front.depth_m, kind.depth.high))
+    return [Panel(front, kind.name, outlined(front) * float(np.exp(-(off @ off) / 8)))]
 
 
 # Presenting: the frame that shows it best, and a click there that means it
 
 
-def _present_panel(session: "GeometricSession", panel: Panel) -> Proposal | None:
-    scene, is_box = session.scene, panel.category in _BOX_KINDS
+def _present_panel(bench: Workbench, panel: Panel) -> Proposal | None:
+    scene, is_box = bench.scene, _is_box(panel.category)
     views = best_views(scene, panel.corners, panel.run.grid.outward)
     shown = [(front_mask(panel.front, scene, frame), frame) for frame in views]
     for (mask, _), frame in sorted(shown, key=lambda view: -np.count_nonzero(view[0][0])):
         for click in panel_clicks(scene, panel, frame, mask):
-            found = _confirmed(session, panel.category, click)
+            found = _confirmed(bench, panel.category, click)
             if isinstance(found, FoundFront | FoundAppliance) and isinstance(found, FoundAppliance) == is_box:
                 if _overlap(panel, found) > 0.7:
-                    return _proposal(session, panel, found, frame, click)
+                    return _proposal(bench, panel, found, frame, click)
                 break
     return None
 
 
-def _proposal(
-    session: "GeometricSession", panel: Panel, found: FoundFront | FoundAppliance, frame: Frame, click: PromptPoint
-) -> Proposal:
+def _proposal(bench: Workbench, panel: Panel, found: FoundFront | FoundAppliance, frame: Frame, click: PromptPoint) -> Proposal:
     width, height = panel.size_m
     return Proposal(
         kind=found.kind,
@@ -172,17 +175,17 @@ def _proposal(
     )
 
 
-def _present_clump(session: "GeometricSession", clump: Clump, others: list[Proposal]) -> Proposal | None:
-    scene = session.scene
+def _present_clump(bench: Workbench, clump: Clump, others: list[Proposal]) -> Proposal | None:
+    scene = bench.scene
     for click in clump_clicks(scene, clump):
         frame = scene.frame(click.frame)
         floor = clump.base_m if scene.capture.room.floor_found else None
         category = name_thing(clump.extent_m, floor)
-        found = _confirmed(session, category, click)
+        found = _confirmed(bench, category, click)
         if found is None or found.kind != "thing":
             continue
         mask, box = found.see(frame).mask, found.box()
-        if box is None or np.count_nonzero(mask) < session.config.least_area_px:
+        if box is None or np.count_nonzero(mask) < bench.config.least_area_px:
             continue
         if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
             return None
@@ -224,12 +227,12 @@ def _inside(mask: Mask, frame: Frame, point: Vector3) -> bool:
     return bool(0 <= u < mask.shape[1] and 0 <= v < mask.shape[0] and mask[int(v), int(u)])
 
 
-def _confirmed(session: "GeometricSession", category: str, click: PromptPoint | None) -> Found | None:
+def _confirmed(bench: Workbench, category: str, click: PromptPoint | None) -> Found | None:
     """What a person would get from this click."""
     if click is None:
         return None
     try:
-        return session.find(ObjectPrompt(name="proposal", category=category, points=(click,)))
+        return bench.find(ObjectPrompt(name="proposal", category=category, points=(click,)))
     except R2C2RError:
         return None
 

@@ -1,8 +1,10 @@
-"""What a segmenter is."""
+"""What a segmenter is, and its settings."""
 
+from abc import abstractmethod
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import PackedMask
@@ -11,6 +13,24 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
+
+Fusion = Literal["none", "depth-mask", "evidence"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmentConfig:
+    """Lengths in metres, so that they hold for any camera."""
+
+    cell_m: float = setting(0.0025, "side of the mosaic's cells, in m: about a pixel of a phone at 2 m", ge=0.0005, le=0.1)
+    # more add smear, not evidence (real kitchen: 24 and 48 cut alike)
+    mosaic_frames: int = setting(24, "frames that a front's mosaic is made of", ge=1, le=1000)
+    least_area_px: int = setting(60, "visible pixels below which an object does not count as seen", ge=0, le=10**6)
+    weights: str = setting(
+        "", "of a learned segmenter: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+    )
+    fusion: Fusion = setting("evidence", "none, depth-mask (the paper's) or evidence: how depth corrects learned masks")
+
 
 Glimpse = tuple[int, PackedMask, float]
 """Frame, mask and confidence."""
@@ -42,7 +62,8 @@ class SegmentSession(Protocol):
 
 
 class Segmenter(Protocol):
-    """A backend."""
+    """A backend; one names this class as its base, so that the type checker compares them."""
 
-    def open(self, capture: Capture, cache: Path, config: object, *, progress: Progress = SILENT) -> SegmentSession:
+    @abstractmethod
+    def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> SegmentSession:
         """Prepare a capture; heavy results are kept in `cache` and found again there."""

@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Points, Vector3
+from r2c2r_core.geometry.camera import pixel_rays
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, in_threads, parts_of
@@ -33,6 +35,11 @@ class Scene:
     _rgb: "_Recent[Image]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES))
     _depth: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
     _filled: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
+
+    @property
+    def noise(self) -> DepthNoise:
+        """How much the recording's depth errs."""
+        return self.capture.depth_noise
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -86,17 +93,12 @@ class Scene:
         depth = self._depth_near(frame_index, x_px, y_px)
         if depth is None:
             return None
-        camera = frame.rgb_camera
-        ray = np.array([(x_px - camera.cx) / camera.fx, (y_px - camera.cy) / camera.fy, 1.0])
-        return frame.world_from_camera.apply((ray * depth)[None])[0]
+        return frame.world_from_camera.apply((pixel_rays(np.array([x_px, y_px]), frame.rgb_camera) * depth)[None])[0]
 
     def ray(self, frame_index: int, x_px: float, y_px: float) -> tuple[Vector3, Vector3]:
         """Camera centre and unit direction (world) through a pixel of the colour image."""
         frame = self.frame(frame_index)
-        camera = frame.rgb_camera
-        direction = frame.world_from_camera.rotation @ np.array(
-            [(x_px - camera.cx) / camera.fx, (y_px - camera.cy) / camera.fy, 1.0]
-        )
+        direction = frame.world_from_camera.rotation @ pixel_rays(np.array([x_px, y_px]), frame.rgb_camera)
         return frame.world_from_camera.translation, direction / np.linalg.norm(direction)
 
     def has_depth(self, frame_index: int, x_px: float, y_px: float) -> bool:

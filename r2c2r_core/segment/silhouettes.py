@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Pixels, Points, Vector3
-from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import colour_gradient
 from r2c2r_core.segment.pixels import ColourModel, cut_pixels, learn_colours
@@ -81,7 +81,7 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
     local = frame.world_from_camera.inverse.apply(centre[None])[0]
     if local[2] < 0.2:
         return 0.0
-    u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
+    u, v = project(local, camera)
     reach = 0.22 * camera.fx / local[2]
     rows = slice(int(np.clip(v - reach, 0, camera.height)), int(np.clip(v + reach, 0, camera.height)), 2)
     columns = slice(int(np.clip(u - reach, 0, camera.width)), int(np.clip(u + reach, 0, camera.width)), 2)
@@ -123,9 +123,7 @@ def hull_view(thing: Thing, scene: Scene, frame: Frame, pad_m: float) -> tuple[M
     local = frame.world_from_camera.inverse.apply(raised(thing.vertices, offset))
     if local[:, 2].min() < 0.15:
         return None
-    uv = np.stack(
-        [camera.fx * local[:, 0] / local[:, 2] + camera.cx, camera.fy * local[:, 1] / local[:, 2] + camera.cy], axis=1
-    )
+    uv = project(local, camera)
     scale = camera.fx / float(np.median(local[:, 2]))
     pad = pad_m * scale + 6
     left, top = int(max(uv[:, 0].min() - pad, 0)), int(max(uv[:, 1].min() - pad, 0))
@@ -143,7 +141,7 @@ def occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice
     """Colour pixels (all, or of an area) where something stands clearly nearer than the thing."""
     nearest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].min())
     depth = scene.filled_depth(frame.index)
-    return _at_colour((depth > 0) & (depth < nearest - 0.03 - 0.01 * nearest), frame, area)
+    return _at_colour(scene.noise.occluded(depth, nearest, 0.03), frame, area)
 
 
 def _at_colour(flags: Mask, frame: Frame, area: tuple[slice, slice] | None) -> Mask:
@@ -163,8 +161,8 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, sli
     first_row, first_column = int(rows[0]), int(columns[0])
     patch = depth[first_row : rows[-1] + 1, first_column : columns[-1] + 1]
     v, u = np.mgrid[first_row : first_row + patch.shape[0], first_column : first_column + patch.shape[1]] + 0.5
-    seen = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)], axis=-1) * patch[..., None]
-    points = frame.world_from_camera.apply(seen.reshape(-1, 3).astype(np.float64)).reshape(seen.shape)
+    seen = unproject(np.stack([u, v], axis=-1), patch.astype(np.float64), camera)
+    points = frame.world_from_camera.apply(seen.reshape(-1, 3)).reshape(seen.shape)
     low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
     slack = 0.015 + 0.5 * thing.pose_error_m
     near = ((points[..., :2] > low[:2] - slack) & (points[..., :2] < high[:2] + slack)).all(axis=-1)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.geometry.camera import project, sample_nearest, unproject
+from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
@@ -183,7 +184,7 @@ def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | No
     for frame in views:
         depth = scene.depth(frame.index)
         offset = support_offset(scene, frame, support, centres.mean(axis=0))
-        z, seen = _lookup(raised(centres, offset), frame, depth)
+        z, seen, _ = look_up(raised(centres, offset), frame.world_from_camera, frame.depth_camera, depth)
         valid = (z > 0.1) & (seen > 0)
         empty += valid & (seen > z + _DEPTH_SLACK_M)
         known += valid & (seen > z - 0.15)
@@ -259,19 +260,6 @@ def _as_deep_as_wide(voxels: Voxels, front: Points, views: list[Frame]) -> np.nd
     return np.asarray(inside.reshape(voxels.shape))
 
 
-def _lookup(points: Points, frame: Frame, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    camera = frame.depth_camera
-    local = frame.world_from_camera.inverse.apply(points)
-    z = np.maximum(local[:, 2], 1e-3)
-    column, row = (
-        (camera.fx * local[:, 0] / z + camera.cx).astype(np.int64),
-        (camera.fy * local[:, 1] / z + camera.cy).astype(np.int64),
-    )
-    inside = (local[:, 2] > 0.1) & (column >= 0) & (row >= 0) & (column < camera.width) & (row < camera.height)
-    seen = depth[np.where(inside, row, 0), np.where(inside, column, 0)]
-    return local[:, 2], np.where(inside, seen, 0)
-
-
 def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Frame], band_m: float) -> np.ndarray:
     """For each voxel, the share of colour silhouettes that hold it, among those that could."""
     centres = voxels.centres
@@ -280,20 +268,13 @@ def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Fr
         mask, _ = small_mask(thing, scene, frame, band_m)
         if not mask.any():
             continue
-        camera = frame.rgb_camera
         offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
-        local = frame.world_from_camera.inverse.apply(raised(centres, offset))
-        z = np.maximum(local[:, 2], 1e-3)
-        column, row = (
-            (camera.fx * local[:, 0] / z + camera.cx).astype(np.int64),
-            (camera.fy * local[:, 1] / z + camera.cy).astype(np.int64),
-        )
-        valid = (column >= 0) & (row >= 0) & (column < camera.width) & (row < camera.height)
-        hidden = occluders(thing, scene, frame)
-        column, row = np.where(valid, column, 0), np.where(valid, row, 0)
-        valid &= ~hidden[row, column] | mask[row, column]
+        uv = project(frame.world_from_camera.inverse.apply(raised(centres, offset)), frame.rgb_camera)
+        in_mask, valid = sample_nearest(mask, uv)
+        hidden, _ = sample_nearest(occluders(thing, scene, frame), uv)
+        valid &= ~hidden | in_mask
         seen += valid
-        inside += valid & mask[row, column]
+        inside += valid & in_mask
     share = inside / np.maximum(seen, 1)
     share[seen < 2] = 0
     return share.reshape(voxels.shape).astype(np.float32)

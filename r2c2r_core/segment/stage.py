@@ -1,18 +1,20 @@
 """Capture + prompts -> mask tracks (paper 4.1)."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
-from r2c2r_core.errors import InputError
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
-from r2c2r_core.segment.protocol import SegmentSession
+from r2c2r_core.segment.protocol import SegmentConfig, Segmenter, SegmentSession
 
-SEGMENTERS = Registry(
+__all__ = ["SEGMENTERS", "SegmentConfig", "open_session", "track_object"]
+
+SEGMENTERS: Registry[Segmenter] = Registry(
     "segmenter",
-    (
+    group="r2c2r.segmenters",
+    own=(
         Backend(
             name="geometric",
             target="r2c2r_core.segment.geometric:GeometricSegmenter",
@@ -49,23 +51,6 @@ SEGMENTERS = Registry(
     ),
 )
 
-Fusion = Literal["none", "depth-mask", "evidence"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SegmentConfig:
-    """Lengths in metres, so that they hold for any camera."""
-
-    cell_m: float = 0.0025  # mosaic cell: about a pixel of a phone at 2 m
-    mosaic_frames: int = 24  # more add smear, not evidence (real kitchen: 24 and 48 cut alike)
-    least_area_px: int = 60  # a smaller visible part does not count as seen
-    weights: str = ""  # of a learned segmenter: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id
-    fusion: Fusion = "evidence"  # of learned masks with depth: see fuse.py; "depth-mask" is the paper's
-
-    def __post_init__(self) -> None:
-        if self.fusion not in get_args(Fusion):
-            raise InputError(f"segment.fusion is '{self.fusion}'", hint=f"choose one of: {', '.join(get_args(Fusion))}")
-
 
 def open_session(
     capture: Capture,
@@ -77,6 +62,9 @@ def open_session(
 ) -> SegmentSession:
     """A capture made ready for clicks; heavy results live in `cache`."""
     config = config or SegmentConfig()
-    backend = SEGMENTERS.load(segmenter, weights=config.weights)
-    session: SegmentSession = backend.open(capture, cache, config, progress=progress)
-    return session
+    return SEGMENTERS.load(segmenter, weights=config.weights).open(capture, cache, config, progress=progress)
+
+
+def track_object(session: SegmentSession, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
+    """The object in every frame that sees it; raises ObjectNotSeen, PromptError."""
+    return session.track(prompt, progress=progress)

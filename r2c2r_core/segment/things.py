@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
+from r2c2r_core.geometry.camera import project, ray_slopes
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
 from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.mincut import VoxelGraph, build_graph, cut
@@ -22,6 +24,7 @@ _CLEARANCE_M = 0.012
 _SEEN_THROUGH_M = 0.10
 _FURNITURE_GAP_M = 0.08  # legs and seats are lost in part
 _LEVEL_COS = 0.92
+_FARTHEST_M = 1.0  # from a click: of what is larger, as a worktop, that much is found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +35,16 @@ class ThingConfig:
     width_m: float | None = None  # across, about, where the name says it
     round: bool = False  # as deep as wide
     on_floor: bool = False
+
+
+def sized_as(category: Category) -> ThingConfig:
+    """How large things of a category may be."""
+    return ThingConfig(
+        radius_m=min(category.longest_m / 2, _FARTHEST_M),
+        width_m=category.width.usual if category.round else None,
+        round=category.round,
+        on_floor=category.on_floor,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,9 +111,9 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
     import cv2
 
     depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
-    hidden = projected & (depth > 0) & (depth < model - 0.05 - 0.015 * model)
+    hidden = projected & scene.noise.occluded(depth, model, 0.05)
     sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
-    through = sensor > model + _SEEN_THROUGH_M + 0.02 * model  # between slats, which the surface closes
+    through = scene.noise.seen_through(sensor, model, _SEEN_THROUGH_M)  # between slats, which the surface closes
     shown = projected & ~hidden & ~through
     shown = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     share = float(shown.sum() / projected.sum())
@@ -227,7 +240,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
         camera = frame.depth_camera
         if not 0.25 < local[2] < 4.0:
             continue
-        u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
+        u, v = project(local, camera)
         if -0.1 * camera.width < u < 1.1 * camera.width and -0.1 * camera.height < v < 1.1 * camera.height:
             rated.append((-np.sqrt(max(frame.sharpness, 1e-3)) / local[2] ** 1.5, frame.index))
     views = []
@@ -235,8 +248,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
         frame = scene.frame(index)
         depth, camera = scene.depth(index), frame.depth_camera
         local = frame.world_from_camera.inverse.apply(centre[None])[0]
-        x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
-        y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
+        x, y = ray_slopes(np.arange(camera.width), np.arange(camera.height), camera)
         away = (x[None] * depth - local[0]) ** 2 + (y[:, None] * depth - local[1]) ** 2 + (depth - local[2]) ** 2
         inside = (depth > 0) & (away < reach_m**2)
         if inside.sum() < 30:

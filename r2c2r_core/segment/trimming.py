@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.fronts import Front
@@ -13,7 +14,7 @@ from r2c2r_core.segment.viewpoints import best_views
 
 _FRAMES = 16
 _STEP_M = 0.02
-_BEHIND_M, _BEHIND_SHARE = 0.08, 0.02  # and of the distance: depth this far behind the front went past it
+_BEHIND_M = 0.08  # depth this far behind the front went past it
 _OPEN = 0.85  # of what was measured in a column or row: glass lies in a frame that returns light, a gap has none
 _PARTLY_OPEN = 0.5  # of the line beside a gap
 _LEAST_KNOWN = 20
@@ -47,14 +48,8 @@ def trimmed(front: Front, scene: Scene) -> Front:
 
 def looked_through(points: Points, scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Of each world point, whether a frame's sensor measured at it or behind it, and whether clearly behind it."""
-    camera, depth = frame.depth_camera, scene.depth(frame.index)
-    local = frame.world_from_camera.inverse.apply(points)
-    z = np.maximum(local[:, 2], 1e-3)
-    u, v = camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy
-    inside = (local[:, 2] > 0.2) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    seen = np.where(inside, depth[np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)], 0)
-    slack = _BEHIND_M + _BEHIND_SHARE * z
-    return (seen > 0) & (seen > z - slack), seen > z + slack
+    z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+    return (seen > 0) & ~scene.noise.occluded(seen, z, _BEHIND_M), scene.noise.seen_through(seen, z, _BEHIND_M)
 
 
 def _solid_span(known: np.ndarray, through: np.ndarray) -> tuple[int, int]:

@@ -1,14 +1,12 @@
 """What a category says about its front: a machine is one front whatever lines it carries, a drawer is one of a stack."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.segment.cut import Cell
 from r2c2r_core.segment.runs import Run
 
 _USUAL_WORTH = 0.6  # a usual size weighs as much as two and a half clear edges
-_SPREAD = 0.22  # of sizes about the usual one, as a share
 _ROW_WORTH = 0.15
 _SAME_AREA = 0.85  # less is nested, more differs by a strip of shadow
 _NESTED_WORTH = 0.08  # a window and its frame lie inside a front, as clear as it: of equals the outermost is the front
@@ -21,33 +19,24 @@ _LEAST_Z = 0.35
 _RIM_M = 0.02
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FrontSize:
-    """Least, usual and largest width and height of a front in metres."""
-
-    width: tuple[float, float, float]
-    height: tuple[float, float, float]
-
-
-def unit_cell(run: Run, column: float, row: float, size: FrontSize) -> Cell | None:
+def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
     """The rectangle between lines of the run around a click of the size of such a unit, with the clearest edges."""
     cell_m = run.grid.cell_m
-    lefts = sorted({cell.left for cell in run.cells if cell.left < column and (column - cell.left) * cell_m < size.width[2]})
-    rights = sorted(
-        {cell.right for cell in run.cells if cell.right > column and (cell.right - column) * cell_m < size.width[2]}
-    )
-    tops = sorted({cell.top for cell in run.cells if cell.top < row and (row - cell.top) * cell_m < size.height[2]})
-    bottoms = sorted({cell.bottom for cell in run.cells if cell.bottom > row and (cell.bottom - row) * cell_m < size.height[2]})
+    widest, tallest = unit.width.high / cell_m, unit.height.high / cell_m
+    lefts = sorted({cell.left for cell in run.cells if cell.left < column and column - cell.left < widest})
+    rights = sorted({cell.right for cell in run.cells if cell.right > column and cell.right - column < widest})
+    tops = sorted({cell.top for cell in run.cells if cell.top < row and row - cell.top < tallest})
+    bottoms = sorted({cell.bottom for cell in run.cells if cell.bottom > row and cell.bottom - row < tallest})
     options = [
         Cell(left, top, right, bottom)
         for left in lefts
         for right in rights
-        if size.width[0] <= (right - left) * cell_m <= size.width[2]
+        if unit.width.holds((right - left) * cell_m)
         for top in tops
         for bottom in bottoms
-        if size.height[0] <= (bottom - top) * cell_m <= size.height[2]
+        if unit.height.holds((bottom - top) * cell_m)
     ]
-    rated = [(_worth(run, cell, size), cell) for cell in options]
+    rated = [(_worth(run, cell, unit), cell) for cell in options]
     best = max((worth for worth, _ in rated), default=0.0)
     equal = [(worth, cell) for worth, cell in rated if worth > best - _NESTED_WORTH]
     largest = max((cell.width * cell.height for _, cell in equal), default=0.0)
@@ -77,9 +66,9 @@ def line_clarity(run: Run, cell: Cell) -> tuple[float, ...]:
     return tuple(values)
 
 
-def _worth(run: Run, cell: Cell, size: FrontSize) -> float:
+def _worth(run: Run, cell: Cell, unit: Category) -> float:
     cell_m = run.grid.cell_m
-    off = np.log([cell.width * cell_m / size.width[1], cell.height * cell_m / size.height[1]]) / _SPREAD
+    off = np.array([unit.width.deviation(cell.width * cell_m), unit.height.deviation(cell.height * cell_m)])
     usual = float(np.exp(-0.5 * (off @ off)))
     return float(np.mean(line_clarity(run, cell))) + _USUAL_WORTH * usual + _ROW_WORTH * _in_row(run, cell)
 

@@ -3,8 +3,11 @@
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.camera import project
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
+
+_HIDDEN_M = 0.08  # a click may lie this far behind the surface that the frame shows: handles, glass
 
 
 def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
@@ -14,13 +17,13 @@ def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
         camera = frame.rgb_camera
         if local[2] < 0.2:
             continue
-        u, v = camera.fx * local[0] / local[2] + camera.cx, camera.fy * local[1] / local[2] + camera.cy
+        u, v = project(local, camera)
         margin = 0.04 * camera.width
         if not (margin < u < camera.width - margin and margin < v < camera.height - margin):
             continue
         seen = scene.filled_depth(frame.index)
-        at = seen[int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)]
-        if 0 < at < local[2] - 0.08:
+        row, column = int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)
+        if scene.noise.occluded(seen[row, column], local[2], _HIDDEN_M):
             continue
         away = point - frame.world_from_camera.translation
         rated.append((float(np.sqrt(max(frame.sharpness, 1e-3)) / local[2]), frame, float(np.arctan2(away[1], away[0]))))

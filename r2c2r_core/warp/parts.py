@@ -5,7 +5,7 @@ the cuts are capped, and the carcass is hollowed like its panels, so that an ope
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from r2c2r_core.model.scene import Box, Link, SceneObject
 from r2c2r_core.warp.solids import Paint, box_solid, joined, mesh_of, plain_box, solid_of
 
 _FAR_M = 10.0
-_INNER = ("tray", "shelf", "separator")  # names of boxes inside a fixture
+_TOUCH_M = 1e-4  # a board this near an outer face is at it
 _BESIDE_M = 0.0015  # between a moving front and what stays beside it
 _BEHIND_M = 0.002  # between a moving front and the carcass behind it
 
@@ -53,29 +53,45 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
 
 
 def front_region(item: SceneObject, link: Link) -> Region:
-    """The front board's box, unbounded forwards (the handle) and where it reaches the object's own edge."""
-    board = link.boxes[0]
-    centre = link.object_from_link.apply(board.link_from_box.translation[None])[0]
-    low, high = centre - board.size_m / 2, centre + board.size_m / 2
+    """The box of the front boards, unbounded forwards (the handle) and where it reaches the object's own edge."""
+    low, high = front_range(link)
     half = item.dimensions_m / 2
     for axis in (0, 2):
-        low[axis] = -_FAR_M if low[axis] < -half[axis] + 1e-4 else low[axis]
-        high[axis] = _FAR_M if high[axis] > half[axis] - 1e-4 else high[axis]
+        low[axis] = -_FAR_M if low[axis] < -half[axis] + _TOUCH_M else low[axis]
+        high[axis] = _FAR_M if high[axis] > half[axis] - _TOUCH_M else high[axis]
     low[1] = -_FAR_M
     return Region(low=low, high=high)
 
 
+def front_range(link: Link) -> tuple[Vector3, Vector3]:
+    """Corners of a moving link's front boards together, in the object frame."""
+    return _range(link, link.of_role("front"))
+
+
 def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
-    """The inside of the carcass, from its panels; empty (low > high) when it has none."""
-    panels = {box.name: box for box in item.links[0].boxes}
-    if not {"left", "right", "top", "back"} <= panels.keys():
-        return np.ones(3), -np.ones(3)
-    wall = float(panels["left"].size_m[0])
+    """The inside of the carcass, between its boards; empty (low > high) unless both sides, top, bottom and back have one."""
+    base = item.links[0]
     half = item.dimensions_m / 2
-    front = float(panels["left"].link_from_box.translation[1] - panels["left"].size_m[1] / 2)
-    low = np.array([-half[0] + wall, front - _BEHIND_M, -half[2] + wall])
-    high = np.array([half[0] - wall, half[1] - wall, half[2] - wall])
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for box in base.of_role("carcass"):
+        start, end = _range(base, (box,))
+        axis = int(np.argmin(end - start))
+        if start[axis] < -half[axis] + _TOUCH_M:
+            low[axis] = min(low[axis], end[axis])
+        if end[axis] > half[axis] - _TOUCH_M:
+            high[axis] = max(high[axis], start[axis])
+        if axis == 0:
+            low[1] = min(low[1], start[1] - _BEHIND_M)  # the front edges of the sides
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return np.ones(3), -np.ones(3)
     return low, high
+
+
+def _range(link: Link, boxes: Sequence[Box]) -> tuple[Vector3, Vector3]:
+    """Corners of boxes together, in the object frame; a link's axes are the object's."""
+    centres = link.object_from_link.apply(np.array([box.link_from_box.translation for box in boxes]))
+    halves = np.array([box.size_m for box in boxes]) / 2
+    return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
 
 
 def _widened(region: Region) -> Region:
@@ -86,7 +102,7 @@ def _widened(region: Region) -> Region:
 
 def _inner_boxes(item: SceneObject, link: Link, paint: Paint) -> list[TexturedMesh]:
     """What no camera saw, as panels: a drawer's floor, sides and back; shelves and floors inside a carcass."""
-    return [_placed(box, link, paint) for box in link.boxes if box.name.startswith(_INNER)]
+    return [_placed(box, link, paint) for box in link.of_role("inner")]
 
 
 def _placed(box: Box, link: Link, paint: Paint) -> TexturedMesh:
@@ -100,7 +116,7 @@ def _cut_open(item: SceneObject, mesh: TexturedMesh, paint: Paint, fronts: dict[
     visuals: dict[str, TexturedMesh] = {}
     for link in item.links[1:]:
         skin = _kept(mesh, fronts[link.name])
-        panels = [_placed(_thinner(box), link, paint) for box in link.boxes if not box.name.startswith("handle")]
+        panels = [_placed(_thinner(box), link, paint) for box in link.boxes if box.role != "handle"]
         visuals[link.name] = joined([skin, *panels])
     base = item.links[0]
     behind = max(region.high[1] for region in fronts.values()) + _BEHIND_M
@@ -149,7 +165,7 @@ def _sliced(mesh: TexturedMesh, normal: Vector3, offset: float) -> TexturedMesh:
 
 def _thinner(box: Box) -> Box:
     """The panel drawn in by a millimetre, so that it backs the skin without fighting it."""
-    return Box(name=box.name, size_m=np.maximum(box.size_m - 0.002, 0.001), link_from_box=box.link_from_box)
+    return replace(box, size_m=np.maximum(box.size_m - 0.002, 0.001))
 
 
 def outline(meshes: Sequence[TexturedMesh]) -> TexturedMesh:

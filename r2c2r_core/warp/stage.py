@@ -13,11 +13,12 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.schema.settings import setting
 from r2c2r_core.warp.affine import AxisMap, fit_map, fit_ranges, warp_vertices
 from r2c2r_core.warp.axes import face_outwards
 from r2c2r_core.warp.corners import FrontFace, find_front
 from r2c2r_core.warp.paper import PaperMap, fit_paper_map, paper_corners
-from r2c2r_core.warp.parts import cut_apart, outline
+from r2c2r_core.warp.parts import cut_apart, front_range, outline
 from r2c2r_core.warp.solids import with_plain_colours
 
 _INSIDE_RGB = (226, 222, 214)  # white melamine in the shade
@@ -27,11 +28,12 @@ _INSIDE_RGB = (226, 222, 214)  # white melamine in the shade
 class WarpConfig:
     """Settings of this stage."""
 
-    version: int = 2  # of the stage's code, so that a changed method re-runs
-    front_scale: tuple[float, float] = (0.7, 1.4)  # how much a front may be stretched before its mesh is not believed
-    depth_scale: tuple[float, float] = (0.2, 5.0)  # depth is mostly unobserved
-    method: Literal["axes", "paper"] = "axes"  # "paper": its corners and affine map (eq. 15-16) as printed, for comparison
-    seed: int = 0
+    front_scale: tuple[float, float] = setting(
+        (0.7, 1.4), "[least, most] stretch of a front in its plane before its mesh is not believed"
+    )
+    depth_scale: tuple[float, float] = setting((0.2, 5.0), "[least, most] stretch in depth, which is mostly unobserved")
+    method: Literal["axes", "paper"] = setting("axes", "axes, or paper: its corners and affine map (eq. 15-16) as printed")
+    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
 
 
 class _Unusable(Exception):  # not an error: the primitive stays visible and says so
@@ -67,7 +69,7 @@ def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: 
     vertices_world = item.final_from_placed.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
     if item.movable or not item.joints:
         return _whole(item, vertices_world, asset.mesh, config)
-    has_handle = any(box.name.startswith("handle") for link in item.links[1:] for box in link.boxes)
+    has_handle = any(link.of_role("handle") for link in item.links[1:])
     canonical = face_outwards(vertices_world, asset.mesh.faces, item.world_from_object, has_handle=has_handle, seed=config.seed)
     target = front_corners(item)
     paper = _paper_map(canonical.vertices, target)
@@ -152,9 +154,8 @@ def _corner_residual(item: SceneObject, visuals: dict[str, TexturedMesh], seed: 
     found = find_front(whole.vertices, whole.faces, seed=seed)
     if found is None:
         return None
-    boards = [(link.object_from_link @ link.boxes[0].link_from_box).translation for link in item.links[1:]]
-    halves = [link.boxes[0].size_m / 2 for link in item.links[1:]]
-    low, high = np.min(np.subtract(boards, halves), axis=0), np.max(np.add(boards, halves), axis=0)
+    ranges = [front_range(link) for link in item.links[1:]]
+    low, high = np.min([start for start, _ in ranges], axis=0), np.max([end for _, end in ranges], axis=0)
     corners = np.array(
         [[x, low[1], z] for x, z in ((high[0], high[2]), (low[0], high[2]), (low[0], low[2]), (high[0], low[2]))]
     )

@@ -1,6 +1,5 @@
 """Whether the manifest and scene.xml tell the same story as scene.urdf."""
 
-import json
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -8,14 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from r2c2r_core.documents import parse_json
+from r2c2r_core.errors import BundleError
 from r2c2r_core.export.plan import WORLD
 from r2c2r_core.export.reading import MOVING, Urdf, UrdfJoint
 from r2c2r_core.export.rules.files import BundleFiles, is_inside
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.export.writers.table import FORMATS, formats
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.report import Finding
 
-REQUIRED_FILES = ("scene.urdf", "scene.xml", "scene.usda", "scene.glb", "manifest.json", "preview.png", "README.txt")
+REQUIRED_FILES = (*(entry.file for entry in FORMATS), "manifest.json", "preview.png", "README.txt")
 _KEYS = ("schema", "tool_version", "capture", "world_from_capture", "objects", "stages")
 _OBJECT_KEYS = ("name", "category", "dimensions_m", "world_from_object", "joint", "meshes", "mass_kg")
 _USD_ASSET = re.compile(r"@@@(.+?)@@@|@([^@\n]+)@")
@@ -28,6 +30,7 @@ def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
     for name in REQUIRED_FILES:
         if not (files.folder / name).is_file():
             yield finding("file-missing", name, "it is not in the bundle")
+    yield from _own_checks(files)
     manifest = files.folder / "manifest.json"
     if manifest.is_file():
         yield from _manifest(urdf, manifest.read_bytes())
@@ -37,6 +40,19 @@ def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
     layer = files.folder / "scene.usda"
     if layer.is_file():
         yield from _usd(layer.read_bytes())
+
+
+def _own_checks(files: BundleFiles) -> Iterator[Finding]:
+    """What a format itself finds wrong with its file; one that another package adds need not be in every bundle."""
+    for entry in formats():
+        path = files.folder / entry.file
+        if entry.check is None or not path.is_file():
+            continue
+        try:
+            lines = list(entry.check(path))
+        except Exception as error:  # a format of another package may raise anything on a file that is damaged
+            lines = [f"cannot be checked: {type(error).__name__}: {error}"]
+        yield from (finding("format", entry.file, line) for line in lines)
 
 
 def _usd(content: bytes) -> Iterator[Finding]:
@@ -49,7 +65,7 @@ def _usd(content: bytes) -> Iterator[Finding]:
 
 def _manifest(urdf: Urdf, content: bytes) -> Iterator[Finding]:
     try:
-        document = json.loads(content)
+        document = parse_json(content, "manifest.json", BundleError, hint="")
         missing = [key for key in _KEYS if key not in document]
         missing += [f"objects[{k}].{key}" for k, o in enumerate(document["objects"]) for key in _OBJECT_KEYS if key not in o]
         if missing or document["schema"] != 1:
@@ -57,7 +73,7 @@ def _manifest(urdf: Urdf, content: bytes) -> Iterator[Finding]:
             yield finding("manifest-schema", "manifest.json", what)
             return
         yield from _objects(urdf, document["objects"])
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (BundleError, ValueError, KeyError, TypeError, AttributeError) as error:
         yield finding("manifest-schema", "manifest.json", f"cannot be read: {error}")
 
 

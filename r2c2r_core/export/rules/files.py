@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.disk import is_below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,7 +31,7 @@ class BundleFiles:
         if not is_inside(reference):
             return None
         path = self.folder / reference
-        return path if path.resolve().is_relative_to(self.folder.resolve()) else None
+        return path if is_below(path, self.folder) else None
 
     def mesh(self, reference: str) -> ObjMesh | None:
         """The mesh, or None when it is absent, outside, of another format, or damaged."""

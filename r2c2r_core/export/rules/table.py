@@ -1,4 +1,4 @@
-"""Every rule of the linter and of the simulation: its name, how bad a hit is, what it protects from (see sim-ready.md)."""
+"""Every rule of the linter, the simulation and the checksums: its name, how bad a hit is, what it protects from."""
 
 from typing import Literal, NamedTuple
 
@@ -15,6 +15,7 @@ class Rule(NamedTuple):
 RULES: dict[str, Rule] = {
     "number": Rule("error", "a number that is missing, not finite or not a number"),
     "name": Rule("error", "names outside [A-Za-z0-9_]: loaders and ROS refuse or rewrite them"),
+    "format": Rule("error", "what a format's own check finds in its file"),
     "duplicate-link": Rule("error", "MuJoCo, PyBullet and SAPIEN refuse it"),
     "duplicate-joint": Rule("error", "MuJoCo, PyBullet and SAPIEN refuse it"),
     "root": Rule("error", "two roots: SAPIEN refuses, MuJoCo loses the loose link"),
@@ -76,10 +77,17 @@ SIMULATION_RULES: dict[str, Rule] = {
     "blocked-by": Rule("warning", "a free-standing thing is in a joint's way"),
 }
 
+SEAL_RULES: dict[str, Rule] = {
+    "file-changed": Rule("error", "a file that is not the one that was certified"),
+    "file-lost": Rule("error", "a file of the bundle that is gone"),
+    "file-unlisted": Rule("warning", "a file that nobody certified"),
+    "file-unsealed": Rule("warning", "a bundle without checksums: what was changed in it cannot be told"),
+}
+
 UNSAFE = ("mesh-path", "mjcf-path", "usd-path")
 """With one of these, no loader is given the bundle: it would read files of this machine."""
 
 
 def finding(rule: str, where: str, message: str) -> Finding:
-    """A hit of a rule of either table."""
-    return Finding(rule=rule, severity=(RULES | SIMULATION_RULES)[rule].severity, where=where, message=message)
+    """A hit of a rule of any table."""
+    return Finding(rule=rule, severity=(RULES | SIMULATION_RULES | SEAL_RULES)[rule].severity, where=where, message=message)

@@ -3,6 +3,8 @@
 glTF is +Y up: the root node turns it.
 """
 
+import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,19 @@ def write_glb(plan: Plan, path: Path) -> None:
         if mesh is not None:
             scene.add_geometry(mesh, node_name=f"{body.name}_vis", geom_name=f"{body.name}_vis", parent_node_name=body.name)
     path.write_bytes(with_motion(scene.export(file_type="glb"), plan.bodies))
+
+
+def check_glb(path: Path) -> Iterator[str]:
+    """Whether the container is whole: its header (glTF 2.0, section 4.4) tells magic, version and length."""
+    content = path.read_bytes()
+    if len(content) < 12 or content[:4] != b"glTF":
+        yield "does not begin with 'glTF'"
+        return
+    version, length = struct.unpack("<II", content[4:12])
+    if version != 2:
+        yield f"is glTF {version}, 2 is expected"
+    if length != len(content):
+        yield f"holds {len(content)} bytes, {length} are expected"
 
 
 def _mesh_of(body: Body, pictures: dict[str, Any]) -> Any:

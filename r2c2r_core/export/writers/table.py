@@ -1,28 +1,40 @@
-"""The formats of a bundle. A new one is a file here and a line in FORMATS; `lint.py` re-reads it."""
+"""The formats of a bundle. A new one is a file here and a line in FORMATS: linter, reports and app take it from there."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from r2c2r_core.export.plan import Plan
-from r2c2r_core.export.writers.glb import write_glb
+from r2c2r_core.export.writers.glb import check_glb, write_glb
 from r2c2r_core.export.writers.mjcf import write_mjcf
 from r2c2r_core.export.writers.urdf import write_urdf
 from r2c2r_core.export.writers.usd import write_usd
+from r2c2r_core.plugins import added
+from r2c2r_core.progress import SILENT, Progress
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
     """One file of the bundle that carries the scene."""
 
+    name: str
     file: str
+    opened_by: str
+    reads_meshes: bool  # the files below meshes/, too
     write: Callable[[Plan, Path], None]
     loses: tuple[str, ...]  # what a reader of this file alone does not get
+    check: Callable[[Path], Iterable[str]] | None = None  # what is wrong with a written file, a line each
 
 
-FORMATS = (
+FORMATS: tuple[Format, ...] = (
     Format(
+        name="urdf",
         file="scene.urdf",
+        opened_by="ROS, PyBullet, SAPIEN, MuJoCo, Isaac's importer",
+        reads_meshes=True,
         write=write_urdf,
         loses=(
             "free-standing things are fixed where they stand (loaders disagree on floating joints)",
@@ -32,12 +44,18 @@ FORMATS = (
         ),
     ),
     Format(
+        name="mjcf",
         file="scene.xml",
+        opened_by="MuJoCo, with textures",
+        reads_meshes=True,
         write=write_mjcf,
         loses=("joint velocity limits (MuJoCo has none)", "where each number comes from: see manifest.json"),
     ),
     Format(
+        name="usd",
         file="scene.usda",
+        opened_by="Isaac Sim, Omniverse",
+        reads_meshes=True,
         write=write_usd,
         loses=(
             "fixtures without a joint are static: their mass is written, engines do not use it",
@@ -46,10 +64,33 @@ FORMATS = (
         ),
     ),
     Format(
+        name="glb",
         file="scene.glb",
+        opened_by="the web, editors",
+        reads_meshes=False,
         write=write_glb,
+        check=check_glb,
         loses=(
             "masses, colliders and how joints resist: it is the scene to look at; joints are clips that open and close them",
         ),
     ),
 )
+"""The project's own, in every bundle; `formats()` also has those of other packages."""
+
+
+def formats() -> tuple[Format, ...]:
+    """Every format that is written, the project's own first; a file that is taken stays whose it is."""
+    taken = {entry.file for entry in FORMATS}
+    return (*FORMATS, *(entry for entry in added("r2c2r.formats", Format) if entry.file not in taken))
+
+
+def write_formats(plan: Plan, folder: Path, *, progress: Progress = SILENT) -> None:
+    """Every format's file; one of another package that fails is left out, with a warning in the log."""
+    for entry in progress.each(formats(), "writing"):
+        try:
+            entry.write(plan, folder / entry.file)
+        except Exception as error:
+            if entry in FORMATS:
+                raise
+            (folder / entry.file).unlink(missing_ok=True)
+            _LOG.warning("%s is left out of the bundle: %s: %s", entry.file, type(error).__name__, error)

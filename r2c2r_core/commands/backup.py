@@ -1,0 +1,28 @@
+"""`r2c2r backup`."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, web_module
+
+
+def add(parsers: Parsers) -> None:
+    """The command and its options."""
+    added = add_command(parsers, "backup", backup)
+    add_data_folder(added)
+    wanted = "a new FILE.db for the database alone, else a new folder for it and the projects' files"
+    added.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT", help=wanted)
+
+
+def backup(options: argparse.Namespace) -> int:
+    """A copy of the data folder, also while it is served."""
+    moved = web_module("backups").backup(options.folder, options.target)
+    print(f"{options.target}: {described(moved)}; the database is sound")
+    return 0
+
+
+def described(moved: Any) -> str:
+    """Sizes in words."""
+    files = f"{moved.files} files of {moved.projects} projects, {moved.files_bytes / 1e6:.1f} MB"
+    return f"database {moved.database_bytes / 1e6:.1f} MB, {files}"

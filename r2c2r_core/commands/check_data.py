@@ -1,0 +1,22 @@
+"""`r2c2r check-data`."""
+
+import argparse
+
+from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, add_json, web_module, write_json
+from r2c2r_core.terminal import table
+
+
+def add(parsers: Parsers) -> None:
+    """The command and its options."""
+    added = add_command(parsers, "check-data", check_data)
+    add_data_folder(added)
+    add_json(added)
+
+
+def check_data(options: argparse.Namespace) -> int:
+    """Whether the database is sound and agrees with the files, both ways; also while it is served."""
+    found = web_module("data_check").check_data(options.folder)
+    if options.json:
+        write_json(options.json, {"version": 1, "findings": [finding.to_json() for finding in found]})
+    print(table(("what", "where", "detail"), [(f.what, f.where, f.detail) for f in found]) if found else "all is well")
+    return 1 if found else 0

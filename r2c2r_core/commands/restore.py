@@ -1,0 +1,21 @@
+"""`r2c2r restore`."""
+
+import argparse
+from pathlib import Path
+
+from r2c2r_core.commands.backup import described
+from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, web_module
+
+
+def add(parsers: Parsers) -> None:
+    """The command and its options."""
+    added = add_command(parsers, "restore", restore)
+    added.add_argument("source", type=Path, metavar="BACKUP", help="what `r2c2r backup` wrote, or any copy of r2c2r.db")
+    add_data_folder(added)
+
+
+def restore(options: argparse.Namespace) -> int:
+    """A backup into a data folder that is not served; what is there stays, the older database in backups/."""
+    moved = web_module("backups").restore(options.source, options.folder)
+    print(f"{options.folder}: {described(moved)} put in place")
+    return 0

@@ -1,0 +1,110 @@
+"""All candidates of one object, as planned: generated, joined by what is there and by a person's own, weighed, ranked."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+
+from r2c2r_core.errors import PlacementFailed
+from r2c2r_core.generate.consensus import Rule, choose_candidate, chosen_by_person
+from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates, marked, with_uploads
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.model.mesh import CandidateSet
+from r2c2r_core.model.placement import Placement
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+
+Place = Callable[..., Placement]
+"""(capture, track, asset, progress=…) to a placement, or PlacementFailed: how align does it is its own matter."""
+
+_MOST_WEIGHED = 5  # candidates placed for their evidence: about 4 s each on one core
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """How one object's candidates are made."""
+
+    generator: str
+    config: GenerateConfig
+    seed: int = 0
+    batch: int = 0  # how often a reviewer asked for further ones
+    excuse: str = ""  # why this generator stands in for the chosen one
+
+    @property
+    def places(self) -> bool:
+        """Whether its meshes have to be placed to be compared: a generator that knows where they stand measures itself."""
+        return self.generator != GENERATORS.default
+
+    def steps(self, uploads: bool) -> tuple["Plan", ...]:
+        """The plans whose candidates this one, perhaps with uploads, only adds to, the nearest first."""
+        return (*([self] if uploads else []), *([replace(self, batch=self.batch - 1)] if self.batch else []))
+
+    def stand_in(self, why: str) -> "Plan | None":
+        """The weight-free generator's plan, which says why; None of its own."""
+        if self.generator == GENERATORS.default:
+            return None
+        excuse = f"{self.generator} made no mesh, {GENERATORS.default} stands in: {why}"
+        return replace(self, generator=GENERATORS.default, excuse=excuse)
+
+
+def make_candidates(
+    capture: Capture,
+    track: MaskTrack,
+    plan: Plan,
+    uploads: tuple[Path, ...],
+    place: Place | None,
+    earlier: tuple[Plan, CandidateSet] | None,
+    *,
+    progress: Progress = SILENT,
+) -> CandidateSet:
+    """An object's candidates, ranked. What `earlier`, a step of the plan, gave is not generated anew."""
+    step, found = earlier or (None, None)
+    if found is not None and step == plan:
+        found = with_uploads(found, uploads, plan.config.rule)
+        return found if place is None else weighed(capture, track, found, place, plan.config.rule, progress)
+    found = generate_candidates(
+        capture,
+        track,
+        plan.generator,
+        plan.config,
+        uploads=uploads,
+        seed=plan.seed,
+        batch=plan.batch,
+        earlier=found,
+        progress=progress,
+    )
+    if place is not None:
+        found = weighed(capture, track, found, place, plan.config.rule, progress)
+    return marked(found, plan.excuse) if plan.excuse else found
+
+
+def weighed(
+    capture: Capture, track: MaskTrack, found: CandidateSet, place: Place, rule: Rule, progress: Progress = SILENT
+) -> CandidateSet:
+    """The candidates of generators that do not know their place, placed and compared with masks and depth; ranked anew.
+
+    The most likely few: one that no pose fits, or that was not tried, is known by its shape alone.
+    """
+    unknown = [c for c in found.candidates if "mask_iou" not in c.metrics]
+    if not unknown or len(found.candidates) == 1:
+        return found
+    tried = sorted(unknown, key=lambda c: found.ranking.index(c.candidate_id))[:_MOST_WEIGHED]
+    fits: dict[str, dict[str, float]] = {}
+    for k, asset in enumerate(tried):
+        part = progress.part(k / len(tried), (k + 1) / len(tried))
+        with suppress(PlacementFailed):
+            placed = place(capture, track, asset, progress=part)
+            depth = {"depth_residual_m": placed.rms_m} if isfinite(placed.rms_m) else {}
+            fits[asset.candidate_id] = {"mask_iou": placed.mask_iou, **depth}
+    candidates = [replace(c, metrics={**c.metrics, **fits.get(c.candidate_id, {})}) for c in found.candidates]
+    return choose_candidate(candidates, rule=rule)
+
+
+def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) -> CandidateSet:
+    """The candidate a person named, else the consensus among those nobody rejected; choosing makes no new candidates."""
+    if override.candidate is not None:
+        uploaded = [c.candidate_id for c in found.candidates if c.candidate_id.startswith("upload")]
+        return chosen_by_person(found, uploaded[0] if Path(override.candidate).is_file() else override.candidate)
+    return choose_candidate(found.candidates, rejected=override.rejected, rule=rule) if override.rejected else found
