@@ -1,6 +1,6 @@
 """What a route is given: the running app as the person who asks may use it. The type says which role a route needs."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Annotated
 
@@ -10,10 +10,10 @@ from app.security import Role
 from app.services.context import Context
 
 
-def context_for(role: Role) -> Callable[[Request], Context]:
+def context_for(role: Role) -> Callable[[Request], Awaitable[Context]]:
     """The running app's engine, queue and viewer, for someone of that role; Forbidden for anyone less."""
 
-    def get_context(request: Request) -> Context:
+    async def get_context(request: Request) -> Context:
         context: Context = replace(request.app.state.context, person=request.state.person)
         context.require(role)
         return context
@@ -21,7 +21,7 @@ def context_for(role: Role) -> Callable[[Request], Context]:
     return get_context
 
 
-def running_app(request: Request) -> Context:
+async def running_app(request: Request) -> Context:
     """The running app, for someone who has not signed in."""
     context: Context = request.app.state.context
     return context

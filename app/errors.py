@@ -10,6 +10,7 @@ R2C2RError (r2c2r_core.errors)
 │   ├── TooMany             429   the same was tried too often
 │   ├── NotReady            409   the thing asked for is not made yet
 │   └── Unavailable         503   a helper process is down
+├── DatabaseUnusable        503   damaged, of a newer r2c2r, not writable (exit 2)
 └── the core's own errors   422 what was given, 507/503 the machine, 500 the work
 """
 
@@ -62,6 +63,10 @@ class Unavailable(AppError):
     """A helper process is down."""
 
 
+class DatabaseUnusable(core.InputError):
+    """The database file is damaged, of a newer r2c2r, not writable, or none."""
+
+
 class NoSpace(core.EnvironmentProblem):
     """The disk is too full to start."""
 
@@ -77,6 +82,7 @@ KINDS: tuple[tuple[type[core.R2C2RError], str, int], ...] = (
     (TooMany, "too-many", 429),
     (Unavailable, "unavailable", 503),
     (NoSpace, "no-space", 507),
+    (DatabaseUnusable, "database", 503),
     (core.CaptureError, "capture", 422),
     (core.PromptError, "prompt", 422),
     (core.OverrideError, "override", 422),

@@ -1,14 +1,20 @@
 """Where a project's files are, and names that cannot leave their folder."""
 
 import contextlib
+import fcntl
+import json
 import os
 import re
 import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any
 
 from app.errors import Forbidden, NoSpace
+from r2c2r_core.errors import EnvironmentProblem
 
+_RECEIVED = "receiving-"
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
 
 
@@ -23,6 +29,21 @@ class ProjectFiles:
     def source(self) -> Path:
         """The recording as it was uploaded."""
         return self.root / "source"
+
+    @property
+    def half_made_mark(self) -> Path:
+        """There while an upload is being made this project: until then the folder is the upload's, and goes with it."""
+        return self.root / "half-made"
+
+    @property
+    def half_made(self) -> bool:
+        """Whether the folder is still an upload's."""
+        return self.half_made_mark.exists() and not self.description.exists()
+
+    @property
+    def description(self) -> Path:
+        """What the project is (services/descriptions.py): by it the folder is known when the database is lost."""
+        return self.root / "project.json"
 
     @property
     def previews(self) -> Path:
@@ -54,6 +75,15 @@ class ProjectFiles:
         """The clicks that the masks in the workspace were made from."""
         return self.root / "finished-prompts.json"
 
+    def request(self, job_id: int) -> Path:
+        """What a job was given: its request.json, with the clicks and corrections of then beside it."""
+        return self.requests / str(job_id) / "request.json"
+
+    @property
+    def requests(self) -> Path:
+        """What its jobs were given, a folder each."""
+        return self.root / "requests"
+
     @property
     def frames(self) -> Path:
         """The frame table (frames.json), written when the recording was read."""
@@ -76,11 +106,30 @@ def project_files(data_dir: Path, project_id: str, work: str | None = None) -> P
     return ProjectFiles(root, Path(work) if work else root / "work")
 
 
+def receiving(folder: Path, name: str) -> Path:
+    """Where a file is received that nobody can go on sending: left over, it may go."""
+    return folder / f"{_RECEIVED}{name}"
+
+
+def half_received(path: Path) -> bool:
+    """Whether the file is what such a reception left."""
+    return path.name.startswith(_RECEIVED)
+
+
 def safe_name(name: str, fallback: str = "recording") -> str:
     """A file name without folders, control characters or a leading dot, at most 120 characters."""
     last = name.replace("\\", "/").rsplit("/", 1)[-1]
     cleaned = _UNSAFE.sub("_", last).strip(" .")
     return cleaned[-120:] or fallback
+
+
+def free_name(folder: Path, name: str) -> Path:
+    """A path in the folder at which nothing is."""
+    target, number = folder / name, 1
+    while target.exists():
+        number += 1
+        target = folder / f"{name}-{number}"
+    return target
 
 
 def inside(root: Path, *parts: str) -> Path:
@@ -132,3 +181,50 @@ def delete_folder(folder: Path) -> int:
     elif folder.exists():
         shutil.rmtree(folder)
     return freed
+
+
+@contextlib.contextmanager
+def only_server(data_dir: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
+    """Hold the data folder against a second server: two queues on one table would run jobs twice.
+
+    Gives what says more about this server to others, beside its process id: see running_server.
+    """
+    with (data_dir / "server.lock").open("a+") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            owner = _said_in(handle).get("process", "unknown")
+            raise EnvironmentProblem(
+                f"{data_dir}: another r2c2r serves this folder (process {owner})", hint="use that one, or another --data"
+            ) from error
+
+        def announce(facts: dict[str, Any]) -> None:
+            handle.truncate(0)
+            handle.write(json.dumps({"process": os.getpid(), **facts}))
+            handle.flush()
+
+        announce({})
+        yield announce
+
+
+def running_server(data_dir: Path) -> dict[str, Any] | None:
+    """What the server that holds the data folder says of itself; None when none does, or it is only starting."""
+    try:
+        with (data_dir / "server.lock").open() as handle:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except OSError:
+                said = _said_in(handle)
+                return said if "address" in said else None
+    except FileNotFoundError:
+        pass
+    return None
+
+
+def _said_in(handle: IO[str]) -> dict[str, Any]:
+    handle.seek(0)
+    try:
+        said = json.loads(handle.read(10_000))
+    except ValueError:  # it is just being written
+        return {}
+    return said if isinstance(said, dict) else {}

@@ -1,109 +1,170 @@
-"""What happened, told to every open tab: numbered messages in memory, so that a tab that was away can catch up."""
+"""What happened, told to every open tab: numbered messages in memory, so that a tab that was away can catch up.
+
+A message is encoded once, in ASCII: whatever is in it, no tab's connection can fail of it. What is kept is bounded by bytes.
+"""
 
 import asyncio
+import json
 import secrets
 import threading
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-Message = dict[str, Any]
+KEPT_BYTES = 16 * 1024 * 1024  # of messages, for tabs that were away; a mask is some kilobytes
+WAITING_BYTES = 8 * 1024 * 1024  # of messages waiting for one tab
+PRESENCE_S = 0.2  # who is here is told at most this often: 300 tabs that come at once are a few messages each
 
-QUEUE_LIMIT = 5000  # messages waiting for one tab
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message as it goes over the wire; `text` is ASCII, so that its length is its bytes."""
+
+    seq: int
+    type: str
+    project: str | None
+    text: str
 
 
 @dataclass(eq=False, slots=True)
 class Listener:
     """One tab. `project` is the one it looks at; messages of other projects reach it only when they are about jobs."""
 
-    queue: "asyncio.Queue[Message]"
     loop: asyncio.AbstractEventLoop
     project: str | None = None
     who: str = ""  # the person; nobody's listener is not shown to others
     page: str = ""
     object: int | None = None  # the one it works on
+    sees: Callable[[str | None], bool] = lambda _: True  # whether its person may see a project
     tab: str = field(default_factory=lambda: secrets.token_hex(4))
+    queue: "asyncio.Queue[str]" = field(default_factory=asyncio.Queue)
+    _waiting: int = 0  # bytes
 
     def take(self, message: Message, epoch: str) -> None:
         """Queue the message; a tab that does not keep up is told to fetch everything anew instead."""
-        if self.queue.qsize() >= QUEUE_LIMIT:
+        text = message.text
+        if self._waiting + len(text) > WAITING_BYTES:
             while not self.queue.empty():
                 self.queue.get_nowait()
-            message = {"type": "hello", "epoch": epoch, "seq": message["seq"], "reset": True}
-        self.queue.put_nowait(message)
+            self._waiting = 0
+            text = json.dumps({"type": "hello", "epoch": epoch, "seq": message.seq, "reset": True, "tab": self.tab})
+        self._waiting += len(text)
+        self.queue.put_nowait(text)
+
+    async def next(self) -> str:
+        """The message that waits longest."""
+        text = await self.queue.get()
+        self._waiting -= len(text)
+        return text
 
     def wants(self, message: Message) -> bool:
         """Whether this tab shows what the message is about."""
-        return message["type"] in ("job", "projects") or message.get("project") == self.project
+        shown = message.type in ("job", "projects") or message.project == self.project
+        return shown and self.sees(message.project)
 
 
 @dataclass(slots=True)
 class Hub:
-    """Safe to publish to from any thread."""
+    """Safe to publish to from any thread; tabs join, move and leave on their event loop."""
 
-    keep: int = 4000
     epoch: str = field(default_factory=lambda: secrets.token_hex(8))
     _seq: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _listeners: set[Listener] = field(default_factory=set)
     _recent: "deque[Message]" = field(default_factory=lambda: deque())
+    _recent_bytes: int = 0
+    _presence_due: set[str] = field(default_factory=set)  # projects whose people will be told who is here
 
     def publish(self, type: str, project: str | None, **content: Any) -> None:
         """Number the message, remember it, hand it to every tab that wants it."""
         with self._lock:
             self._seq += 1
-            message: Message = {"type": type, "seq": self._seq, "project": project, **content}
-            self._recent.append(message)
-            if len(self._recent) > self.keep:
-                self._recent.popleft()
+            message = self._message(type, project, content)
+            self._remember(message)
             for listener in tuple(self._listeners):
                 if listener.wants(message):
                     self._hand(listener, message)
 
-    def join(self, project: str | None, since: int | None, epoch: str | None, who: str = "") -> tuple[Listener, bool]:
-        """A new listener with what it missed after `since` queued, and whether it must fetch everything anew."""
-        listener = Listener(asyncio.Queue(), asyncio.get_running_loop(), project, who)
+    def tell(self, listener: Listener, type: str, **content: Any) -> None:
+        """Say something to one tab alone; it is not remembered."""
+        with self._lock:
+            self._hand(listener, self._message(type, listener.project, content))
+
+    def join(
+        self,
+        project: str | None,
+        since: int | None,
+        epoch: str | None,
+        who: str = "",
+        sees: Callable[[str | None], bool] = lambda _: True,
+    ) -> Listener:
+        """A new listener: hello first (`reset`: it must fetch everything anew), then what it missed after `since`."""
+        listener = Listener(asyncio.get_running_loop(), project, who, sees=sees)
         with self._lock:
             missed, complete = self._missed(since, epoch)
-            for message in missed:
-                if listener.wants(message):
-                    listener.queue.put_nowait(message)
+            hello = {"epoch": self.epoch, "reset": not complete, "tab": listener.tab}
+            for message in (self._message("hello", project, hello), *missed):
+                if message.type == "hello" or listener.wants(message):
+                    listener.take(message, self.epoch)
             self._listeners.add(listener)
-            self._tell_who_is_here(project)
-        return listener, not complete
+        self._people_changed(project)
+        return listener
 
     def leave(self, listener: Listener) -> None:
         """Forget a tab."""
         with self._lock:
             self._listeners.discard(listener)
-            self._tell_who_is_here(listener.project)
+        self._people_changed(listener.project)
 
     def move(self, listener: Listener, project: str | None, page: str, number: int | None) -> None:
         """The tab looks at something else; everybody at the projects it comes from and goes to is told."""
         with self._lock:
             before = listener.project
             listener.project, listener.page, listener.object = project, page, number
-            for told in {before, project}:
-                self._tell_who_is_here(told)
+        for told in {before, project}:
+            self._people_changed(told)
 
     def watched(self, project: str) -> bool:
         """Whether any tab looks at the project."""
         with self._lock:
             return any(listener.project == project for listener in self._listeners)
 
+    def tabs_of(self, who: str) -> int:
+        """How many tabs of a person are connected."""
+        with self._lock:
+            return sum(listener.who == who for listener in self._listeners)
+
     @property
     def seq(self) -> int:
         """Number of the last message."""
         return self._seq
 
-    def _tell_who_is_here(self, project: str | None) -> None:
+    def _message(self, type: str, project: str | None, content: dict[str, Any]) -> Message:
+        said = {"type": type, "seq": self._seq, "project": project, **content}
+        return Message(self._seq, type, project, json.dumps(said, separators=(",", ":")))
+
+    def _remember(self, message: Message) -> None:
+        self._recent.append(message)
+        self._recent_bytes += len(message.text)
+        while self._recent_bytes > KEPT_BYTES:
+            self._recent_bytes -= len(self._recent.popleft().text)
+
+    def _people_changed(self, project: str | None) -> None:
+        """Tell everybody at the project who is there, once for all changes of a moment."""
+        if project is not None and project not in self._presence_due:
+            self._presence_due.add(project)
+            asyncio.get_running_loop().call_later(PRESENCE_S, self._tell_who_is_here, project)
+
+    def _tell_who_is_here(self, project: str) -> None:
         """Presence is a state, not an event: it is told as it is now, and never told again to a tab that was away."""
-        here = [
-            listener for listener in self._listeners if listener.who and project is not None and listener.project == project
-        ]
-        people = [{"tab": each.tab, "who": each.who, "page": each.page, "object": each.object} for each in here]
-        for listener in here:
-            self._hand(listener, {"type": "presence", "seq": self._seq, "project": project, "people": people})
+        self._presence_due.discard(project)
+        with self._lock:
+            here = [each for each in self._listeners if each.who and each.project == project and each.sees(project)]
+            people = [{"tab": each.tab, "who": each.who, "page": each.page, "object": each.object} for each in here]
+            message = self._message("presence", project, {"people": people})
+            for listener in here:
+                self._hand(listener, message)
 
     def _missed(self, since: int | None, epoch: str | None) -> tuple[list[Message], bool]:
         if since is None or not epoch:  # its first visit: there is nothing it could have missed
@@ -112,8 +173,8 @@ class Hub:
             return [], True
         if epoch != self.epoch or since > self._seq:
             return [], False
-        first = self._recent[0]["seq"] if self._recent else self._seq + 1
-        return [m for m in self._recent if m["seq"] > since], first <= since + 1
+        first = self._recent[0].seq if self._recent else self._seq + 1
+        return [m for m in self._recent if m.seq > since], first <= since + 1
 
     def _hand(self, listener: Listener, message: Message) -> None:
         try:

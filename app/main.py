@@ -14,16 +14,20 @@ from starlette.exceptions import HTTPException
 
 from app import errors, schemas
 from app.db.engine import open_engine
+from app.gates import Gates
 from app.hub import Hub
 from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
-from app.jobs.plans import Commands
+from app.jobs.plans import Commands, commands_of
 from app.jobs.rows import JobRows
 from app.jobs.runner import Runner
+from app.privacy import without_places
+from app.process import Workers
 from app.routes import (
     jobs,
     live,
     media,
+    members,
     pages,
     people,
     projects,
@@ -33,14 +37,21 @@ from app.routes import (
     scenes,
     states,
     system,
+    unknown,
     uploads,
     viewer,
 )
+from app.routes.addresses import Addresses
+from app.routes.members import MembersOnly
 from app.routes.once import Once
+from app.routes.packed import Packed
 from app.routes.static import PageFiles
 from app.security import Guard, Person
-from app.services import leftovers, masks, sending
+from app.services import leftovers, masks, sending, sizes
+from app.services.access import Access
+from app.services.at_work import AtWork
 from app.services.context import Context
+from app.services.descriptions import Descriptions
 from app.services.people import People
 from app.services.prompts import tell_object
 from app.services.uploads import forget_stopped
@@ -52,7 +63,24 @@ _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
 MOST_BODY_BYTES = 16 * MEBIBYTE  # of what is read at once; routes that store a stream count its bytes themselves
-ROUTERS = (system, people, projects, uploads, prompts, proposals, jobs, reviews, states, scenes, media, viewer, live, pages)
+ROUTERS = (
+    system,
+    people,
+    projects,
+    members,
+    uploads,
+    prompts,
+    proposals,
+    jobs,
+    reviews,
+    states,
+    scenes,
+    media,
+    viewer,
+    live,
+    unknown,
+    pages,
+)
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
 
@@ -62,14 +90,15 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        context = await anyio.to_thread.run_sync(_open, settings, commands or Commands(), viewer_client)
+        context = await anyio.to_thread.run_sync(_open, settings, commands or commands_of(settings), viewer_client)
         app.state.context = context
         tidying = asyncio.create_task(_tidy(context))
         try:
             yield
         finally:
             tidying.cancel()
-            await anyio.to_thread.run_sync(_close, context)
+            with anyio.CancelScope(shield=True):
+                await anyio.to_thread.run_sync(_close, context, limiter=anyio.CapacityLimiter(1))
 
     app = FastAPI(
         title="r2c2r",
@@ -86,26 +115,35 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
     app.mount("/static", PageFiles(directory=static), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
+    app.add_middleware(Addresses)
     app.add_middleware(Once, context_of=lambda: app.state.context)
+    app.add_middleware(MembersOnly, context_of=lambda: app.state.context)
+    app.add_middleware(Packed)
     app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)
     return app
 
 
 def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) -> Context:
     """Everything that runs: the database, the queue, the live segmenters, the viewer."""
-    engine, hub = open_engine(settings.database), Hub()
+    engine, hub, gates = open_engine(settings.database), Hub(), Gates()
     runner = Runner(JobRows(engine, hub, settings, FINISHERS, job_ended), settings, commands)
     context = Context(
         settings=settings,
         engine=engine,
         hub=hub,
-        people=People(engine, settings),
+        people=People(engine, settings, gates.passwords),
+        access=Access(engine),
+        uploads=AtWork(),
+        descriptions=Descriptions(engine, settings),
         person=Person(settings.user, "admin"),
         runner=runner,
         live=LiveSegmenters(engine, hub, settings, commands),
         viewer=viewer_client or Viewer(settings),
+        gates=gates,
+        probes=Workers(),
         static=shipped("static", "index.html"),
     )
+    context.descriptions.start()
     context.live.on_object = lambda project, number: _tell(context, project, number)
     if settings.run_jobs:
         runner.start()
@@ -119,18 +157,38 @@ async def _person_of(app: FastAPI, session: str) -> Person | None:
 
 
 async def _tidy(context: Context) -> None:
-    """Close what nobody looks at any more."""
+    """Close what nobody looks at any more, in a thread of its own: it may wait for the 3D view."""
+    thread = anyio.CapacityLimiter(1)
     while True:
         await asyncio.sleep(TIDY_S)
-        for tidy in (_close_idle_views, forget_stopped, leftovers.tidy, sending.tidy):
+        for tidy in TIDYING:
             try:
-                await anyio.to_thread.run_sync(tidy, context)
+                await anyio.to_thread.run_sync(tidy, context, limiter=thread)
             except Exception:  # a full disk or a locked database now must not end tidying for good
                 _log.exception("tidying")
 
 
+def _look_at_members(context: Context) -> None:
+    context.access.look_again()
+
+
 def _close_idle_views(context: Context) -> None:
     context.viewer.close_idle()
+
+
+def _forget_ended(context: Context) -> None:
+    context.people.forget_ended()
+
+
+TIDYING = (
+    _close_idle_views,
+    _look_at_members,
+    _forget_ended,
+    forget_stopped,
+    leftovers.tidy,
+    sending.tidy,
+    sizes.measure,
+)
 
 
 def _tell(context: Context, project: str, number: int) -> None:
@@ -140,10 +198,24 @@ def _tell(context: Context, project: str, number: int) -> None:
         return
 
 
-def _close(context: Context) -> None:
-    context.live.stop()
+async def let_go(app: FastAPI) -> None:
+    """End what requests wait for, so that a server that stops need not wait for them; it takes no other request after this."""
+    context: Context | None = getattr(app.state, "context", None)
+    if context is not None:
+        await anyio.to_thread.run_sync(_end_waits, context, limiter=anyio.CapacityLimiter(1))
+
+
+def _end_waits(context: Context) -> None:
+    context.probes.stop()
     context.viewer.stop()
+
+
+def _close(context: Context) -> None:
+    """First what requests wait for, so that they end too; nothing here waits for a request."""
+    _end_waits(context)
+    context.live.stop()
     context.runner.stop()
+    context.descriptions.stop()
     context.engine.dispose()
 
 
@@ -151,9 +223,13 @@ def _add_error_handlers(app: FastAPI) -> None:
     """Every failure leaves in the one shape."""
 
     @app.exception_handler(R2C2RError)
-    async def known(_: Request, error: R2C2RError) -> JSONResponse:
+    async def known(request: Request, error: R2C2RError) -> JSONResponse:
         headers = {"retry-after": str(error.retry_s)} if isinstance(error, errors.TooMany) else None
-        return JSONResponse(errors.error_body(error), errors.kind_of(error)[1], headers=headers)
+        said, person = errors.error_body(error), getattr(request.state, "person", None)
+        if person is None or not person.may("admin"):
+            settings = request.app.state.context.settings
+            said |= {key: without_places(said[key], settings) for key in ("message", "hint")}
+        return JSONResponse(said, errors.kind_of(error)[1], headers=headers)
 
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:

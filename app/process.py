@@ -7,8 +7,10 @@ import queue
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,19 +22,23 @@ Line = dict[str, Any]
 
 
 class Worker:
-    """A running worker. Its stderr, and whatever on stdout is not JSON, goes to the log."""
+    """A running worker. Its stderr, and whatever on stdout is not JSON, goes to the log.
+
+    Its temporary files lie in a folder of its own, which ends with it however it ends.
+    """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         self._log: IO[bytes] = log.open("ab")
         self._lines: queue.Queue[Line | None] = queue.Queue()
+        self._temporary = tempfile.TemporaryDirectory(prefix="r2c2r-worker-")
         self.process = subprocess.Popen(
             list(command),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
             start_new_session=True,
-            env=_environment(),
+            env=_environment() | {"TMPDIR": self._temporary.name},
         )
         self._reader = threading.Thread(target=self._read, name=f"worker-{self.process.pid}", daemon=True)
         self._reader.start()
@@ -85,6 +91,8 @@ class Worker:
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
+        with contextlib.suppress(OSError):  # a disk that fails
+            self._temporary.cleanup()
         return status
 
     def _read(self) -> None:
@@ -104,6 +112,33 @@ class Worker:
         else:
             with contextlib.suppress(OSError):  # a full disk must not stop us listening
                 self._log.write(raw)
+
+
+class Workers:
+    """Workers that requests wait for, all ended at once when the server stops: then they say their last."""
+
+    def __init__(self) -> None:
+        self.stopped = False
+        self._running: set[Worker] = set()
+
+    @contextmanager
+    def running(self, command: Sequence[str], log: Path) -> Iterator[Worker]:
+        """A worker that ends with this block, or with the server; when that stops already, one that has ended."""
+        worker = Worker(command, log)
+        self._running.add(worker)
+        if self.stopped:  # looked at after it was added: stop() sees it, or we see that it was called
+            worker.kill()
+        try:
+            yield worker
+        finally:
+            worker.close()
+            self._running.discard(worker)
+
+    def stop(self) -> None:
+        """End those that run and those that will; takes no lock, for whoever waits for one may hold any."""
+        self.stopped = True
+        for worker in tuple(self._running):
+            worker.kill()
 
 
 def python_module(*words: str) -> tuple[str, ...]:

@@ -17,12 +17,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.errors import body, kind_of
 from r2c2r_core.errors import R2C2RError
 
-COOKIE = "r2c2r_session"
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 OPEN_PATHS = ("/api/health", "/api/login", "/login", "/static/", "/favicon.ico")
 Role = Literal["annotator", "reviewer", "admin"]
 Refusal = tuple[int, str, str, str]  # status, kind, message, hint
 ROLES: tuple[Role, ...] = ("annotator", "reviewer", "admin")  # each may do what those before it may
+TLS_POLICY = "max-age=31536000"  # a year: a browser that came by TLS never again comes without
+FEATURE_POLICY = "camera=(), microphone=(), geolocation=(), payment=(), usb=(), serial=(), bluetooth=(), display-capture=()"
 PAGE_POLICY = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "frame-src 'self'; worker-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
@@ -44,9 +45,17 @@ class Person:
         return ROLES.index(self.role) >= ROLES.index(needed)
 
 
-def session_in(cookie_header: str) -> str:
+def cookie_name(scope: Scope) -> str:
+    """What the session's cookie is called: browsers send a host's cookies to each of its ports, so it says which is ours."""
+    server = scope.get("server")
+    return f"r2c2r_session_{server[1]}" if server else "r2c2r_session"
+
+
+def session_in(scope: Scope, cookie_header: str) -> str:
     """The session id of a request's cookies; empty when there is none."""
-    return cookie_parser(cookie_header).get(COOKIE, "")  # other apps of this machine may have set anything beside it
+    return cookie_parser(cookie_header).get(
+        cookie_name(scope), ""
+    )  # other apps of this machine may have set anything beside it
 
 
 class Guard:
@@ -63,7 +72,7 @@ class Guard:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        session = session_in(headers.get("cookie", ""))
+        session = session_in(scope, headers.get("cookie", ""))
         refusal, person = self._foreign(scope, headers), None
         if refusal is None and not scope["path"].startswith(OPEN_PATHS):
             person, refusal = await self._enter(scope, session)
@@ -136,6 +145,9 @@ def _with_safe_headers(send: Send, scope: Scope) -> Send:
             headers.setdefault("x-frame-options", "SAMEORIGIN")
             headers.setdefault("cross-origin-opener-policy", "same-origin")
             headers.setdefault("cross-origin-resource-policy", "same-origin")
+            headers.setdefault("permissions-policy", FEATURE_POLICY)
+            if scope.get("scheme") == "https":
+                headers.setdefault("strict-transport-security", TLS_POLICY)
             if not viewer:
                 headers.setdefault("content-security-policy", PAGE_POLICY)
             if scope["path"].startswith("/api/"):

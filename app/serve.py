@@ -2,10 +2,8 @@
 
 import contextlib
 import errno
-import fcntl
 import ipaddress
 import json
-import os
 import socket
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,17 +12,20 @@ from pathlib import Path
 
 import psutil
 import uvicorn
+from fastapi import FastAPI
+from sqlalchemy import Engine
 from sqlmodel import select
 
-from app.db.documents import inputs_key
-from app.db.engine import open_engine, writing
+from app.db.engine import opened, writing
 from app.db.tables import Project
-from app.files import project_files
+from app.files import only_server, project_files, running_server
 from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts
-from app.main import create_app
-from app.services import accounts
+from app.main import create_app, let_go
+from app.services import accounts, launch_keys
+from app.services.adopting import adopt_all
 from app.services.projects import new_project
-from app.settings import LOOPBACK, MAX_UPLOAD_BYTES, Settings
+from app.settings import DATABASE, LOOPBACK, MAX_UPLOAD_BYTES, Quotas, Settings
+from r2c2r_core.disk import keep_private, resolved
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
 
@@ -36,92 +37,144 @@ def serve(
     names: Sequence[str] = (),
     open_project: str | None = None,
     heavy_jobs: int = 1,
+    workers: int = 0,
     max_upload_bytes: int = MAX_UPLOAD_BYTES,
+    behind_proxy: Sequence[str] = (),
+    quotas: Quotas = Quotas(),  # frozen
+    adopt: bool = False,
 ) -> None:
     """Run the app until it is stopped; the address is printed first, with its key when only this machine reaches it.
 
-    `names` are host names by which people reach it, where they differ from the address it listens on.
+    `names` are host names by which people reach it, where they differ from the address it listens on; `behind_proxy` are the
+    addresses or networks of proxies whose word about who asks, and whether by TLS, is believed. `adopt` makes projects of
+    the folders that the database does not know, and a new database where there is none.
     """
-    data_dir = data_dir.expanduser().resolve()
-    settings = replace(_settings(data_dir, host, names), heavy_jobs=heavy_jobs, max_upload_bytes=max_upload_bytes)
-    with _only_server(data_dir), _bound(host, port) as listening:
-        if settings.accounts_only:
-            _require_accounts(settings)
+    data_dir = resolved(data_dir)
+    proxies = [_network(address) for address in behind_proxy]
+    settings = _settings(data_dir, host, names, shared=bool(proxies))
+    settings = replace(settings, heavy_jobs=heavy_jobs, workers=workers, max_upload_bytes=max_upload_bytes, quotas=quotas)
+    keep_private(data_dir, DATABASE)
+    with only_server(data_dir) as announce, _bound(host, port) as listening:
+        with opened(settings.database, anew=adopt) as engine:  # what is wrong with it is said before an address is
+            if adopt:
+                sys.stderr.writelines(f"r2c2r: {line}\n" for line in adopt_all(engine, data_dir, settings.user))
+            if settings.accounts_only:
+                _require_accounts(engine, proxies)
         address = f"http://{names[0] if names else _shown_host(host)}:{listening.getsockname()[1]}"
+        announce({"address": address, "accounts_only": settings.accounts_only})
         page = f"/p/{open_project}" if open_project else "/"
         key = "" if settings.accounts_only else f"?token={settings.launch_token}"
         sys.stdout.write(f"r2c2r: {address}{page}{key}\n")
         sys.stdout.flush()
+        app = create_app(settings)
         config = uvicorn.Config(
-            create_app(settings),
+            app,
             log_level="warning",
             ws_per_message_deflate=False,  # scenes and masks are compressed or not compressible: it only costs time
             timeout_graceful_shutdown=3,
             server_header=False,
+            proxy_headers=bool(proxies),
+            forwarded_allow_ips=proxies,
         )
-        uvicorn.Server(config).run(sockets=[listening])
+        _Server(config, app).run(sockets=[listening])
+
+
+class _Server(uvicorn.Server):
+    """One that ends what its requests wait for before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop, in seconds."""
+        await let_go(self._app)
+        await super().shutdown(sockets)
+
+
+def new_address(data_dir: Path) -> str:
+    """Another address that signs one browser in at the server that serves this folder now."""
+    data_dir = resolved(data_dir)
+    running = running_server(data_dir)
+    if running is None:
+        raise EnvironmentProblem(f"{data_dir}: no r2c2r serves this folder", hint="r2c2r serve prints an address")
+    if running["accounts_only"]:
+        hint = "open its address and sign in; r2c2r user password NAME sets a new password"
+        raise EnvironmentProblem("people sign in to this server by name and password", hint=hint)
+    with opened(Settings(data_dir=data_dir).database) as engine:
+        return f"{running['address']}/?token={launch_keys.new(engine)}"
 
 
 def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path, workdir: Path) -> str:
     """A finished workspace as a project, read where it is; the same workspace is the same project. Returns its id."""
     from app.jobs.ingest import describe
-    from r2c2r_core.workspace import Workspace
+    from r2c2r_core.workspace import Workspace, write_atomically
 
-    data_dir, workdir = data_dir.expanduser().resolve(), workdir.resolve()
+    data_dir, workdir = resolved(data_dir), resolved(workdir)
     capture = Workspace(workdir).load_latest("ingest", "scene")
     if capture is None:
         raise InputError(f"{workdir}: holds no finished run", hint="run it first")
     settings = Settings(data_dir=data_dir)
-    engine = open_engine(settings.database)
-    try:
-        with writing(engine) as session:
-            found = session.exec(select(Project).where(Project.work_path == str(workdir))).first()
-            project = found or new_project(session, name, source.name, source.resolve(), workdir)
-            files = project_files(data_dir, project.id, project.work_path)
-            files.root.mkdir(parents=True, exist_ok=True)
-            describe(capture, files.root, source.resolve())
-            document = json.loads(prompts.read_text())
-            files.finished_prompts.write_text(json.dumps(document))
-            adopt_capture(project, files)
-            if found is None:
-                adopt_prompts(session, project, document, settings.user)
-            if (workdir / "bundle.zip").is_file():
-                adopt_bundle(session, project, files, inputs_key(session, project.id))
-            session.add(project)
-            return project.id
-    finally:
-        engine.dispose()
+    with opened(settings.database) as engine, writing(engine) as session:
+        found = session.exec(select(Project).where(Project.work_path == str(workdir))).first()
+        project = found or new_project(session, name, source.name, source.resolve(), workdir)
+        files = project_files(data_dir, project.id, project.work_path)
+        files.root.mkdir(parents=True, exist_ok=True)
+        describe(capture, files.root, source.resolve())
+        document = json.loads(prompts.read_text())
+        write_atomically(files.finished_prompts, json.dumps(document).encode())
+        adopt_capture(project, files)
+        if found is None:
+            adopt_prompts(session, project, document, settings.user)
+        if (workdir / "bundle.zip").is_file():
+            adopt_bundle(session, project, files, project.inputs)
+        session.add(project)
+        return project.id
 
 
-def _settings(data_dir: Path, host: str, names: Sequence[str]) -> Settings:
-    try:
-        data_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise EnvironmentProblem(f"{data_dir}: {error.strerror}", hint="choose another folder with --data") from error
+def require_database(data_dir: Path) -> None:
+    """Raise DatabaseUnusable for a database that the app could not work with, before long work is begun for it."""
+    settings = Settings(data_dir=resolved(data_dir))
+    keep_private(settings.data_dir, DATABASE)
+    with opened(settings.database):
+        pass
+
+
+def _settings(data_dir: Path, host: str, names: Sequence[str], *, shared: bool) -> Settings:
     settings = Settings(data_dir=data_dir, host=host, allowed_hosts=(*LOOPBACK, *(name.lower() for name in names)))
-    if _is_loopback(host) and not names:
+    if _is_loopback(host) and not names and not shared:
         return settings
     reached = (*settings.allowed_hosts, host, socket.gethostname().lower(), *_own_addresses())
     return replace(settings, accounts_only=True, allowed_hosts=reached)
 
 
-def _require_accounts(settings: Settings) -> None:
-    engine = open_engine(settings.database)
-    try:
-        if not accounts.everyone(engine):
-            raise EnvironmentProblem(
-                "this address can be reached from other machines, and nobody has an account",
-                hint="make one first: r2c2r user add NAME --role admin; or bind 127.0.0.1 and tunnel with ssh -L",
-            )
-    finally:
-        engine.dispose()
-    sys.stderr.write("r2c2r: passwords and scans cross the network as they are; put it behind a proxy that speaks TLS\n")
+def _require_accounts(engine: Engine, proxies: Sequence[str]) -> None:
+    if not accounts.everyone(engine):
+        raise EnvironmentProblem(
+            "this address can be reached from other machines, and nobody has an account",
+            hint="make one first: r2c2r user add NAME --role admin; or bind 127.0.0.1 and tunnel with ssh -L",
+        )
+    if not proxies:
+        sys.stderr.write(
+            "r2c2r: passwords and scans cross the network as they are; put it behind a proxy that speaks TLS, and say which: "
+            "--behind-proxy ADDRESS, else all people are one address to it\n"
+        )
 
 
 def _own_addresses() -> list[str]:
     """Addresses of this machine: who listens on all of them is called by any."""
     found = (address.address for addresses in psutil.net_if_addrs().values() for address in addresses)
     return [address.split("%")[0].lower() for address in found if address[:1].isalnum()]
+
+
+def _network(address: str) -> str:
+    """A proxy's address, or a network of them, as it was given."""
+    try:
+        return str(ipaddress.ip_network(address) if "/" in address else ipaddress.ip_address(address))
+    except ValueError as error:
+        raise InputError(
+            f"--behind-proxy {address}: {error}", hint="the address from which the proxy connects: 127.0.0.1"
+        ) from error
 
 
 def _is_loopback(host: str) -> bool:
@@ -136,24 +189,6 @@ def _shown_host(host: str) -> str:
 
 
 @contextlib.contextmanager
-def _only_server(data_dir: Path) -> Iterator[None]:
-    """Hold the data folder against a second server: two queues on one table would run jobs twice."""
-    with (data_dir / "server.lock").open("a+") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            handle.seek(0)
-            owner = handle.read(20).strip() or "unknown"
-            raise EnvironmentProblem(
-                f"{data_dir}: another r2c2r serves this folder (process {owner})", hint="use that one, or another --data"
-            ) from error
-        handle.truncate(0)
-        handle.write(str(os.getpid()))
-        handle.flush()
-        yield
-
-
-@contextlib.contextmanager
 def _bound(host: str, port: int) -> Iterator[socket.socket]:
     """A listening socket; a taken port is said in one line."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -162,6 +197,10 @@ def _bound(host: str, port: int) -> Iterator[socket.socket]:
     try:
         try:
             listening.bind((host, port))
+        except (TypeError, UnicodeError) as error:  # a name that IDNA cannot encode
+            raise EnvironmentProblem(
+                f"cannot listen on {host[:60]!r}: no host's name or address", hint="check --host"
+            ) from error
         except OSError as error:
             if error.errno == errno.EADDRINUSE:
                 hint = f"stop what uses it, or choose another one: --port {port + 1}"

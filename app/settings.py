@@ -3,14 +3,42 @@
 import getpass
 import os
 import secrets
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import app
+from r2c2r_core.errors import InputError
 
 MEBIBYTE = 1024 * 1024
 MAX_UPLOAD_BYTES = 16 * 1024 * MEBIBYTE
+DATABASE = "r2c2r.db"  # in the data folder; by it the folder is known to be one
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quotas:
+    """What one person may take at a time; admins take more."""
+
+    jobs: int = 20  # waiting or running
+    uploads: int = 20  # announced and not finished
+    upload_gb: int = 64  # of them
+    samples: int = 20
+    projects: int = 1000
+
+
+def quotas_from(wishes: Sequence[str]) -> Quotas:
+    """Quotas from `name=number`; raises InputError."""
+    names = [each.name for each in fields(Quotas)]
+    wanted: dict[str, int] = {}
+    for wish in wishes:
+        name, _, number = wish.partition("=")
+        if name not in names or not number.isdecimal() or len(number) > 9:
+            raise InputError(
+                f"--quota {wish[:80]!r}: not NAME=N", hint=f"NAME is one of {', '.join(names)}; N is what one may have"
+            )
+        wanted[name] = int(number)
+    return Quotas(**wanted)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +57,9 @@ class Settings:
     max_unpacked_files: int = 200_000
     min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
     job_memory_bytes: int = 2048 * MEBIBYTE  # free before a job starts: what a kitchen of a recording of minutes takes
+    quotas: Quotas = Quotas()
     heavy_jobs: int = 1
+    workers: int = 0  # objects of a job side by side; 0: as cores, shared by the heavy jobs, and memory allow
     job_attempts: int = 3  # how often a job whose process vanishes is begun without getting further
     job_losses: int = 10  # the same when its server vanishes, which is hardly the job's doing
     kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
@@ -40,14 +70,25 @@ class Settings:
     user: str = field(default_factory=lambda: _user_name())
 
     @property
+    def workers_a_job(self) -> int:
+        """Processes that one job may start; 0 leaves it to the cores and the memory that are there."""
+        shared = max(1, len(os.sched_getaffinity(0)) // self.heavy_jobs)
+        return self.workers or (0 if self.heavy_jobs == 1 else shared)
+
+    @property
     def database(self) -> Path:
         """The SQLite file."""
-        return self.data_dir / "r2c2r.db"
+        return self.data_dir / DATABASE
 
     @property
     def uploads(self) -> Path:
         """Recordings on their way in."""
         return self.data_dir / "uploads"
+
+    @property
+    def unknown(self) -> Path:
+        """What lay in the data folder without a row: set aside for an admin."""
+        return self.data_dir / "unknown"
 
     @property
     def roots(self) -> tuple[Path, ...]:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from sqlalchemy import Engine
 
-from app.db.engine import open_engine
+from app.db.engine import opened
 from app.services import accounts
-from app.settings import Settings
+from app.settings import DATABASE, Settings
+from r2c2r_core.disk import keep_private, resolved
 
 
 def add(data_dir: Path, name: str, role: str, password: str) -> None:
@@ -32,19 +33,18 @@ def remove(data_dir: Path, name: str) -> None:
 def set_role(data_dir: Path, name: str, role: str) -> None:
     """Another role."""
     with _engine(data_dir) as engine:
-        accounts.set_role(engine, name, role)
+        accounts.change(engine, name, role=role)
 
 
 def set_password(data_dir: Path, name: str, password: str) -> None:
     """Another password; the account's sessions end."""
     with _engine(data_dir) as engine:
-        accounts.set_password(engine, name, password)
+        accounts.change(engine, name, password=password)
 
 
 @contextmanager
 def _engine(data_dir: Path) -> Iterator[Engine]:
-    engine = open_engine(Settings(data_dir=data_dir.expanduser().resolve()).database)
-    try:
+    settings = Settings(data_dir=resolved(data_dir))
+    keep_private(settings.data_dir, DATABASE)
+    with opened(settings.database) as engine:
         yield engine
-    finally:
-        engine.dispose()

@@ -7,43 +7,49 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from alembic.config import Config
 from sqlalchemy import Engine, event
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DatabaseError
 from sqlmodel import Session, create_engine
 
-from alembic import command
 from app.db import once
-from app.errors import NoSpace, Unavailable
-from app.settings import shipped
+from app.db.migrations import migrate, require_tables
+from app.db.sqlite import explained
+from app.db.tables import Bundle, Comment, Event, Project
+from app.db.usable import require_usable
 
 _log = logging.getLogger(__name__)
 
 
-def open_engine(database: Path) -> Engine:
-    """The engine of a database file, migrated to the newest tables."""
-    database.parent.mkdir(parents=True, exist_ok=True)
+def open_engine(database: Path, *, anew: bool = False) -> Engine:
+    """The engine of a database file, migrated to the newest tables.
+
+    Raises DatabaseUnusable for a file that is none, is damaged, is of a newer r2c2r or may not be written, and where there
+    is no file beside projects (an empty one would hide them), unless it is to be made `anew`.
+    """
+    require_usable(database, anew=anew)
     engine = create_engine(f"sqlite:///{database}", connect_args={"check_same_thread": False, "timeout": 10})
     event.listen(engine, "connect", _prepare)
     event.listen(engine, "begin", _begin)
-    migrate(engine)
+    with _said_plainly(engine):
+        migrate(engine)
+        require_tables(engine)
     return engine
 
 
-def migrate(engine: Engine, revision: str = "head") -> None:
-    """Bring the file to a revision; an empty file becomes a complete one."""
-    config = Config()
-    config.set_main_option("script_location", str(shipped("alembic", "env.py")).replace("%", "%%"))
-    config.set_main_option("path_separator", "os")
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, revision)
+@contextmanager
+def opened(database: Path, *, anew: bool = False) -> Iterator[Engine]:
+    """`open_engine` for as long as the block lasts."""
+    engine = open_engine(database, anew=anew)
+    try:
+        yield engine
+    finally:
+        engine.dispose()
 
 
 @contextmanager
 def reading(engine: Engine) -> Iterator[Session]:
-    """A session for reading; raises Unavailable when the database does not answer."""
-    with _said_plainly(), Session(engine, expire_on_commit=False) as session:
+    """A session for reading; raises Unavailable when the database does not answer, DatabaseUnusable when it is damaged."""
+    with _said_plainly(engine), Session(engine, expire_on_commit=False) as session:
         yield session
 
 
@@ -51,24 +57,44 @@ def reading(engine: Engine) -> Iterator[Session]:
 def writing(engine: Engine) -> Iterator[Session]:
     """One transaction that takes the write lock at its start, so that what it read is still true when it writes.
 
-    Raises NoSpace when the disk is full, Unavailable when the database does not answer: nothing of it is stored then.
+    Raises NoSpace when the disk is full, Unavailable when the database does not answer, DatabaseUnusable when it is damaged:
+    nothing of it is stored then. Once it is stored, the engine's option `projects_changed` is told whose rows changed.
     """
     options = engine.execution_options(write=True)
-    with _said_plainly(), Session(options, expire_on_commit=False) as session, session.begin():
-        once.claim(session)
-        yield session
+    with _said_plainly(engine), _Writing(options, expire_on_commit=False) as session:
+        with session.begin():
+            once.claim(session)
+            yield session
+        tell = options.get_execution_options().get("projects_changed")
+        if tell and session.info:
+            tell(session.info)
+
+
+class _Writing(Session):
+    """A session whose `info` has the ids of projects that people, or a finished job, changed."""
+
+
+@event.listens_for(_Writing, "after_flush")
+def _note_changed(session: _Writing, _context: Any) -> None:
+    for row in (*session.new, *session.dirty):
+        if isinstance(row, Project):
+            session.info[row.id] = True
+        elif isinstance(row, Event | Comment | Bundle):
+            session.info[row.project_id] = True
 
 
 @contextmanager
-def _said_plainly() -> Iterator[None]:
+def _said_plainly(engine: Engine) -> Iterator[None]:
     try:
         yield
-    except OperationalError as error:
-        said = str(error.orig)
-        if "disk" in said or "full" in said:
-            raise NoSpace("the disk is full", hint="free some space: nothing already made is lost") from error
-        _log.warning("the database does not answer: %s", said)
-        raise Unavailable("the database does not answer", hint="try again in a moment") from error
+    except DatabaseError as error:
+        if not isinstance(error.orig, sqlite3.Error):
+            raise
+        said = explained(error.orig, Path(engine.url.database or ""))
+        if said is None:
+            raise
+        _log.warning("the database: %s", error.orig)
+        raise said from error
 
 
 def _prepare(connection: sqlite3.Connection, _record: Any) -> None:

@@ -1,31 +1,40 @@
-"""Every change is an event with what was before and after it, so anything can be undone, also after a restart.
+"""Every change is an event with what it replaced and by what, so anything can be undone, also after a restart.
 
 An object's state has two scopes that are undone apart: `prompts` (name, category, colour, clicks, whether it is there) and
-`review` (verdicts, corrections). Undo writes the older state back and is itself an event; nothing is ever removed.
+`review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event keeps only
+those that differ, so the history grows with what is done and not with what is there. Undo puts back what the event
+replaced and is itself an event; nothing is ever removed.
+
+What can be undone is a stack, and what can be redone another. Events say on which they stand: `done`, `undone`, or `gone`
+once something else was done instead; on both the order is that of their numbers.
 """
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import func
-from sqlmodel import Session, col, select
+from sqlalchemy import func, update
+from sqlalchemy.orm import aliased
+from sqlmodel import Session, col, delete, select
 
+from app.db.keys import note_object, note_project
+from app.db.queries import clicks_of
 from app.db.tables import Event, Override, Point, Project, SceneObject, Verdict
 from app.errors import Conflict
 
 Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
+_FIELDS = ("name", "category", "colour", "deleted")
+_POINT, _CORRECTION, _VERDICT = "point ", "override ", "verdict "  # what follows: its id, its name, its candidate
 
-@dataclass(frozen=True, slots=True)
-class Stacks:
-    """What can be undone (oldest first) and redone (next last)."""
 
-    done: tuple[Event, ...]
-    undone: tuple[Event, ...]
+class Steps(NamedTuple):
+    """Whether anything can be undone, and redone."""
+
+    undo: bool = False
+    redo: bool = False
 
 
 @contextmanager
@@ -38,109 +47,74 @@ def change(
     session.flush()
     after = snapshot(session, item, scope)
     if after != before:
-        _record(session, item, scope, action, text, who=who, frame=frame, before=before, after=after)
+        _forget_undone(session, item, scope)
+        event = _record(session, item, scope, action, text, who=who, frame=frame)
+        event.before, event.after, event.standing = _without(before, after), _without(after, before), "done"
 
 
 def undo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Event:
     """Take back the object's last change; returns that change. Raises Conflict when there is none."""
-    stacks = stacks_of(session, item.project_id, item.id, scope)
-    if not stacks.done:
+    target = last_done(session, item, scope)
+    if target is None:
         raise Conflict(f"nothing to undo on {item.name}")
-    return _step(session, item, scope, stacks.done[-1], "undo", who)
+    return _step(session, item, scope, target, "undo", who)
 
 
 def redo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Event:
     """Do again what was undone last; returns that change. Raises Conflict when there is none."""
-    stacks = stacks_of(session, item.project_id, item.id, scope)
-    if not stacks.undone:
+    target = session.exec(_standing(item, scope, "undone").order_by(col(Event.id))).first()
+    if target is None:
         raise Conflict(f"nothing to redo on {item.name}")
-    return _step(session, item, scope, stacks.undone[-1], "redo", who)
+    return _step(session, item, scope, target, "redo", who)
 
 
-def stacks_of(session: Session, project_id: str, object_id: int | None, scope: Scope) -> Stacks:
-    """What can be undone and redone on one object, read from its events."""
-    return all_stacks(session, project_id, scope, object_id).get(object_id, Stacks((), ()))
+def last_done(session: Session, item: SceneObject, scope: Scope) -> Event | None:
+    """The object's last change that stands."""
+    return session.exec(_standing(item, scope, "done").order_by(col(Event.id).desc())).first()
 
 
-def all_stacks(session: Session, project_id: str, scope: Scope, object_id: int | None = None) -> dict[int | None, Stacks]:
-    """What can be undone and redone, by object."""
-    query = select(Event).where(Event.project_id == project_id, Event.scope == scope)
+def steps(session: Session, project_id: str, scope: Scope, object_id: int | None = None) -> dict[int | None, Steps]:
+    """What can be undone and redone, by object; of one, where one is named."""
+    query = select(Event.object_id, Event.standing).where(Event.project_id == project_id, Event.scope == scope)
     if object_id is not None:
         query = query.where(Event.object_id == object_id)
-    done: dict[int | None, list[Event]] = {}
-    undone: dict[int | None, list[Event]] = {}
-    for event in session.exec(query.order_by(col(Event.id))):
-        past, future = done.setdefault(event.object_id, []), undone.setdefault(event.object_id, [])
-        if event.action == "undo":
-            future.append(past.pop())
-        elif event.action == "redo":
-            past.append(future.pop())
-        else:
-            past.append(event)
-            future.clear()
-    return {key: Stacks(tuple(done[key]), tuple(undone[key])) for key in done}
+    standing = set(session.exec(query.where(col(Event.standing).in_(("done", "undone"))).distinct()))
+    return {key: Steps((key, "done") in standing, (key, "undone") in standing) for key, _ in standing}
 
 
 def last_change(session: Session, project_id: str, scope: Scope, direction: Literal["undo", "redo"]) -> int | None:
     """The object that an undo (or redo) of the whole project is about."""
-    best: tuple[int, int] | None = None
-    for object_id, stacks in all_stacks(session, project_id, scope).items():
-        if object_id is None:
-            continue
-        if direction == "undo" and stacks.done:
-            when = stacks.done[-1].id or 0
-        elif direction == "redo" and stacks.undone:
-            when = _undone_at(session, stacks.undone[-1])
-        else:
-            continue
-        best = max(best, (when, object_id)) if best else (when, object_id)
-    return best[1] if best else None
+    mine = (Event.project_id == project_id, Event.scope == scope)
+    query = select(Event.object_id).order_by(col(Event.id).desc())
+    if direction == "undo":
+        return session.exec(query.where(*mine, Event.standing == "done")).first()
+    undone = aliased(Event)  # what an undo is about, and is not done again since
+    query = query.join(undone, col(undone.id) == Event.target).where(*mine, Event.action == "undo")
+    return session.exec(query.where(undone.standing == "undone")).first()
 
 
 def version_of(session: Session, item: SceneObject, scope: Scope) -> int:
     """A number that grows with every change of the object in this scope; 0 before the first."""
-    query = select(func.max(Event.id)).where(
-        Event.project_id == item.project_id, Event.object_id == item.id, Event.scope == scope
-    )
-    return session.exec(query).one() or 0
+    return versions(session, item.project_id, scope, item.id).get(item.id, 0)
+
+
+def versions(session: Session, project_id: str, scope: Scope, object_id: int | None = None) -> dict[int | None, int]:
+    """`version_of`, by object; of one, where one is named."""
+    query = select(Event.object_id, func.max(Event.id)).where(Event.project_id == project_id, Event.scope == scope)
+    if object_id is not None:
+        query = query.where(Event.object_id == object_id)
+    return {number: newest or 0 for number, newest in session.exec(query.group_by(col(Event.object_id)))}
 
 
 def snapshot(session: Session, item: SceneObject, scope: Scope) -> State:
-    """The object's state in one scope, as JSON."""
+    """The object's state in one scope, flat, as JSON."""
     if scope == "prompts":
-        points = session.exec(select(Point).where(Point.object_id == item.id).order_by(col(Point.id)))
-        return {
-            "name": item.name,
-            "category": item.category,
-            "colour": item.colour,
-            "deleted": item.deleted,
-            "points": [p.model_dump(exclude={"object_id"}) for p in points],
-        }
-    override = _override(session, item)
-    verdicts = session.exec(select(Verdict).where(Verdict.object_id == item.id).order_by(col(Verdict.candidate)))
-    return {
-        "override": override.data if override else {},
-        "verdicts": [v.model_dump(exclude={"id", "object_id"}) for v in verdicts],
-    }
-
-
-def restore(session: Session, item: SceneObject, scope: Scope, state: State) -> None:
-    """Write a snapshot back; ids of clicks stay what they were."""
-    if scope == "prompts":
-        _refuse_taken_name(session, item, state)
-        for name in ("name", "category", "colour", "deleted"):
-            setattr(item, name, state[name])
-        for point in session.exec(select(Point).where(Point.object_id == item.id)):
-            session.delete(point)
-        session.flush()
-        session.add_all(Point(object_id=item.id or 0, **point) for point in state["points"])
-    else:
-        set_override(session, item, state["override"])
-        for verdict in session.exec(select(Verdict).where(Verdict.object_id == item.id)):
-            session.delete(verdict)
-        session.flush()
-        session.add_all(Verdict(object_id=item.id or 0, **verdict) for verdict in state["verdicts"])
-    session.flush()
+        clicks = clicks_of(session, item.id)
+        points = {f"{_POINT}{c.id}": {"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in clicks}
+        return {**{name: getattr(item, name) for name in _FIELDS}, **points}
+    said = session.exec(select(Verdict).where(Verdict.object_id == item.id).order_by(col(Verdict.candidate)))
+    corrected = {f"{_CORRECTION}{key}": value for key, value in override_data(session, item).items()}
+    return corrected | {f"{_VERDICT}{v.candidate}": v.model_dump(include={"verdict", "reason", "who", "at"}) for v in said}
 
 
 def require_open(project: Project) -> None:
@@ -163,57 +137,83 @@ def override_data(session: Session, item: SceneObject) -> dict[str, Any]:
 
 
 def _step(session: Session, item: SceneObject, scope: Scope, target: Event, action: str, who: str) -> Event:
-    before = snapshot(session, item, scope)
-    restore(session, item, scope, (target.before if action == "undo" else target.after) or {})
-    after = snapshot(session, item, scope)
+    before, after = target.before or {}, target.after or {}
+    there, wanted = (after, before) if action == "undo" else (before, after)
+    _replace(session, item, scope, there, wanted)
     text = f"{'undid' if action == 'undo' else 'redid'}: {target.text}"
-    _record(session, item, scope, action, text, who=who, frame=target.frame, before=before, after=after, target=target.id)
+    event = _record(session, item, scope, action, text, who=who, frame=target.frame)
+    event.before, event.after, event.target = there, wanted, target.id
+    target.standing = "undone" if action == "undo" else "done"
+    session.add_all([event, target])
+    session.flush()
     return target
 
 
-def _record(
-    session: Session,
-    item: SceneObject,
-    scope: Scope,
-    action: str,
-    text: str,
-    *,
-    who: str,
-    frame: int | None,
-    before: State,
-    after: State,
-    target: int | None = None,
-) -> None:
-    project = session.get(Project, item.project_id)
-    if project is not None:
-        require_open(project)
-    now = time.time()
-    item.version += 1
-    session.add(item)
-    event = Event(project_id=item.project_id, object_id=item.id, scope=scope, action=action, text=text, who=who, at=now)
-    event.frame, event.before, event.after, event.target = frame, before, after, target
-    session.add(event)
-    if project is not None:
-        project.updated = now
-        session.add(project)
+def _replace(session: Session, item: SceneObject, scope: Scope, there: State, wanted: State) -> None:
+    """Put what is wanted in the place of what is there; ids of clicks stay what they were."""
+    if scope == "prompts":
+        _refuse_taken_name(session, item, wanted)
+        for name in _FIELDS:
+            setattr(item, name, wanted.get(name, getattr(item, name)))
+        session.exec(delete(Point).where(col(Point.id).in_([int(key) for key in _named(there, _POINT)])))
+        points = _named(wanted, _POINT).items()
+        session.add_all(Point(id=int(key), object_id=item.id or 0, **point) for key, point in points)
+    else:
+        kept = {key: value for key, value in override_data(session, item).items() if key not in _named(there, _CORRECTION)}
+        set_override(session, item, kept | _named(wanted, _CORRECTION))
+        gone = col(Verdict.candidate).in_(list(_named(there, _VERDICT)))
+        session.exec(delete(Verdict).where(col(Verdict.object_id) == item.id, gone))
+        said = _named(wanted, _VERDICT).items()
+        session.add_all(Verdict(object_id=item.id or 0, candidate=candidate, **verdict) for candidate, verdict in said)
     session.flush()
+
+
+def _record(session: Session, item: SceneObject, scope: Scope, action: str, text: str, *, who: str, frame: int | None) -> Event:
+    """An event of now, and what is stored with every change: the object's version and keys, the project's."""
+    project = session.get_one(Project, item.project_id)
+    require_open(project)
+    clicks, override = clicks_of(session, item.id), override_data(session, item)
+    item.version += 1  # after the questions, which store what was set before them: each row is written once
+    note_object(session, item, project.segmenter, clicks, override)
+    note_project(session, project)
+    now = project.updated = time.time()
+    event = Event(project_id=item.project_id, object_id=item.id, scope=scope, action=action, text=text, who=who, at=now)
+    event.frame = frame
+    session.add(event)
+    return event
+
+
+def _without(state: State, other: State) -> State:
+    """Of a state, what the other has not, or has otherwise."""
+    return {key: value for key, value in state.items() if key not in other or other[key] != value}
+
+
+def _named(state: State, kind: str) -> State:
+    """The state's entries of that kind, by what follows it."""
+    return {key.removeprefix(kind): value for key, value in state.items() if key.startswith(kind)}
+
+
+def _standing(item: SceneObject, scope: Scope, standing: str) -> Any:
+    mine = (Event.project_id == item.project_id, Event.object_id == item.id, Event.scope == scope)
+    return select(Event).where(*mine, Event.standing == standing)
+
+
+def _forget_undone(session: Session, item: SceneObject, scope: Scope) -> None:
+    """What was undone cannot be redone over something else."""
+    mine = (col(Event.project_id) == item.project_id, col(Event.object_id) == item.id, col(Event.scope) == scope)
+    session.exec(update(Event).where(*mine, col(Event.standing) == "undone").values(standing="gone"))
 
 
 def _override(session: Session, item: SceneObject) -> Override | None:
     return session.exec(select(Override).where(Override.object_id == item.id)).first()
 
 
-def _undone_at(session: Session, event: Event) -> int:
-    """When the change was last undone, as an event number."""
-    query = select(Event.id).where(Event.project_id == event.project_id, Event.target == event.id, Event.action == "undo")
-    return session.exec(query.order_by(col(Event.id).desc())).first() or 0
-
-
-def _refuse_taken_name(session: Session, item: SceneObject, state: State) -> None:
-    if state["deleted"]:
+def _refuse_taken_name(session: Session, item: SceneObject, wanted: State) -> None:
+    if wanted.get("deleted", item.deleted):
         return
-    others = select(SceneObject).where(
+    name = wanted.get("name", item.name)
+    others = select(SceneObject.name).where(
         SceneObject.project_id == item.project_id, SceneObject.id != item.id, col(SceneObject.deleted).is_(False)
     )
-    if any(other.name.casefold() == state["name"].casefold() for other in session.exec(others)):
-        raise Conflict(f"another object is called '{state['name']}' by now", hint="rename that one first")
+    if any(other.casefold() == name.casefold() for other in session.exec(others)):
+        raise Conflict(f"another object is called '{name}' by now", hint="rename that one first")

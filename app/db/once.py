@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from typing import Any, cast
 
+from sqlalchemy import CursorResult, insert, update
 from sqlmodel import Session, col, delete
 
 from app.db.tables import SentChange
@@ -48,9 +50,10 @@ def claim(session: Session) -> None:
     """
     sending = _sending.get()
     if sending is not None:
-        if session.get(SentChange, sending.digest) is not None:
+        row = SentChange(digest=sending.digest, request=sending.request, project_id=sending.project_id, at=time.time())
+        stored = session.execute(insert(SentChange).prefix_with("OR IGNORE").values(**row.model_dump()))
+        if not cast(CursorResult[Any], stored).rowcount:
             raise Conflict("this change is stored already", hint="look at what is there now")
-        session.add(SentChange(digest=sending.digest, request=sending.request, project_id=sending.project_id, at=time.time()))
 
 
 def find(session: Session, digest: str) -> SentChange | None:
@@ -60,10 +63,7 @@ def find(session: Session, digest: str) -> SentChange | None:
 
 def answered(session: Session, digest: str, status: int, body: str) -> None:
     """Keep the answer beside the key, if the change was stored at all."""
-    found = session.get(SentChange, digest)
-    if found is not None:
-        found.status, found.answer = status, body
-        session.add(found)
+    session.exec(update(SentChange).where(col(SentChange.digest) == digest).values(status=status, answer=body))
 
 
 def forget(session: Session, *, before: float | None = None, project_id: str | None = None) -> None:

@@ -1,12 +1,16 @@
 """Rows by their keys, and rows as what goes over the wire."""
 
-from typing import Any
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
-from sqlalchemy import func
+import sqlalchemy
+from sqlalchemy import func, update
+from sqlalchemy.orm import defer
 from sqlmodel import Session, col, select
 
 from app import schemas
-from app.db.tables import Bundle, Job, Point, Project, SceneObject
+from app.db.tables import Bundle, Event, Job, Override, Point, Project, SceneObject
 from app.errors import NotFound
 
 STAGES: dict[str, tuple[str, ...]] = {
@@ -41,15 +45,59 @@ def job_row(session: Session, job_id: int) -> Job:
     return found
 
 
-def live_objects(session: Session, project_id: str) -> list[SceneObject]:
-    """The project's objects that are not deleted, oldest first."""
-    query = select(SceneObject).where(SceneObject.project_id == project_id, col(SceneObject.deleted).is_(False))
-    return list(session.exec(query.order_by(col(SceneObject.id))))
+def live_objects(session: Session, project_id: str, *, deleted: bool = False) -> list[SceneObject]:
+    """The project's objects, oldest first; deleted ones only when asked for."""
+    query = select(SceneObject).where(SceneObject.project_id == project_id).order_by(col(SceneObject.id))
+    return list(session.exec(query if deleted else query.where(col(SceneObject.deleted).is_(False))))
 
 
-def points_of(session: Session, object_id: int | None) -> list[Point]:
+class Click(NamedTuple):
+    """A click as it is stored, to be looked at: thousands are read at once."""
+
+    id: int
+    frame: int
+    x: float
+    y: float
+    label: int  # 1 on the object, 0 off it
+
+
+_CLICKS = sqlalchemy.select(
+    col(Point.id), col(Point.frame), col(Point.x), col(Point.y), col(Point.label), col(Point.object_id)
+).order_by(col(Point.id))
+
+
+def clicks_of(session: Session, object_id: int | None) -> list[Click]:
     """An object's clicks, oldest first."""
-    return list(session.exec(select(Point).where(Point.object_id == object_id).order_by(col(Point.id))))
+    return [Click(*row[:5]) for row in session.execute(_CLICKS.where(col(Point.object_id) == object_id))]
+
+
+def clicks_by_object(session: Session, project_id: str) -> dict[int, list[Click]]:
+    """The clicks of all of a project's objects, oldest first."""
+    mine = sqlalchemy.select(col(SceneObject.id)).where(col(SceneObject.project_id) == project_id)
+    found: dict[int, list[Click]] = {}
+    for *click, object_id in session.execute(_CLICKS.where(col(Point.object_id).in_(mine))):
+        found.setdefault(object_id, []).append(Click(*click))
+    return found
+
+
+def overrides_by_object(session: Session, project_id: str) -> dict[int, dict[str, Any]]:
+    """What was corrected about each of a project's objects."""
+    rows = session.exec(select(Override).where(Override.project_id == project_id))
+    return {row.object_id or 0: dict(row.data) for row in rows}
+
+
+def saved(session: Session, project_id: str, object_id: int | None = None) -> dict[int | None, float]:
+    """When the last change about each object was stored; about one, where one is named."""
+    query = select(Event.object_id, func.max(Event.at)).where(Event.project_id == project_id)
+    if object_id is not None:
+        query = query.where(Event.object_id == object_id)
+    return dict(session.exec(query.group_by(col(Event.object_id))).all())
+
+
+def note_size(session: Session, project_id: str, size: int) -> None:
+    """Store how large the project's folder is now."""
+    values = {"size_bytes": size, "sized": time.time()}
+    session.exec(update(Project).where(col(Project.id) == project_id).values(**values))
 
 
 def newest_bundle(session: Session, project_id: str) -> Bundle | None:
@@ -58,19 +106,27 @@ def newest_bundle(session: Session, project_id: str) -> Bundle | None:
     return session.exec(query).first()
 
 
-def no_retry(row: Job, project: Project) -> str:
+def no_retry(kind: str, source_path: str | None) -> str:
     """Why the job, if it failed, would only fail again; empty where it may be retried."""
-    of_recording = row.kind in ("import", "sample")
-    return "the recording was refused, and is not kept" if of_recording and project.source_path is None else ""
+    of_recording = kind in ("import", "sample")
+    return "the recording was refused, and is not kept" if of_recording and source_path is None else ""
 
 
-def job_shape(session: Session, row: Job) -> schemas.Job:
-    """A job as it goes over the wire."""
-    project = session.get(Project, row.project_id)
+def job_shapes(session: Session, rows: Sequence[Job]) -> list[schemas.Job]:
+    """Jobs as they go over the wire."""
+    of = select(Project.id, Project.name, Project.source_path).where(col(Project.id).in_({row.project_id for row in rows}))
+    projects = {number: (name, source) for number, name, source in session.exec(of)}
+    waiting: list[int | None] = []
+    if any(row.state == "queued" for row in rows):
+        waiting = list(session.exec(select(Job.id).where(Job.state == "queued").order_by(col(Job.id))))
+    return [_job_shape(row, *projects.get(row.project_id, ("", None)), waiting) for row in rows]
+
+
+def _job_shape(row: Job, name: str, source: str | None, waiting: list[int | None]) -> schemas.Job:
     return schemas.Job(
         id=row.id or 0,
         project=row.project_id,
-        project_name=project.name if project else "",
+        project_name=name,
         kind=row.kind,  # type: ignore[arg-type]  # the column holds no other
         state=row.state,  # type: ignore[arg-type]
         stage=row.stage,
@@ -80,8 +136,8 @@ def job_shape(session: Session, row: Job) -> schemas.Job:
         eta_s=row.eta_s,
         message=row.message,
         error=schemas.ErrorBody(**row.error) if row.error else None,
-        position=_position(session, row),
-        no_retry=no_retry(row, project) if project else "",
+        position=waiting.index(row.id) + 1 if row.id in waiting else None,
+        no_retry=no_retry(row.kind, source),
         attempts=row.attempts,
         who=row.who,
         has_log=row.log_path is not None,
@@ -104,7 +160,15 @@ def stage_states(row: Job) -> list[schemas.StageState]:
     ]
 
 
-def bundle_shape(row: Bundle, name: str, inputs: str) -> schemas.Bundle:
+def bundles(session: Session, which: Any) -> list[tuple[Bundle, bool | None]]:
+    """Bundles, newest first, and whether each passed: their certificates, which may be long, are left where they are."""
+    passed = func.json_extract(Bundle.certificate, "$.passed")
+    rows = select(Bundle, passed).where(which).options(defer(Bundle.certificate))  # type: ignore[arg-type]  # a column
+    found = session.exec(rows.order_by(col(Bundle.version).desc()))
+    return [(bundle, None if said is None else bool(said)) for bundle, said in found]
+
+
+def bundle_shape(row: Bundle, passed: bool | None, name: str, inputs: str) -> schemas.Bundle:
     """A bundle as it goes over the wire; `inputs` is the project's key of now."""
     return schemas.Bundle(
         version=row.version,
@@ -113,7 +177,7 @@ def bundle_shape(row: Bundle, name: str, inputs: str) -> schemas.Bundle:
         sha256=row.sha256,
         size=row.size,
         created=row.created,
-        passed=row.certificate.get("passed") if row.certificate else None,
+        passed=passed,
         current=row.inputs == inputs,
     )
 
@@ -122,10 +186,3 @@ def bundle_file_name(name: str, version: int, sha256: str) -> str:
     """What the browser saves a bundle as."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name).strip("-").lower()
     return f"{plain or 'scene'}-v{version}-{sha256[:8]}.zip"
-
-
-def _position(session: Session, row: Job) -> int | None:
-    if row.state != "queued":
-        return None
-    ahead = select(func.count()).select_from(Job).where(Job.state == "queued", col(Job.id) < row.id)
-    return session.exec(ahead).one() + 1

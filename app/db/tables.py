@@ -5,7 +5,7 @@ Times are seconds since 1970, UTC. Nothing but jobs' progress is ever updated wi
 
 from typing import Any
 
-from sqlalchemy import JSON, Column, Index, UniqueConstraint
+from sqlalchemy import JSON, Column, Index, UniqueConstraint, false
 from sqlmodel import Field, SQLModel
 
 from r2c2r_core.align.protocol import MATCHERS
@@ -33,7 +33,12 @@ class Project(SQLModel, table=True):
     segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
     generator: str = Field(default=GENERATORS.default, sa_column_kwargs={"server_default": GENERATORS.default})
     matcher: str = Field(default=MATCHERS.default, sa_column_kwargs={"server_default": MATCHERS.default})
+    owner_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # who made it
+    members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # only they and admins see it
     review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of everything a person gave
+    size_bytes: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # of its folder
+    sized: float = Field(default=0.0, sa_column_kwargs={"server_default": "0"})  # when that was measured
 
 
 class Account(SQLModel, table=True):
@@ -49,6 +54,15 @@ class Account(SQLModel, table=True):
     created: float
 
 
+class ProjectMember(SQLModel, table=True):
+    """Somebody who may see a project that not everybody may see."""
+
+    __tablename__ = "project_members"
+
+    project_id: str = Field(primary_key=True, foreign_key="projects.id", ondelete="CASCADE")
+    account_id: int = Field(primary_key=True, foreign_key="accounts.id", ondelete="CASCADE")
+
+
 class SignIn(SQLModel, table=True):
     """One browser that is let in; without an account it is that of whoever started the server."""
 
@@ -58,6 +72,30 @@ class SignIn(SQLModel, table=True):
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
     created: float
     used: float  # to the hour
+
+
+class LaunchKey(SQLModel, table=True):
+    """The key of a printed address that nobody has opened yet."""
+
+    __tablename__ = "launch_keys"
+
+    digest: str = Field(primary_key=True)  # SHA-256: the file alone lets nobody in
+    created: float
+
+
+class AuditEntry(SQLModel, table=True):
+    """Who was let in or refused, and who changed whose account. Append-only, but for the oldest of many refusals."""
+
+    __tablename__ = "audit"
+    __table_args__ = (Index("ix_audit_action", "action", "id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    at: float
+    action: str  # schemas.AuditAction
+    account: str  # whose; no foreign key: the record outlives the account; "" for an unknown one, or none
+    who: str  # did it
+    client: str  # the address it came from; "" for the command line
+    detail: str
 
 
 class SentChange(SQLModel, table=True):
@@ -100,6 +138,8 @@ class SceneObject(SQLModel, table=True):
     colour: int  # index into the palette
     version: int = 1  # grows with every change
     deleted: bool = False
+    masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
 
 
 class Point(SQLModel, table=True):
@@ -167,7 +207,12 @@ class Event(SQLModel, table=True):
     """Who changed what, when, from what to what. Append-only: undo and redo are events too."""
 
     __tablename__ = "events"
-    __table_args__ = (Index("ix_events_object", "project_id", "object_id"), {"sqlite_autoincrement": True})
+    __table_args__ = (
+        Index("ix_events_object", "project_id", "object_id", "at"),
+        Index("ix_events_standing", "project_id", "scope", "object_id", "standing"),
+        Index("ix_events_target", "target"),
+        {"sqlite_autoincrement": True},
+    )
 
     id: int | None = Field(default=None, primary_key=True)
     project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
@@ -178,9 +223,10 @@ class Event(SQLModel, table=True):
     frame: int | None = None
     who: str
     at: float
-    before: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
+    before: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))  # only what differs: see db/history.py
     after: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
     target: int | None = None  # the event an undo or redo is about
+    standing: str | None = None  # of a change of an object: done | undone | gone
 
 
 class Job(SQLModel, table=True):
@@ -254,4 +300,4 @@ class Bundle(SQLModel, table=True):
     size: int
     created: float
     certificate: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
-    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/documents.py: inputs_key
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # the project's, when the run began

@@ -1,4 +1,4 @@
-"""Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR`.
+"""Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR --request FILE`.
 
 Beside the workspace it writes what the web process needs at hand without loading the
 recording: frames.json (the frame table), facts.json (what the recording is, and its problems) and pictures of the scan.
@@ -16,14 +16,15 @@ import cv2
 import numpy as np
 
 from app import archives
-from app.jobs.limits import limit_this_process
 from app.jobs.messages import run_stage
 from app.settings import Settings
 from r2c2r_core.errors import PromptError
+from r2c2r_core.limits import free_memory, limit_this_process
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.progress import Progress
 from r2c2r_core.workspace import Workspace, write_atomically
 
+MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
 CPU_S = 4 * 3600  # a recording of an hour takes a tenth of that
 FILE_BYTES = 8 << 30
 
@@ -33,22 +34,22 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="app.jobs.ingest", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--request", type=Path, required=True)
     options = parser.parse_args(arguments)
-    limit_this_process(cpu_s=CPU_S, file_bytes=FILE_BYTES)
-    return run_stage("ingest", lambda progress: ingest(options.workdir, options.folder, progress))
+    limit_this_process(memory_bytes=free_memory(MEMORY_SHARE), cpu_s=CPU_S, file_bytes=FILE_BYTES)
+    return run_stage("ingest", lambda progress: ingest(options.workdir, options.folder, options.request, progress))
 
 
-def ingest(workdir: Path, folder: Path, progress: Progress) -> None:
-    """Read the recording that WORKDIR/request.json names, and describe it in the project's folder."""
+def ingest(workdir: Path, folder: Path, request: Path, progress: Progress) -> None:
+    """Read the recording that the request names, and describe it in the project's folder."""
     from r2c2r_core.pipeline import reconstruct
     from r2c2r_core.worker import read_request
 
-    request_path = workdir / "request.json"
-    document = json.loads(request_path.read_text())
+    document = json.loads(request.read_text())
     source = _checked_source(Path(document["source"]))
     work = Workspace(workdir)
     with suppress(PromptError):  # nobody has clicked yet; the recording is read before that is noticed
-        reconstruct(read_request(workdir), work, until="ingest", progress=progress)
+        reconstruct(read_request(request), work, until="ingest", progress=progress)
     capture: Capture | None = work.load_latest("ingest", "scene")
     if capture is None:
         raise PromptError("the recording was not read", hint="see the job's log")

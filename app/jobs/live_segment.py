@@ -25,6 +25,7 @@ from app.errors import told
 from app.jobs.mask_wire import mask_bits
 from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
@@ -53,6 +54,10 @@ def main(arguments: list[str] | None = None) -> int:
     except R2C2RError as error:
         _say(state="failed", error=told(error))
         return error.exit_code
+    except MemoryError:
+        traceback.print_exc()
+        _say(state="failed", error=told(memory_met()))
+        return 1
     except Exception as error:  # the edge of the process: the traceback goes to the log
         traceback.print_exc()
         _say(
@@ -227,6 +232,8 @@ def _named(error: Exception) -> R2C2RError:
     if isinstance(error, R2C2RError):
         return error
     traceback.print_exception(error)
+    if isinstance(error, MemoryError):
+        return memory_met()
     return R2C2RError(f"unexpected: {error}", hint="see the log of the live segmenter")
 
 
@@ -248,4 +255,5 @@ def _say(**message: object) -> None:
 
 
 if __name__ == "__main__":
+    limit_this_process()
     sys.exit(main())

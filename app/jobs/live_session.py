@@ -3,7 +3,6 @@
 The methods are called under the lock of app.jobs.live, but for `take`, which takes it.
 """
 
-import contextlib
 import json
 import logging
 import threading
@@ -37,6 +36,7 @@ class Task:
     state: schemas.SegmentState = "waiting"
     asked: float = field(default_factory=time.monotonic)
     masks: MaskFile = field(default_factory=MaskFile)
+    kept: bool = True  # all of them are in the file
 
     @property
     def is_open(self) -> bool:
@@ -177,7 +177,11 @@ class LiveSession:
             task.masks.frames[int(line["frame"])] = entry
             counts = {"done": len(task.masks.frames), "total": self.total}
             self._note_work()
-        mask_store.append(task.path, entry)
+        try:
+            mask_store.append(task.path, entry)
+        except OSError as error:  # a full disk: they are shown all the same
+            task.kept = False
+            _log.warning("live masks of %s: %s", self.project, error)
         if first:
             waited_ms = 1000 * (time.monotonic() - task.asked)
             _log.info("%s: object %d: first mask after %.0f ms", self.project, number, waited_ms)
@@ -192,10 +196,14 @@ class LiveSession:
         task.masks.end, task.masks.error = end, error
         task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
         self.deaths = 0 if end == "done" else self.deaths
-        with contextlib.suppress(OSError):
-            mask_store.append(task.path, {"end": end, "error": error})
+        try:
+            mask_store.finish(task.path, end, error)
+        except OSError:
+            task.kept = False
         self._note_work()
         self._tell_segment(number, task)
+        if end == "done" and task.kept and self.tasks.get(number) is task:
+            del self.tasks[number]  # whoever looks at them reads the file
         self.on_object(self.project, number)
 
     def _note_work(self, *, ended: bool = False) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from app.errors import told
 from r2c2r_core.errors import Cancelled, R2C2RError
+from r2c2r_core.limits import memory_met
 from r2c2r_core.progress import Progress
 
 
@@ -25,13 +26,7 @@ def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
         return 130 if isinstance(error, Cancelled) else error.exit_code
     except MemoryError:
         traceback.print_exc()
-        say(
-            error={
-                "kind": "EnvironmentProblem",
-                "message": f"{stage}: out of memory",
-                "hint": "close other programs, then retry",
-            }
-        )
+        say(error=told(memory_met()))
         return 1
     except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the person
         traceback.print_exc()

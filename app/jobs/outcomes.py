@@ -19,6 +19,7 @@ from app.files import ProjectFiles, delete_folder
 from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.segment.prompts import parse_prompts
+from r2c2r_core.workspace import write_atomically
 
 
 def import_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
@@ -38,7 +39,7 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
 def run_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
     """The bundle becomes a version, unless it is the same as the newest one."""
     adopt_bundle(session, project, files, job.payload.get("inputs", ""))
-    shutil.copyfile(files.work / "prompts.json", files.finished_prompts)
+    write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
 
 
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
@@ -60,7 +61,7 @@ def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles)
 
 def _delete_what_was_read(files: ProjectFiles) -> None:
     """The recording, what was unpacked of it, and what was drawn; the log stays."""
-    for folder in (files.source, files.work, files.previews, files.masks):
+    for folder in (files.source, files.work, files.previews, files.masks, files.requests):
         delete_folder(folder)
     for path in (files.frames, files.facts, *files.scan_pictures):
         path.unlink(missing_ok=True)
@@ -113,20 +114,33 @@ def adopt_bundle(session: Session, project: Project, files: ProjectFiles, inputs
         newest.inputs = inputs
         session.add(newest)
         return newest
-    version = newest.version + 1 if newest else 1
     files.bundles.mkdir(parents=True, exist_ok=True)
+    version = _free_version(files, newest.version + 1 if newest else 1, digest)
     kept = files.bundles / f"v{version}.zip"
     temporary = kept.with_suffix(".part")
     shutil.copyfile(made, temporary)
     os.replace(temporary, kept)
-    bundle = Bundle(
-        project_id=project.id, version=version, path=kept.name, sha256=digest, size=kept.stat().st_size, created=time.time()
-    )
+    bundle = bundle_row(project, kept, version)
     bundle.certificate, bundle.inputs = _certificate(kept, files.work), inputs
     project.updated = time.time()
     session.add(bundle)
     session.add(project)
     return bundle
+
+
+def bundle_row(project: Project, kept: Path, version: int) -> Bundle:
+    """The row of a bundle that is kept, with the certificate that it holds."""
+    size, created = kept.stat().st_size, kept.stat().st_mtime
+    row = Bundle(project_id=project.id, version=version, path=kept.name, sha256=_sha256(kept), size=size, created=created)
+    row.certificate = _certificate_in(kept)
+    return row
+
+
+def _free_version(files: ProjectFiles, version: int, digest: str) -> int:
+    """The next version that writes over nothing: a restored database does not know the newest files."""
+    while (kept := files.bundles / f"v{version}.zip").exists() and _sha256(kept) != digest:
+        version += 1
+    return version
 
 
 def _certificate(bundle: Path, work: Path) -> dict[str, Any] | None:
@@ -138,6 +152,11 @@ def _certificate(bundle: Path, work: Path) -> dict[str, Any] | None:
     if noun is not None:
         found: dict[str, Any] = plain(noun)
         return found
+    return _certificate_in(bundle)
+
+
+def _certificate_in(bundle: Path) -> dict[str, Any] | None:
+    """What the bundle's report says."""
     try:
         with zipfile.ZipFile(bundle) as archive:
             report: dict[str, Any] = json.loads(archive.read("report.json"))

@@ -13,6 +13,7 @@ from app.db.queries import STAGES
 from app.db.tables import Job, Project
 from app.files import ProjectFiles
 from app.process import python_module
+from app.settings import Settings
 from r2c2r_core.workspace import write_atomically
 
 
@@ -30,10 +31,15 @@ class Commands:
     """The programs a job may start; tests put their own in their place."""
 
     worker: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.worker"))
-    probe: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.probe"))
-    ingest: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.ingest"))
+    probe: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.alone", "app.jobs.probe"))
+    ingest: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.alone", "app.jobs.ingest"))
     sample: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.sample"))
     live: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.live_segment"))
+
+
+def commands_of(settings: Settings) -> Commands:
+    """The programs of the app, as it was told to run them."""
+    return Commands(worker=(*python_module("r2c2r_core.worker"), "--workers", str(settings.workers_a_job)))
 
 
 Planner = Callable[[Job, Project, ProjectFiles, Commands], list[Step]]
@@ -46,15 +52,23 @@ def steps_of(job: Job, project: Project, files: ProjectFiles, commands: Commands
     return _PLANNERS[job.kind](job, project, files, commands)
 
 
-def write_request(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
-    """Write the clicks and corrections of this moment where the worker reads them (r2c2r_core.worker.read_request)."""
-    payload = job.payload
+def request_of(session: Session, job: Job, project: Project, files: ProjectFiles) -> dict[str, Any]:
+    """What the job is given: the clicks and corrections of the moment it first began, whatever is clicked later.
+
+    They lie in a place of the job's own, where its processes read them (r2c2r_core.worker.read_request); request.json is
+    written last, so a job that is taken up again finds all of them or none.
+    """
+    path, payload = files.request(job.id or 0), job.payload
+    if path.is_file():
+        found: dict[str, Any] = json.loads(path.read_text())
+        return found
     tools = {key: payload[key] for key in ("segmenter", "generator", "matcher") if payload.get(key)}
     request: dict[str, Any] = {"source": project.source_path, "prompts": "prompts.json", "overrides": "overrides.json"}
-    request |= {"tools": tools, "seed": payload.get("seed", 0)}
-    write_json(files.work / "prompts.json", prompts_document(session, project.id))
-    write_json(files.work / "overrides.json", overrides_document(session, project.id))
-    write_json(files.work / "request.json", request)
+    request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": project.inputs}
+    write_json(path.with_name("prompts.json"), prompts_document(session, project.id))
+    write_json(path.with_name("overrides.json"), overrides_document(session, project.id))
+    write_json(path, request)
+    return request
 
 
 def write_json(path: Path, document: Any) -> None:
@@ -63,21 +77,25 @@ def write_json(path: Path, document: Any) -> None:
 
 
 def _import(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
-    return [_ingest(project, files, commands)]
+    return [_ingest(job, files, commands)]
 
 
 def _sample(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
     wish = job.payload
     options = ("--seed", str(wish["seed"]), "--frames", str(wish["frames"]), "--size", f"{wish['width']}x{wish['height']}")
-    return [Step("sample", (*commands.sample, str(files.source), *options), 60.0), _ingest(project, files, commands)]
+    return [Step("sample", (*commands.sample, str(files.source), *options), 60.0), _ingest(job, files, commands)]
 
 
 def _run(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
-    return [Step(stage, (*commands.worker, str(files.work), "--until", stage), _WEIGHTS[stage]) for stage in STAGES["run"]]
+    given = ("--request", str(files.request(job.id or 0)))
+    return [
+        Step(stage, (*commands.worker, str(files.work), "--until", stage, *given), _WEIGHTS[stage]) for stage in STAGES["run"]
+    ]
 
 
-def _ingest(project: Project, files: ProjectFiles, commands: Commands) -> Step:
-    return Step("ingest", (*commands.ingest, str(files.work), str(files.root)), 40.0)
+def _ingest(job: Job, files: ProjectFiles, commands: Commands) -> Step:
+    given = ("--request", str(files.request(job.id or 0)))
+    return Step("ingest", (*commands.ingest, str(files.work), str(files.root), *given), 40.0)
 
 
 _PLANNERS: dict[str, Planner] = {"import": _import, "sample": _sample, "run": _run}

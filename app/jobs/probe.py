@@ -10,11 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from app.jobs.limits import limit_this_process
 from app.jobs.messages import run_stage
 from r2c2r_core.errors import CaptureError, InputError
+from r2c2r_core.limits import free_memory, limit_this_process
 
 LOOKED_AT = 8  # frames
+MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
 
 
 class Look(NamedTuple):
@@ -32,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("name")
     options = parser.parse_args(arguments)
     look = LOOKS[options.kind]
-    limit_this_process(cpu_s=look.cpu_s, file_bytes=1 << 20)
+    limit_this_process(memory_bytes=free_memory(MEMORY_SHARE), cpu_s=look.cpu_s, file_bytes=1 << 20)
     return run_stage("probe", lambda progress: _named(look.probe, options.file, options.name))
 
 

@@ -9,14 +9,14 @@ from typing import Any
 from sqlalchemy import Engine, text
 from sqlmodel import Session, col, select
 
-from app.db.documents import inputs_key
 from app.db.engine import reading, writing
-from app.db.queries import STAGES, job_row, job_shape, project_row
+from app.db.queries import STAGES, job_row, job_shapes, note_size, project_row
 from app.db.tables import Job, JobEvent, Project
 from app.errors import told_body
-from app.files import ProjectFiles, project_files, require_free
+from app.files import ProjectFiles, folder_bytes, project_files, require_free
 from app.hub import Hub
-from app.jobs.plans import Commands, Step, steps_of, write_request
+from app.jobs.plans import Commands, Step, request_of, steps_of
+from app.privacy import without_places
 from app.process import Worker, end_orphan, started_at
 from app.settings import Settings
 
@@ -25,7 +25,8 @@ Finisher = Callable[[Session, Job, Project, ProjectFiles], None]
 _CLAIM = text(
     "UPDATE jobs SET state='running', owner_pid=:pid, attempts=attempts+1, started=COALESCE(started, :now), "
     "heartbeat=:now, error=NULL, stage='', stage_fraction=0 "
-    "WHERE id=(SELECT id FROM jobs WHERE state='queued' ORDER BY id LIMIT 1) RETURNING id"
+    "WHERE id=(SELECT id FROM jobs AS waiting WHERE state='queued' AND NOT EXISTS (SELECT 1 FROM jobs AS other "
+    "WHERE other.project_id=waiting.project_id AND other.state IN ('running', 'cancelling')) ORDER BY id LIMIT 1) RETURNING id"
 )
 
 
@@ -38,9 +39,13 @@ class JobRows:
 
     def recover(self) -> None:
         """Take up what an earlier server left: its workers are ended, its jobs wait again."""
+        left = select(Job).where(col(Job.state).in_(("running", "cancelling")))
+        with reading(self.engine) as session:
+            orphans = [(row.worker_pid, row.worker_started) for row in session.exec(left)]
+        for pid, started in orphans:  # outside the transaction: nobody else can write while it lasts
+            end_orphan(pid, started)
         with writing(self.engine) as session:
-            for row in session.exec(select(Job).where(col(Job.state).in_(("running", "cancelling")))):
-                end_orphan(row.worker_pid, row.worker_started)
+            for row in session.exec(left):
                 row.worker_pid = row.worker_started = row.owner_pid = None
                 if row.state == "cancelling":
                     row.state, row.finished = "cancelled", time.time()
@@ -59,7 +64,7 @@ class JobRows:
                 session.add(row)
 
     def claim(self) -> int | None:
-        """Take the oldest waiting job; no two threads or servers get the same one."""
+        """Take the oldest waiting job whose project's workspace nobody writes; no two threads or servers get the same one."""
         with writing(self.engine) as session:
             found = session.execute(_CLAIM, {"pid": os.getpid(), "now": time.time()}).first()
         return int(found[0]) if found else None
@@ -81,16 +86,17 @@ class JobRows:
             project = project_row(session, row.project_id)
             files = self._files(session, row)
             require_free(files.root, 0, self.settings.min_free_bytes)
-            write_request(session, row, project, files)
-            row.payload = {**row.payload, "inputs": inputs_key(session, project.id)}
+            given = request_of(session, row, project, files)
+            row.payload = {**row.payload, "inputs": given["inputs"]}
             session.add(row)
             return steps_of(row, project, files, commands), files.root / "logs" / f"job-{job_id}.log"
 
     def began_step(self, job_id: int, stage: str, log: Path, worker: Worker, progress: float, eta_s: float | None) -> None:
         """A process of the job was started."""
+        began = started_at(worker.pid)
         with writing(self.engine) as session:
             row = job_row(session, job_id)
-            row.log_path, row.worker_pid, row.worker_started = str(log), worker.pid, started_at(worker.pid)
+            row.log_path, row.worker_pid, row.worker_started = str(log), worker.pid, began
             _note(session, row, "stage", stage, stage=stage)
             _set_progress(session, row, stage, 0.0, progress, eta_s)
             if row.state == "running":
@@ -121,8 +127,11 @@ class JobRows:
 
     def finish(self, job_id: int) -> None:
         """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""
+        with reading(self.engine) as session:
+            size = folder_bytes(self._files(session, job_row(session, job_id)).root)
         with writing(self.engine) as session:
             row = job_row(session, job_id)
+            note_size(session, row.project_id, size)
             self._finishers[row.kind](session, row, project_row(session, row.project_id), self._files(session, row))
             row.state, row.finished, row.progress, row.stage_fraction = "done", time.time(), 1.0, 1.0
             row.stage, row.eta_s, row.worker_pid, row.error = STAGES[row.kind][-1], None, None, None
@@ -135,6 +144,7 @@ class JobRows:
         with writing(self.engine) as session:
             row = job_row(session, job_id)
             row.state, row.finished, row.eta_s, row.worker_pid = state, time.time(), None, None
+            error = {k: without_places(v, self.settings) if isinstance(v, str) else v for k, v in error.items()}
             row.error = None if state == "cancelled" else told_body(error)
             row.message = "cancelled; finished stages are kept" if state == "cancelled" else str(error["message"])
             _note(session, row, "state" if state == "cancelled" else "error", row.message)
@@ -184,7 +194,7 @@ class JobRows:
         with reading(self.engine) as session:
             row = session.get(Job, job_id)
             if row is not None:
-                self.hub.publish("job", row.project_id, job=job_shape(session, row).model_dump())
+                self.hub.publish("job", row.project_id, job=job_shapes(session, [row])[0].model_dump())
 
     def _tell_end(self, job_id: int) -> None:
         self.tell(job_id)

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from app.jobs.messages import run_stage
+from r2c2r_core.limits import limit_this_process
 from r2c2r_core.progress import Progress
 
 
@@ -30,4 +31,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    limit_this_process()
     sys.exit(main())

@@ -1,6 +1,7 @@
 """One process of a job, from its first word to its last, and how far the job is with it."""
 
 import queue
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -8,6 +9,7 @@ from typing import Any
 
 from app.jobs.plans import Step
 from app.process import Line, Worker
+from r2c2r_core.limits import HOURS_VARIABLE
 
 POLL_S = 0.15
 STORE_EVERY_S = 0.5
@@ -86,6 +88,9 @@ def outcome(last: Line, status: int, stage: str) -> dict[str, Any] | None:
         return dict(last["error"])
     if "done" in last:  # what it made is stored: how it left does not matter any more
         return None
+    if status == -signal.SIGXCPU:  # met again if it is tried again
+        hint = f"give a smaller recording, or allow more with {HOURS_VARIABLE}"
+        return {"kind": "EnvironmentProblem", "message": f"{stage}: it took all the processor time it may use", "hint": hint}
     reason = f"signal {-status}" if status < 0 else f"exit status {status}"
     hint = "the system may have run out of memory; see the log" if status == -9 else "see the log"
     return {"kind": VANISHED, "message": f"{stage}: its process ended early ({reason})", "hint": hint}

@@ -1,11 +1,12 @@
 """One connection per tab: jobs, masks, saved changes, and who else is here."""
 
 import asyncio
-import contextlib
-import json
+from typing import Annotated
 
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
+from pydantic import ValidationError
 
+from app import schemas
 from app.hub import Hub, Listener
 from app.security import SESSION_ENDED
 from app.services.context import Context
@@ -15,21 +16,32 @@ from app.tasks import until_first
 router = APIRouter()
 
 HEARTBEAT_S = 15.0
+MOST_TABS = 50  # connected at a time, of one person
+TOO_MANY_TABS = 4429  # closes a connection beyond them; HTTP says 429
+LONGEST_MESSAGE = 1000  # characters of what a tab says
+SAID = '{"type": "watch", "project": an id or null, "page": one of the app\'s pages, "object": a number or null}'
 
 
 @router.websocket("/api/live")
-async def live(socket: WebSocket, project: str | None = None, since: int | None = None, epoch: str | None = None) -> None:
+async def live(
+    socket: WebSocket,
+    project: Annotated[schemas.ProjectId | None, Query()] = None,
+    since: int | None = None,
+    epoch: str | None = None,
+) -> None:
     """Messages as they happen; `since` and `epoch` (of the last hello) bring what was missed, or a reset."""
     context: Context = socket.app.state.context
+    person = socket.state.person
     await socket.accept()
-    listener, must_fetch = context.hub.join(project, since, epoch, socket.state.person.name)
+    if context.hub.tabs_of(person.name) >= MOST_TABS:
+        await socket.close(TOO_MANY_TABS, f"{MOST_TABS} tabs of yours are connected already: close some")
+        return
+    listener = context.hub.join(project, since, epoch, person.name, lambda at: context.access.sees(socket.state.person, at))
     try:
-        hello = {"type": "hello", "epoch": context.hub.epoch, "seq": context.hub.seq, "reset": must_fetch, "tab": listener.tab}
-        await socket.send_json(hello)
         await until_first(
             lambda: _listen(socket, listener, context.hub),
             lambda: _speak(socket, listener, context.hub),
-            lambda: _follow_person(socket, listener, context.people),
+            lambda: _follow_person(socket, listener, context.hub, context.people),
         )
     except (WebSocketDisconnect, RuntimeError):
         pass
@@ -40,31 +52,32 @@ async def live(socket: WebSocket, project: str | None = None, since: int | None 
 async def _speak(socket: WebSocket, listener: Listener, hub: Hub) -> None:
     while True:
         try:
-            message = await asyncio.wait_for(listener.queue.get(), HEARTBEAT_S)
+            await socket.send_text(await asyncio.wait_for(listener.next(), HEARTBEAT_S))
         except TimeoutError:
-            message = {"type": "ping", "seq": hub.seq}
-        await socket.send_json(message)
+            hub.tell(listener, "ping")
 
 
 async def _listen(socket: WebSocket, listener: Listener, hub: Hub) -> None:
-    while True:
-        text = await socket.receive_text()
-        with contextlib.suppress(ValueError, AttributeError):
-            said = json.loads(text)
-            if said.get("type") == "watch":
-                project, page, number = (said.get(name) for name in ("project", "page", "object"))
-                hub.move(
-                    listener,
-                    project if isinstance(project, str) else None,
-                    page[:20] if isinstance(page, str) else "",
-                    number if isinstance(number, int) else None,
-                )
+    """Where the tab is; what is no such message is answered to it, and changes nothing."""
+    while (message := await socket.receive())["type"] == "websocket.receive":
+        try:
+            text = message.get("text") or ""
+            if len(text) > LONGEST_MESSAGE:
+                raise ValueError(f"{len(text)} characters")
+            said = schemas.Watch.model_validate_json(text)
+        except ValidationError as error:
+            first = error.errors()[0]
+            hub.tell(listener, "refused", message=": ".join([*map(str, first["loc"]), first["msg"]]), hint=SAID)
+        except ValueError as error:
+            hub.tell(listener, "refused", message=f"{error}, at most {LONGEST_MESSAGE}", hint=SAID)
+        else:
+            hub.move(listener, said.project, said.page, said.object)
 
 
-async def _follow_person(socket: WebSocket, listener: Listener, people: People) -> None:
+async def _follow_person(socket: WebSocket, listener: Listener, hub: Hub, people: People) -> None:
     """Say when the person may do more or less than before; close when the session has ended."""
     person = socket.state.person
     while (now := await people.until_other(socket.state.session, person)) is not None:
-        person = now
-        listener.queue.put_nowait({"type": "you", "name": person.name, "role": person.role})
+        person = socket.state.person = now
+        hub.tell(listener, "you", name=person.name, role=person.role)
     await socket.close(SESSION_ENDED, "the session has ended")

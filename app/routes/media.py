@@ -13,7 +13,7 @@ from app.services import bundles, media, overlays
 
 router = APIRouter(prefix="/media/{project}", tags=["media"], default_response_class=Response)
 
-Formats = Annotated[tuple[Literal["urdf", "mjcf", "usd", "glb"], ...], Query()]
+Formats = Annotated[tuple[str, ...], Query(max_length=10)]
 Width = Annotated[int | None, Query(ge=16, le=4096)]
 
 

@@ -4,7 +4,8 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 
 from app.deps import OpenCtx
-from app.routes.people import give_cookie
+from app.errors import Unauthorised
+from app.routes.people import address_of, give_cookie
 from app.services import pages
 
 router = APIRouter(include_in_schema=False)
@@ -16,12 +17,19 @@ REVALIDATED = {"cache-control": "no-cache"}
 @router.get("/people")
 @router.get("/p/{rest:path}")
 def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None, frame: str = "") -> Response:
-    """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address."""
+    """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address.
+
+    A key that was used already is no matter to the browser that used it; others see the sign-in page, which says what to do.
+    """
     if token is not None:
         answer: Response = RedirectResponse(request.url.remove_query_params("token").path, status_code=303)
-        give_cookie(request, answer, context.people.enter_with_key(token))
+        try:
+            give_cookie(request, answer, context.people.enter_with_key(token, address_of(request)))
+        except Unauthorised:
+            if request.state.person is None:
+                return FileResponse(context.static / "login.html", status_code=401, headers=REVALIDATED)
         return answer
-    return HTMLResponse(pages.html(context, request.url.path, frame), headers=REVALIDATED)
+    return HTMLResponse(pages.html(context, request.url.path, frame, request.state.person), headers=REVALIDATED)
 
 
 @router.get("/login")

@@ -1,36 +1,39 @@
 """Signing in and out, and who may."""
 
-from fastapi import APIRouter, Request, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
 
 from app import schemas
 from app.deps import AdminCtx, Ctx, OpenCtx
-from app.security import COOKIE
+from app.routes.numbers import OptionalId
+from app.security import cookie_name
 from app.services import members
 
 router = APIRouter(prefix="/api", tags=["people"])
 
 KEPT_S = 30 * 24 * 3600
+PageSize = Annotated[int, Query(ge=1, le=200)]
 
 
 @router.post("/login", operation_id="signIn", status_code=204)
-def sign_in(context: OpenCtx, request: Request, response: Response, body: schemas.Credentials) -> None:
-    """A session for an account, as a cookie; 429 after too many wrong passwords."""
-    client = request.client.host if request.client else ""
-    give_cookie(request, response, context.people.sign_in(body.name, body.password, client))
+async def sign_in(context: OpenCtx, request: Request, response: Response, body: schemas.Credentials) -> None:
+    """A session for an account, as a cookie. After some wrong ones each is looked at later, 429 when many wait."""
+    give_cookie(request, response, await context.people.sign_in(body.name, body.password, address_of(request)))
 
 
 @router.post("/logout", operation_id="signOut", status_code=204)
 def sign_out(context: Ctx, request: Request, response: Response) -> None:
     """End this session."""
-    context.people.sign_out(request.state.session)
-    response.delete_cookie(COOKIE, path="/")
+    context.people.sign_out(request.state.session, context.who, address_of(request))
+    response.delete_cookie(cookie_name(request.scope), path="/")
 
 
 @router.post("/account/password", operation_id="changePassword", status_code=204)
-def change_password(context: Ctx, request: Request, response: Response, body: schemas.PasswordChange) -> None:
+async def change_password(context: Ctx, request: Request, response: Response, body: schemas.PasswordChange) -> None:
     """Your own password; your other browsers are signed out."""
-    client = request.client.host if request.client else ""
-    give_cookie(request, response, context.people.change_password(context.person, body.old, body.new, client))
+    session = await context.people.change_password(context.person, body.old, body.new, address_of(request))
+    give_cookie(request, response, session)
 
 
 @router.get("/accounts", operation_id="listAccounts")
@@ -39,16 +42,22 @@ def list_accounts(context: AdminCtx) -> list[schemas.AccountInfo]:
     return members.everyone(context)
 
 
+@router.get("/audit", operation_id="listAudit")
+def list_audit(context: AdminCtx, before: OptionalId = None, limit: PageSize = 50) -> schemas.AuditPage:
+    """Sign-ins, refusals and changes of accounts, newest first; `before` is the last id of the page before."""
+    return members.record(context, before, limit)
+
+
 @router.post("/accounts", operation_id="addAccount", status_code=201)
-def add_account(context: AdminCtx, body: schemas.AccountIn) -> schemas.AccountInfo:
-    """Let somebody in; 409 when the name is taken."""
-    return members.add(context, body)
+async def add_account(context: AdminCtx, body: schemas.AccountIn) -> schemas.AccountInfo:
+    """Let somebody in; 409 when the name is taken, 422 with the reason for a password that is easily guessed."""
+    return await context.gates.passwords.run(context.who, members.add, context, body)
 
 
 @router.patch("/accounts/{name}", operation_id="changeAccount")
-def change_account(context: AdminCtx, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
+async def change_account(context: AdminCtx, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
     """Another role or password, from now on; 409 for the last admin's role."""
-    return members.change(context, name, body)
+    return await context.gates.passwords.run(context.who, members.change, context, name, body)
 
 
 @router.delete("/accounts/{name}", operation_id="removeAccount", status_code=204)
@@ -60,4 +69,10 @@ def remove_account(context: AdminCtx, name: str) -> None:
 def give_cookie(request: Request, response: Response, session_id: str) -> None:
     """The session, where no script reads it and no other site sends it."""
     secure = request.url.scheme == "https"
-    response.set_cookie(COOKIE, session_id, httponly=True, samesite="lax", secure=secure, max_age=KEPT_S, path="/")
+    name = cookie_name(request.scope)
+    response.set_cookie(name, session_id, httponly=True, samesite="lax", secure=secure, max_age=KEPT_S, path="/")
+
+
+def address_of(request: Request) -> str:
+    """Where a request comes from: who connected, or what the proxy says that the server was told to believe."""
+    return request.client.host if request.client else ""

@@ -5,19 +5,20 @@ from fastapi import APIRouter, Request
 from app import schemas
 from app.deps import AdminCtx, Ctx
 from app.routes.numbers import STREAMED, Count, OptionalId
+from app.schemas.text import FileName, Title
 from app.services import imports, projects, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
 
 @router.get("", operation_id="listProjects")
-def list_projects(context: Ctx) -> list[schemas.Project]:
+def list_projects(context: Ctx) -> list[schemas.ProjectSummary]:
     """All projects, last touched first."""
     return projects.list_projects(context)
 
 
 @router.post("/upload", operation_id="uploadProject", status_code=202, max_body_size=STREAMED)
-async def upload_project(context: Ctx, request: Request, filename: str, name: str | None = None) -> schemas.Project:
+async def upload_project(context: Ctx, request: Request, filename: FileName, name: Title | None = None) -> schemas.Project:
     """A new project from the request's body (the raw bytes of an .r3d or a zip); starts the import."""
     length = request.headers.get("content-length")
     size = int(length) if length and length.isdigit() else None
@@ -49,9 +50,9 @@ def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> sc
 
 
 @router.delete("/{project}", operation_id="deleteProject")
-def delete_project(context: AdminCtx, project: str) -> schemas.Deleted:
+async def delete_project(context: AdminCtx, project: str) -> schemas.Deleted:
     """Delete the project and its files; a recording imported by path stays where it is."""
-    return projects.delete(context, project)
+    return await context.gates.deletions.run(context.who, projects.delete, context, project)
 
 
 @router.get("/{project}/frames", operation_id="listFrames")

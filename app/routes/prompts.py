@@ -105,13 +105,13 @@ def open_live(context: Ctx, project: str) -> schemas.LiveStatus:
 @router.post("/objects/{object}/segment", operation_id="segmentObject", status_code=202)
 def segment_object(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
     """Compute the object's masks now."""
-    return masks.segment(context, project, object)
+    return prompts.segment(context, project, object)
 
 
 @router.post("/objects/{object}/segment/cancel", operation_id="cancelSegment")
 def cancel_segment(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
     """Stop computing the object's masks; those already there stay."""
-    return masks.cancel(context, project, object)
+    return prompts.cancel_segment(context, project, object)
 
 
 @router.get("/lanes", operation_id="getLanes")

@@ -10,8 +10,8 @@ router = APIRouter(prefix="/api", tags=["system"])
 
 
 @router.get("/health", operation_id="health")
-def health() -> dict[str, str]:
-    """Alive."""
+async def health() -> dict[str, str]:
+    """Alive; waits for nothing."""
     return {"state": "ok"}
 
 

@@ -43,9 +43,9 @@ async def continue_upload(context: Ctx, request: Request, upload: str, offset: O
 
 
 @router.post("/{upload}/finish", operation_id="finishUpload", status_code=202)
-def finish_upload(context: Ctx, upload: str) -> schemas.Project:
-    """Make it a project; starts the import. Asking twice is the same as once."""
-    return uploads.finish(context, upload)
+async def finish_upload(context: Ctx, upload: str) -> schemas.Project:
+    """Make it a project; starts the import. Asking twice is the same as once; 429 while others of yours are looked at."""
+    return await context.gates.looks.run(context.who, uploads.finish, context, upload)
 
 
 @router.delete("/{upload}", operation_id="cancelUpload", status_code=204)

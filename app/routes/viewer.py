@@ -12,27 +12,27 @@ router = APIRouter(tags=["viewer"])
 
 
 @router.post("/api/projects/{project}/viewer", operation_id="openViewer")
-def open_viewer(context: Ctx, request: Request, project: str) -> schemas.ViewerSession:
+async def open_viewer(context: Ctx, request: Request, project: str) -> schemas.ViewerSession:
     """Where the 3D view is; says so, with a picture and a mesh to show instead, when it is down."""
-    return viewers.open_view(context, project, request.state.session)
+    return await context.gates.views.run(context.who, viewers.open_view, context, project, request.state.session)
 
 
 @router.post("/api/projects/{project}/viewer/show", operation_id="showInViewer")
-def show_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
+async def show_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
     """Change what the 3D view shows."""
-    return viewers.show(context, project, request.state.session, body)
+    return await context.gates.views.run(context.who, viewers.show, context, project, request.state.session, body)
 
 
 @router.post("/api/projects/{project}/viewer/joints", operation_id="setJoints")
-def set_joints(context: Ctx, request: Request, project: str, body: schemas.JointValues) -> schemas.ViewerShown:
+async def set_joints(context: Ctx, request: Request, project: str, body: schemas.JointValues) -> schemas.ViewerShown:
     """Move joints of the scene in the 3D view."""
-    return viewers.set_joints(context, project, request.state.session, body.values)
+    return await context.gates.views.run(context.who, viewers.set_joints, context, project, request.state.session, body.values)
 
 
 @router.post("/api/projects/{project}/viewer/place", operation_id="placeInViewer")
-def place_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
+async def place_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
     """Put what is being moved in the 3D view at a pose; without one, say where it was dragged to."""
-    return viewers.place(context, project, request.state.session, body)
+    return await context.gates.views.run(context.who, viewers.place, context, project, request.state.session, body)
 
 
 @router.get("/viewer/{token}/{path:path}", include_in_schema=False)

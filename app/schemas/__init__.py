@@ -4,7 +4,8 @@ from app.schemas.base import ErrorBody
 from app.schemas.bundles import Bundle, BundleChange, BundleCheck, Certificate, Finding
 from app.schemas.captures import CaptureFacts, FrameInfo
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
-from app.schemas.masks import FrameMask, Lane, LaneEntry, LiveState, LiveStatus, MaskBits
+from app.schemas.live import ProjectId, Watch
+from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits
 from app.schemas.objects import (
     HistoryEntry,
     ObjectIn,
@@ -14,33 +15,55 @@ from app.schemas.objects import (
     PointIn,
     PointPatch,
     PointsIn,
-    PromptsFile,
-    PromptsFileObject,
-    PromptsFilePoint,
     SceneObject,
     SegmentState,
     Undone,
     UndoRequest,
 )
-from app.schemas.people import AccountIn, AccountInfo, AccountPatch, Credentials, PasswordChange
+from app.schemas.people import (
+    AccountIn,
+    AccountInfo,
+    AccountPatch,
+    AuditAction,
+    AuditEntry,
+    AuditPage,
+    Credentials,
+    PasswordChange,
+)
 from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo
-from app.schemas.projects import Deleted, ImportPath, Project, ProjectCounts, ProjectPatch, SampleRequest
+from app.schemas.projects import (
+    Deleted,
+    ImportPath,
+    MembersIn,
+    Project,
+    ProjectCounts,
+    ProjectMembers,
+    ProjectPatch,
+    ProjectSummary,
+    SampleRequest,
+)
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
 from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
 from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
 from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
-from app.schemas.system import Backend, Category, FolderEntry, FolderListing, SystemInfo
+from app.schemas.system import Backend, BundleFormat, Category, FolderEntry, FolderListing, SystemInfo
+from app.schemas.unknown import UnknownFolder
 from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
+from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject, PromptsFilePoint
 
 __all__ = [
     "AccountIn",
     "AccountInfo",
     "AccountPatch",
+    "AuditAction",
+    "AuditEntry",
+    "AuditPage",
     "Backend",
     "Bundle",
     "BundleChange",
     "BundleCheck",
+    "BundleFormat",
     "Candidate",
     "CandidateGroup",
     "CaptureFacts",
@@ -64,10 +87,10 @@ __all__ = [
     "JobEvent",
     "JointValues",
     "Lane",
-    "LaneEntry",
     "LiveState",
     "LiveStatus",
     "MaskBits",
+    "MembersIn",
     "ObjectIn",
     "ObjectPatch",
     "ObjectPhotos",
@@ -85,7 +108,10 @@ __all__ = [
     "PointsIn",
     "Project",
     "ProjectCounts",
+    "ProjectId",
+    "ProjectMembers",
     "ProjectPatch",
+    "ProjectSummary",
     "PromptsFile",
     "PromptsFileObject",
     "PromptsFilePoint",
@@ -108,6 +134,7 @@ __all__ = [
     "SystemInfo",
     "UndoRequest",
     "Undone",
+    "UnknownFolder",
     "Upload",
     "UploadIn",
     "VerdictIn",
@@ -117,4 +144,5 @@ __all__ = [
     "ViewerSession",
     "ViewerShow",
     "ViewerShown",
+    "Watch",
 ]

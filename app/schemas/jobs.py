@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from app.schemas.base import ErrorBody, Shape
+from app.schemas.text import Word
 
 JobState = Literal["queued", "running", "cancelling", "cancelled", "failed", "done"]
 JobKind = Literal["import", "sample", "run"]
@@ -56,7 +57,7 @@ class JobEvent(Shape):
 class RunRequest(Shape):
     """Which backends, where not the defaults."""
 
-    segmenter: str | None = Field(default=None, max_length=60)
-    generator: str | None = Field(default=None, max_length=60)
-    matcher: str | None = Field(default=None, max_length=60)
+    segmenter: Word | None = None
+    generator: Word | None = None
+    matcher: Word | None = None
     seed: int = Field(default=0, ge=0, lt=2**31)

@@ -30,22 +30,15 @@ class FrameMask(Shape):
     mask: MaskBits
 
 
-class LaneEntry(Shape):
-    """An object on one frame of the film-strip."""
-
-    frame: int
-    area: float  # share of the image
-    confidence: float
-
-
 class Lane(Shape):
-    """Where an object is seen."""
+    """Where an object is seen: frames, and the confidence on each."""
 
     object: int
     state: SegmentState
     source: Literal["live", "run", "none"]
     complete: bool
-    frames: list[LaneEntry]
+    frames: list[int]
+    confidences: list[float]
 
 
 class LiveStatus(Shape):

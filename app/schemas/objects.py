@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from app.schemas.base import Shape
+from app.schemas.text import Word
 
 SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"]
 
@@ -45,16 +46,16 @@ class Point(Shape):
 class ObjectIn(Shape):
     """A new object; without a name it gets its category's and the next number."""
 
-    name: str | None = Field(default=None, max_length=60)
-    category: str = Field(default="object", min_length=1, max_length=60)
+    name: Word | None = None
+    category: Word = "object"
     points: list[PointIn] = Field(default_factory=list, max_length=100)
 
 
 class ObjectPatch(Shape):
     """What changes; with `version`, only if nobody changed it meanwhile."""
 
-    name: str | None = Field(default=None, max_length=60)
-    category: str | None = Field(default=None, min_length=1, max_length=60)
+    name: Word | None = None
+    category: Word | None = None
     colour: int | None = Field(default=None, ge=0, le=999)
     version: int | None = None
 
@@ -108,30 +109,6 @@ class HistoryEntry(Shape):
     who: str
     at: float
     undone: bool
-
-
-class PromptsFile(Shape):
-    """prompts.json."""
-
-    version: Literal[1]
-    objects: list["PromptsFileObject"] = Field(max_length=10_000)
-
-
-class PromptsFileObject(Shape):
-    """One object of prompts.json."""
-
-    name: str = Field(max_length=60)
-    category: str = Field(max_length=60)
-    points: list["PromptsFilePoint"] = Field(max_length=1000)
-
-
-class PromptsFilePoint(Shape):
-    """One click of prompts.json."""
-
-    frame: int = Field(ge=0, lt=2**31)
-    x: float = Field(allow_inf_nan=False)
-    y: float = Field(allow_inf_nan=False)
-    label: Literal[0, 1]
 
 
 class ObjectPoints(Shape):

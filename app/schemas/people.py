@@ -5,14 +5,16 @@ from typing import Literal
 from pydantic import Field
 
 from app.schemas.base import Shape
+from app.schemas.text import Word
 
 RoleName = Literal["annotator", "reviewer", "admin"]
+AuditAction = Literal["signed in", "signed out", "refused", "added", "removed", "role", "password"]
 
 
 class Credentials(Shape):
     """A name and its password."""
 
-    name: str = Field(min_length=1, max_length=60)
+    name: Word
     password: str = Field(min_length=1, max_length=1000)
 
 
@@ -29,7 +31,7 @@ class AccountInfo(Shape):
 class AccountIn(Shape):
     """A new account."""
 
-    name: str = Field(min_length=1, max_length=60)
+    name: Word
     role: RoleName
     password: str = Field(min_length=1, max_length=1000)
 
@@ -46,3 +48,22 @@ class PasswordChange(Shape):
 
     old: str = Field(min_length=1, max_length=1000)
     new: str = Field(min_length=1, max_length=1000)
+
+
+class AuditEntry(Shape):
+    """One line of the record of sign-ins and accounts."""
+
+    id: int
+    at: float
+    action: AuditAction
+    account: str  # whose; empty for a name that nobody has, and for whoever started the server
+    who: str  # did it
+    client: str  # the address it came from, as far as the server was told which proxy to believe
+    detail: str
+
+
+class AuditPage(Shape):
+    """Some lines of the record, newest first, and how many there are."""
+
+    entries: list[AuditEntry]
+    total: int

@@ -9,6 +9,7 @@ from app.schemas.bundles import Bundle
 from app.schemas.captures import CaptureFacts
 from app.schemas.jobs import Job
 from app.schemas.states import ReviewState
+from app.schemas.text import ServerPath, Title, Word
 
 
 class ProjectCounts(Shape):
@@ -21,8 +22,8 @@ class ProjectCounts(Shape):
     open_comments: int = 0
 
 
-class Project(Shape):
-    """One recording and what became of it."""
+class ProjectSummary(Shape):
+    """One recording and what became of it, as the list of all shows it."""
 
     id: str
     name: str
@@ -31,8 +32,7 @@ class Project(Shape):
     updated: float
     source_name: str
     media_version: str
-    capture: CaptureFacts | None
-    notices: list[str]
+    frame_count: int
     error: ErrorBody | None
     counts: ProjectCounts
     job: Job | None  # the one under way, else the last one
@@ -46,20 +46,44 @@ class Project(Shape):
     review_state: ReviewState
 
 
+class Project(ProjectSummary):
+    """A project by itself, with what the doctor said of its recording."""
+
+    capture: CaptureFacts | None
+    notices: list[str]
+
+
 class ProjectPatch(Shape):
     """What changes: its name, or which backends do its stages."""
 
-    name: str | None = Field(default=None, min_length=1, max_length=120)
-    segmenter: str | None = Field(default=None, max_length=60)
-    generator: str | None = Field(default=None, max_length=60)
-    matcher: str | None = Field(default=None, max_length=60)
+    name: Title | None = None
+    segmenter: Word | None = None
+    generator: Word | None = None
+    matcher: Word | None = None
+
+
+class ProjectMembers(Shape):
+    """Who may see a project: everybody, or its owner, its members and admins."""
+
+    members_only: bool
+    owner: str | None  # None: who started the server, or an account that is gone
+    members: list[str]
+    may_change: bool  # whether you may
+    accounts: list[str]  # who could be a member; empty unless you may change it
+
+
+class MembersIn(Shape):
+    """Who may see a project from now on; the owner always does."""
+
+    members_only: bool
+    members: list[Word] = Field(default_factory=list, max_length=500)
 
 
 class ImportPath(Shape):
     """A recording on this machine."""
 
-    path: str = Field(min_length=1, max_length=4096)
-    name: str | None = Field(default=None, max_length=120)
+    path: ServerPath
+    name: Title | None = None
 
 
 class SampleRequest(Shape):
@@ -69,7 +93,7 @@ class SampleRequest(Shape):
     frames: int = Field(default=90, ge=10, le=600)
     width: int = Field(default=960, ge=160, le=1920)
     height: int = Field(default=720, ge=120, le=1440)
-    name: str | None = Field(default=None, max_length=120)
+    name: Title | None = None
 
 
 class Deleted(Shape):

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from app.schemas.base import Shape
+from app.schemas.text import Word
 
 
 class Proposal(Shape):
@@ -34,4 +35,4 @@ class Proposals(Shape):
 class ProposalIds(Shape):
     """Which proposals are meant."""
 
-    ids: list[str] = Field(min_length=1, max_length=500)
+    ids: list[Word] = Field(min_length=1, max_length=500)

@@ -2,11 +2,25 @@
 
 from typing import Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field
 
 from app.schemas.base import Shape
 from app.schemas.jobs import Job
-from r2c2r_core.overrides import MOST_BATCHES
+from app.schemas.text import Reference, Remark, Word
+from r2c2r_core.model.inputs import HingeSide
+from r2c2r_core.schema.overrides import (
+    BATCHES_SAID,
+    HINGE_SAID,
+    JOINTS_SAID,
+    MOST_BATCHES,
+    MOST_JOINTS,
+    POSE_SAID,
+    SIZE_SAID,
+    Dimensions,
+    Limits,
+    Opening,
+    Pose,
+)
 
 
 class Candidate(Shape):
@@ -80,9 +94,9 @@ class CandidateGroup(Shape):
 class VerdictIn(Shape):
     """What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew."""
 
-    candidate: str = Field(min_length=1, max_length=60)
+    candidate: Word
     verdict: Literal["accepted", "rejected", "cleared"]
-    reason: str = Field(default="", max_length=500)
+    reason: Remark = ""
     rerun: bool = True
     version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
 
@@ -91,11 +105,12 @@ class OverrideData(Shape):
     """What a person corrected about one object; None is computed."""
 
     candidate: str | None = None
-    hinge: Literal["left", "right", "top", "bottom"] | None = None
+    hinge: HingeSide | None = None
     dimensions_m: tuple[float, float, float] | None = None
     pose: list[list[float]] | None = None  # world_from_object, 4x4
     joint_lower: float | None = None
     joint_upper: float | None = None
+    joints: dict[str, tuple[float | None, float | None]] = Field(default_factory=dict)  # [lower, upper] by name
     rejected: list[str] = Field(default_factory=list)
     regenerate: int = 0
 
@@ -103,13 +118,14 @@ class OverrideData(Shape):
 class OverridePatch(Shape):
     """The fields that are present are set; null clears."""
 
-    candidate: str | None = None
-    hinge: Literal["left", "right", "top", "bottom"] | None = None
-    dimensions_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = None
-    pose: list[list[FiniteFloat]] | None = None
-    joint_lower: FiniteFloat | None = None
-    joint_upper: FiniteFloat | None = None
-    regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES)  # times further candidates were asked for
+    candidate: Reference | None = None
+    hinge: HingeSide | None = Field(default=None, description=HINGE_SAID)
+    dimensions_m: Dimensions | None = Field(default=None, description=SIZE_SAID)
+    pose: Pose | None = Field(default=None, description=POSE_SAID)
+    joint_lower: Opening | None = None
+    joint_upper: Opening | None = None
+    joints: dict[Reference, Limits] | None = Field(default=None, max_length=MOST_JOINTS, description=JOINTS_SAID)
+    regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES, description=BATCHES_SAID)
     rerun: bool = True
     version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
 

@@ -39,7 +39,7 @@ class StageInfo(Shape):
 
     name: str
     backend: str
-    seconds: float
+    seconds: float | None  # that its results took; None: not known
 
 
 class SceneSummary(Shape):

@@ -5,6 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from app.schemas.base import Shape
+from app.schemas.text import Prose, Remark
 
 ReviewState = Literal["draft", "ready", "in review", "changes requested", "approved"]
 
@@ -34,7 +35,7 @@ class ReviewStep(Shape):
 
     from_state: ReviewState
     to: ReviewState
-    reason: str = Field(default="", max_length=1000)
+    reason: Remark = ""
 
 
 class CommentPin(Shape):
@@ -50,7 +51,7 @@ class CommentPin(Shape):
 class CommentIn(CommentPin):
     """A new comment."""
 
-    text: str = Field(min_length=1, max_length=2000)
+    text: Prose
 
     @model_validator(mode="after")
     def _pinned_whole(self) -> Self:

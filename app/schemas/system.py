@@ -24,6 +24,14 @@ class Backend(Shape):
     reason: str  # why not, and the next step
 
 
+class BundleFormat(Shape):
+    """One file of a bundle that carries the scene."""
+
+    name: str  # as a download of some formats only asks for it
+    file: str
+    opened_by: str
+
+
 class SystemInfo(Shape):
     """What the app can do here; limits are shown before a file is chosen."""
 
@@ -40,6 +48,7 @@ class SystemInfo(Shape):
     segmenters: list[Backend]  # of each seam the first needs nothing and is the default
     generators: list[Backend]
     matchers: list[Backend]
+    formats: list[BundleFormat]
 
 
 class FolderEntry(Shape):

@@ -3,14 +3,15 @@
 from pydantic import Field
 
 from app.schemas.base import Shape
+from app.schemas.text import FileName, Title
 
 
 class UploadIn(Shape):
     """The file that will come, as its sender knows it."""
 
-    file_name: str = Field(min_length=1, max_length=300)
+    file_name: FileName
     size: int = Field(ge=1, lt=2**53, strict=True)
-    name: str | None = Field(default=None, max_length=120)
+    name: Title | None = None
     modified: float | None = Field(default=None, allow_inf_nan=False)
 
 

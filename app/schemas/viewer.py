@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat
 
 from app.schemas.base import Shape
+from app.schemas.text import Word
 
 
 class ViewerSession(Shape):
@@ -46,7 +47,7 @@ class ViewerShow(Shape):
 
     mode: Literal["cloud", "candidate", "aligned", "scene"]
     object: int | None = Field(default=None, ge=0, lt=2**63)
-    candidate: str | None = Field(default=None, max_length=60)
+    candidate: Word | None = None
     cloud: bool = True  # the scan behind it
     opacity: float = Field(default=1.0, ge=0.0, le=1.0)
     collision: bool = False  # colliders instead of what is seen (scene only)
@@ -75,4 +76,4 @@ class ViewerShown(Shape):
 class JointValues(Shape):
     """Joint positions; they are clamped to the limits."""
 
-    values: dict[str, FiniteFloat]
+    values: dict[Word, FiniteFloat] = Field(max_length=1000)

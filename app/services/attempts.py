@@ -1,47 +1,72 @@
-"""How often a password was guessed wrong, and when the next guess is heard."""
+"""How fast passwords may be guessed: the first guesses are heard at once, then each waits longer, and nobody is locked out."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from app.errors import TooMany
 
-WINDOW_S = 300.0
-LIMITS = {"pair": 5, "client": 30, "name": 50}  # wrong guesses in the window: one person from one place, one place, one person
+
+class Pace(NamedTuple):
+    """A leaky bucket (the generic cell rate algorithm): so many guesses at once, then one each so many seconds."""
+
+    free: int
+    every_s: float
+
+
+PACES = {
+    "pair": Pace(5, 4.0),  # one account from one address
+    "client": Pace(30, 0.5),  # one address, which may be that of everybody behind a proxy
+    "name": Pace(20, 2.0),  # one account, from anywhere
+}
+MOST_WAIT_S = 15.0  # that a guess is kept waiting; the right password is in after that, whatever was guessed before
+Key = tuple[str, str, str]
 
 
 class Attempts:
-    """Wrong guesses of the last minutes, in memory."""
+    """Guesses of the last minutes, in memory. A guess is counted before it is looked at, so that many at once are no more."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._wrong: dict[tuple[str, str, str], list[float]] = {}
+        self._due: dict[Key, float] = {}  # when the bucket is empty again
         self._lock = threading.Lock()
 
-    def check(self, name: str, client: str) -> None:
-        """Raise TooMany while no guess is heard."""
+    def take(self, name: str, client: str) -> float:
+        """Count a guess; the seconds it waits before it is looked at, at most MOST_WAIT_S.
+
+        Raises TooMany where more guesses than that wait already, of this account from this address: it is not counted then.
+        """
         now = self._clock()
         with self._lock:
-            for key in [key for key, times in self._wrong.items() if times[-1] < now - WINDOW_S]:
-                del self._wrong[key]
-            for key in _keys(name, client):
-                recent = [at for at in self._wrong.get(key, ()) if at > now - WINDOW_S]
-                if len(recent) >= LIMITS[key[0]]:
-                    wait = int(recent[-LIMITS[key[0]]] + WINDOW_S - now) + 1
-                    raise TooMany("too many wrong passwords", hint=f"try again in {wait} s", retry_s=wait)
-
-    def failed(self, name: str, client: str) -> None:
-        """Remember a wrong guess."""
-        with self._lock:
-            for key in _keys(name, client):
-                self._wrong[key] = [*self._wrong.get(key, ())[-LIMITS[key[0]] :], self._clock()]
+            self._due = {key: due for key, due in self._due.items() if due > now}
+            keys = _keys(name, client)
+            waits = [self._wait(key, now) for key in keys]
+            if waits[0] > MOST_WAIT_S:
+                retry_s = math.ceil(waits[0] - MOST_WAIT_S)
+                raise TooMany("too many wrong passwords", hint=f"try again in {retry_s} s", retry_s=retry_s)
+            for key in keys:
+                pace = PACES[key[0]]
+                fullest = now + pace.free * pace.every_s + MOST_WAIT_S
+                self._due[key] = min(max(self._due.get(key, now), now) + pace.every_s, fullest)
+            return min(max(waits), MOST_WAIT_S)
 
     def succeeded(self, name: str, client: str) -> None:
-        """Who knows the password may mistype it again."""
+        """It was no guess: who knows the password may mistype it again."""
         with self._lock:
-            self._wrong.pop(_keys(name, client)[0], None)
+            pair, *others = _keys(name, client)
+            self._due.pop(pair, None)
+            for key in others:
+                if key in self._due:
+                    self._due[key] -= PACES[key[0]].every_s
+
+    def _wait(self, key: Key, now: float) -> float:
+        """Seconds until one more fits the pace of the key."""
+        pace = PACES[key[0]]
+        return max(self._due.get(key, now) - now - (pace.free - 1) * pace.every_s, 0.0)
 
 
-def _keys(name: str, client: str) -> tuple[tuple[str, str, str], ...]:
+def _keys(name: str, client: str) -> tuple[Key, Key, Key]:
     name = name.casefold()
     return ("pair", name, client), ("client", "", client), ("name", name, "")

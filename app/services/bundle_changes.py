@@ -27,7 +27,7 @@ def _differences(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
     said = []
     if before.get("category") != after.get("category"):
         said.append(f"category {before.get('category')} → {after.get('category')}")
-    old, new = (entry.get("chosen", {}).get("candidate") for entry in (before, after))
+    old, new = ((entry.get("chosen") or {}).get("candidate") for entry in (before, after))
     if old != new:
         said.append(f"candidate {old} → {new}")
     if not _close(before.get("dimensions_m"), after.get("dimensions_m"), 5e-4):

@@ -2,17 +2,18 @@
 
 import hashlib
 import io
+import json
 import tempfile
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlmodel import col, select
+from sqlmodel import select
 
 from app import schemas
 from app.db import queries
-from app.db.documents import inputs_key
 from app.db.engine import reading
 from app.db.tables import Bundle
 from app.errors import NotFound, NotReady
@@ -21,9 +22,9 @@ from app.services.bundle_changes import changes
 from app.services.context import Context
 from app.services.media import kept_file
 from app.services.scenes import manifest
+from r2c2r_core.errors import InputError
+from r2c2r_core.export.writers.table import formats as known_formats
 from r2c2r_core.workspace import write_atomically
-
-FORMATS = {"urdf": "scene.urdf", "mjcf": "scene.xml", "usd": "scene.usda", "glb": "scene.glb"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +40,8 @@ def list_bundles(context: Context, project_id: str) -> list[schemas.Bundle]:
     """All versions, newest first."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        rows = session.exec(select(Bundle).where(Bundle.project_id == project_id).order_by(col(Bundle.version).desc()))
-        now = inputs_key(session, project_id)
-        return [queries.bundle_shape(row, project.name, now) for row in rows]
+        rows = queries.bundles(session, Bundle.project_id == project_id)
+        return [queries.bundle_shape(row, passed, project.name, project.inputs) for row, passed in rows]
 
 
 def file(context: Context, project_id: str, version: int) -> BundleFile:
@@ -58,7 +58,10 @@ def file(context: Context, project_id: str, version: int) -> BundleFile:
 def part(context: Context, project_id: str, version: int, formats: frozenset[str]) -> BundleFile:
     """A bundle with some formats only, made once, so that a download of it can go on where it stopped."""
     whole = file(context, project_id, version)
-    if formats >= FORMATS.keys():
+    names = {entry.name for entry in known_formats()}
+    if unknown := formats - names:
+        raise InputError(f"a bundle has no format {sorted(unknown)[0][:60]!r}", hint=f"its formats: {', '.join(sorted(names))}")
+    if formats == names:
         return whole
     with reading(context.engine) as session:
         files = context.files(queries.project_row(session, project_id))
@@ -72,12 +75,13 @@ def check(context: Context, project_id: str, version: int) -> schemas.BundleChec
     """Look at a bundle now: are its bytes those that were certified, and what does the linter say."""
     from r2c2r_core.export.archive import opened_bundle
     from r2c2r_core.export.lint import lint
+    from r2c2r_core.export.seal import check_seal
 
     found = file(context, project_id, version)
     with found.path.open("rb") as handle:
         intact = hashlib.file_digest(handle, "sha256").hexdigest() == found.sha256
     with opened_bundle(found.path) as folder:
-        findings = [schemas.Finding.model_validate(plain(finding)) for finding in lint(folder)]
+        findings = [schemas.Finding.model_validate(plain(finding)) for finding in (*check_seal(folder), *lint(folder))]
     return schemas.BundleCheck(version=version, intact=intact, findings=findings)
 
 
@@ -160,12 +164,26 @@ def _inside(archive: zipfile.ZipFile, name: str) -> str:
 
 def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
     """The zip without the other formats' scenes; without their meshes too, where no chosen format has use for them."""
-    left_out = {scene for name, scene in FORMATS.items() if name not in formats}
+    left_out = {entry.file for entry in known_formats() if entry.name not in formats}
+    meshes = any(entry.reads_meshes for entry in known_formats() if entry.name in formats)
     made = io.BytesIO()
+
+    def stays(path: str) -> bool:
+        parts = path.split("/")
+        return parts[-1] not in left_out and (meshes or "meshes" not in parts)
+
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
-        for entry in archive.infolist():
-            parts = entry.filename.split("/")
-            if parts[-1] in left_out or ("meshes" in parts and not formats & {"urdf", "mjcf", "usd"}):
-                continue
-            out.writestr(entry, archive.read(entry))
+        for entry in filter(lambda entry: stays(entry.filename), archive.infolist()):
+            content = archive.read(entry)
+            if entry.filename.rsplit("/", 1)[-1] == "manifest.json":
+                content = _listing_only(content, stays)
+            out.writestr(entry, content)
     return made.getvalue()
+
+
+def _listing_only(manifest: bytes, stays: Callable[[str], bool]) -> bytes:
+    """The manifest without the checksums of files that were left out."""
+    document = json.loads(manifest)
+    if "files" in document:
+        document["files"] = {name: sha256 for name, sha256 in document["files"].items() if stays(name)}
+    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()

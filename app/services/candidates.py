@@ -1,14 +1,13 @@
 """What was made for each object: candidates with their evidence, the choice, and what people said about them."""
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlmodel import Session, col, select
 
 from app import schemas
-from app.db import history
+from app.db import history, queries
 from app.db.tables import Project, SceneObject, Verdict
 from app.errors import NotFound
 from app.files import ProjectFiles
@@ -16,20 +15,45 @@ from app.jobs.plain import plain
 from app.services import views
 from app.services.context import Context
 from r2c2r_core.model.mesh import CandidateSet
-from r2c2r_core.overrides import MOST_BATCHES
+from r2c2r_core.schema.overrides import MOST_BATCHES
 from r2c2r_core.workspace import Workspace
 
 
-def group_of(context: Context, session: Session, project: Project, item: SceneObject) -> schemas.CandidateGroup | None:
+class _Said(NamedTuple):
+    """What people said about objects, by object."""
+
+    overrides: dict[int, dict[str, Any]]
+    verdicts: dict[int, dict[str, Verdict]]  # by candidate
+    steps: dict[int | None, history.Steps]
+    versions: dict[int | None, int]
+
+
+def groups_of(
+    context: Context, session: Session, project: Project, items: Sequence[SceneObject]
+) -> list[schemas.CandidateGroup]:
+    """The candidates of objects; those without any are left out."""
+    of = items[0].id if len(items) == 1 else None
+    verdicts: dict[int, dict[str, Verdict]] = {}
+    for verdict in session.exec(select(Verdict).where(col(Verdict.object_id).in_([item.id for item in items]))):
+        verdicts.setdefault(verdict.object_id, {})[verdict.candidate] = verdict
+    said = _Said(
+        overrides=queries.overrides_by_object(session, project.id),
+        verdicts=verdicts,
+        steps=history.steps(session, project.id, "review", of),
+        versions=history.versions(session, project.id, "review", of),
+    )
     files = context.files(project)
+    return [group for item in items if (group := _group(files, project, item, said)) is not None]
+
+
+def _group(files: ProjectFiles, project: Project, item: SceneObject, said: _Said) -> schemas.CandidateGroup | None:
     facts = facts_of(files, item.name)
     if facts is None:
         return None
-    override = history.override_data(session, item)
-    verdicts = {v.candidate: v for v in session.exec(select(Verdict).where(col(Verdict.object_id) == item.id))}
+    override, verdicts = said.overrides.get(item.id or 0, {}), said.verdicts.get(item.id or 0, {})
     accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
-    stacks = history.stacks_of(session, project.id, item.id, "review")
-    placement = _facts(files, "align", item.name, plain)
+    steps = said.steps.get(item.id, history.Steps())
+    placement = views.facts(files, "align", item.name, plain)
     by_person: str | None = override.get("candidate")
     known = {c["candidate_id"] for c in facts["candidates"]}
     chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
@@ -48,9 +72,9 @@ def group_of(context: Context, session: Session, project: Project, item: SceneOb
         candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],
         placement=_placement(placement) if placement else None,
         override=override_shape(override),
-        version=history.version_of(session, item, "review"),
-        can_undo=bool(stacks.done),
-        can_redo=bool(stacks.undone),
+        version=said.versions.get(item.id, 0),
+        can_undo=steps.undo,
+        can_redo=steps.redo,
         can_regenerate=(override.get("regenerate") or 0) < MOST_BATCHES,
     )
 
@@ -87,12 +111,14 @@ def _placement(facts: dict[str, Any]) -> schemas.Placement:
 
 
 def override_shape(data: dict[str, Any]) -> schemas.OverrideData:
-    return schemas.OverrideData.model_validate(data)
+    """The corrections as they are shown: of an uploaded mesh its name, not where it lies."""
+    shown = {"candidate": Path(data["candidate"]).name} if data.get("candidate") else {}
+    return schemas.OverrideData.model_validate({**data, **shown})
 
 
 def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:
     """The candidates as JSON, without their meshes."""
-    return _facts(files, "generate", name, _candidate_facts)
+    return views.facts(files, "generate", name, _candidate_facts)
 
 
 def _candidate_facts(found: CandidateSet) -> dict[str, Any]:
@@ -100,24 +126,6 @@ def _candidate_facts(found: CandidateSet) -> dict[str, Any]:
     candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
     about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
     return {**about, "candidates": candidates}
-
-
-def _facts(files: ProjectFiles, stage: str, name: str, told: Callable[[Any], dict[str, Any]]) -> dict[str, Any] | None:
-    """What `told` says of an object's noun, read once for every version of its file; None where it has none."""
-    path = Workspace(files.work).noun_path(stage, name)
-    try:
-        changed = path.stat().st_mtime_ns
-    except FileNotFoundError:
-        return None
-    return _facts_at(path, changed, files.work, stage, name, told)
-
-
-@lru_cache(maxsize=256)
-def _facts_at(
-    _path: Path, _changed: int, work: Path, stage: str, name: str, told: Callable[[Any], dict[str, Any]]
-) -> dict[str, Any] | None:
-    found = Workspace(work).load_latest(stage, name)
-    return None if found is None else told(found)
 
 
 def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:

@@ -14,7 +14,9 @@ from app.jobs.mask_wire import bits_mask
 from app.services import masks, views
 from app.services.context import Context
 from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.ingest.depth import decode_depth
+from r2c2r_core.ingest.store import depth_path, rgb_path
 
 VIEWS = 10
 POINTS_A_VIEW = 1200
@@ -26,11 +28,12 @@ def object_points(context: Context, project_id: str, object_id: int) -> schemas.
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        found = masks.frames_of(context, project, item, queries.points_of(session, object_id))
         files = context.files(project)
-    surest = sorted(found, key=lambda entry: (-float(entry["confidence"]), int(entry["frame"])))[: 3 * VIEWS]
-    spread = sorted(surest, key=lambda entry: int(entry["frame"]))[:: max(len(surest) // VIEWS, 1)][:VIEWS]
-    parts = [part for entry in spread if len((part := _seen_in(files, entry))[0])]
+    found = masks.found_of(context, project, item)
+    surest = sorted(found.masks.seen().tolist() if found else [], key=lambda seen: (-seen[1], seen[0]))[: 3 * VIEWS]
+    spread = [int(frame) for frame, *_ in sorted(surest)[:: max(len(surest) // VIEWS, 1)][:VIEWS]]
+    entries = [entry for frame in spread if found and (entry := found.masks.entry(frame)) is not None]
+    parts = [part for entry in entries if len((part := _seen_in(files, entry))[0])]
     if not parts:
         return schemas.ObjectPoints(count=0, frames=0, centre_m=[0, 0, 0], size_m=[0, 0, 0], xyz_mm="", rgb="")
     points, colours = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -53,8 +56,9 @@ def _seen_in(files: ProjectFiles, entry: dict[str, Any]) -> tuple[Points, np.nda
     nothing = np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
     index = int(entry["frame"])
     frame = views.frame_of(files, index)
-    raw = cv2.imread(str(files.work / "capture" / "depth" / f"{index:06d}.png"), cv2.IMREAD_UNCHANGED)
-    photo = cv2.imread(str(files.work / "capture" / "rgb" / f"{index:06d}.jpg"), cv2.IMREAD_REDUCED_COLOR_2)
+    store = views.frames_folder(files)
+    raw = cv2.imread(str(depth_path(store, index)), cv2.IMREAD_UNCHANGED)
+    photo = cv2.imread(str(rgb_path(store, index)), cv2.IMREAD_REDUCED_COLOR_2)
     if frame is None or raw is None or photo is None:
         return nothing
     depth, camera = decode_depth(raw), frame.depth_camera
@@ -66,6 +70,6 @@ def _seen_in(files: ProjectFiles, entry: dict[str, Any]) -> tuple[Points, np.nda
     chosen = np.random.default_rng(index).permutation(len(rows))[:POINTS_A_VIEW]
     rows, columns = rows[chosen], columns[chosen]
     z = depth[rows, columns].astype(np.float64)
-    rays = np.column_stack([(columns + 0.5 - camera.cx) / camera.fx, (rows + 0.5 - camera.cy) / camera.fy, np.ones(len(z))])
+    points = unproject(np.column_stack([columns, rows]) + 0.5, z, camera)
     small = cv2.resize(photo, depth.shape[::-1], interpolation=cv2.INTER_AREA)
-    return frame.world_from_camera.apply(rays * z[:, None]), small[rows, columns][:, ::-1]
+    return frame.world_from_camera.apply(points), small[rows, columns][:, ::-1]

@@ -8,10 +8,15 @@ from sqlalchemy import Engine
 from app.db.tables import Project
 from app.errors import Forbidden
 from app.files import ProjectFiles, project_files
+from app.gates import Gates
 from app.hub import Hub
 from app.jobs.live import LiveSegmenters
 from app.jobs.runner import Runner
+from app.process import Workers
 from app.security import Person, Role
+from app.services.access import Access
+from app.services.at_work import AtWork
+from app.services.descriptions import Descriptions
 from app.services.people import People
 from app.settings import Settings
 from app.viewer.client import Viewer
@@ -25,10 +30,15 @@ class Context:
     engine: Engine
     hub: Hub
     people: People
+    access: Access
+    uploads: AtWork
+    descriptions: Descriptions
     person: Person  # who asks; outside a request, who started the server
     runner: Runner
     live: LiveSegmenters
     viewer: Viewer
+    gates: Gates  # where requests wait for heavy work
+    probes: Workers
     static: Path
 
     @property

@@ -3,14 +3,14 @@
 import time
 from pathlib import Path
 
-from sqlmodel import Session
+from sqlmodel import Session, select
 
 from app import archives, schemas
 from app.db.engine import writing
-from app.db.tables import Job, Project, Upload
+from app.db.tables import Account, Job, Project, Upload
 from app.errors import NotFound
 from app.files import project_files, require_free, safe_name
-from app.services import projects
+from app.services import projects, quotas
 from app.services.context import Context
 from app.services.system import allowed_path
 from r2c2r_core.errors import CaptureError
@@ -19,15 +19,21 @@ from r2c2r_core.errors import CaptureError
 def from_finished_upload(context: Context, upload: Upload, received: Path) -> schemas.Project:
     """A project from a file that arrived; may be called again when it was interrupted."""
     file_name = safe_name(upload.file_name)
-    target = project_files(context.settings.data_dir, upload.id).source / file_name
+    files = project_files(context.settings.data_dir, upload.id)
+    target = files.source / file_name
     if received.exists():
         target.parent.mkdir(parents=True, exist_ok=True)
+        files.half_made_mark.touch()
         received.replace(target)
     with writing(context.engine) as session:
+        quotas.check_project(context, session)
         name = _name(upload.name, upload.file_name)
-        project = projects.new_project(session, name, file_name, target, project_id=upload.id, began=upload.created)
+        project = projects.new_project(
+            session, name, file_name, target, project_id=upload.id, began=upload.created, owner_id=_account(context, session)
+        )
         session.delete(session.merge(upload))
         job = queue_job(context, session, project, "import", {})
+    files.half_made_mark.unlink(missing_ok=True)
     return _started(context, project.id, job)
 
 
@@ -43,7 +49,9 @@ def from_path(context: Context, body: schemas.ImportPath) -> schemas.Project:
         raise CaptureError(f"{source} is empty", hint="choose the recording's folder")
     _require_room(context)
     with writing(context.engine) as session:
-        project = projects.new_project(session, _name(body.name, source.name), source.name, source)
+        project = projects.new_project(
+            session, _name(body.name, source.name), source.name, source, owner_id=_account(context, session)
+        )
         job = queue_job(context, session, project, "import", {})
     return _started(context, project.id, job)
 
@@ -52,7 +60,10 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
     """A project with a synthetic kitchen and its clicks."""
     _require_room(context)
     with writing(context.engine) as session:
-        project = projects.new_project(session, body.name or "Sample kitchen", "sample", None)
+        quotas.check_project(context, session, sample=True)
+        project = projects.new_project(
+            session, body.name or "Sample kitchen", quotas.SAMPLE, None, owner_id=_account(context, session)
+        )
         scan = project_files(context.settings.data_dir, project.id).source / "scan.r3d"
         project.source_path = str(scan)
         session.add(project)
@@ -62,11 +73,18 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
 
 def queue_job(context: Context, session: Session, project: Project, kind: str, payload: dict[str, object]) -> Job:
     """Put a job into the queue."""
+    quotas.check_job(context, session)
     job = Job(project_id=project.id, kind=kind, state="queued", payload=payload, who=context.who, created=time.time())
     job.message = "waiting"
     session.add(job)
     session.flush()
     return job
+
+
+def _account(context: Context, session: Session) -> int | None:
+    """The account of who asks; None for whoever started the server."""
+    mine = select(Account.id).where(Account.name == context.who)
+    return session.exec(mine).first() if context.person.account else None
 
 
 def _started(context: Context, project_id: str, job: Job) -> schemas.Project:
@@ -80,4 +98,4 @@ def _require_room(context: Context) -> None:
 
 
 def _name(name: str | None, filename: str) -> str:
-    return (name or "").strip()[:120] or Path(safe_name(filename)).stem or "Recording"
+    return name or Path(safe_name(filename)).stem or "Recording"

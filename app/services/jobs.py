@@ -6,10 +6,10 @@ from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import history, queries
-from app.db.documents import inputs_key, prompts_document
 from app.db.engine import reading, writing
 from app.db.tables import Job, JobEvent, Project
 from app.errors import Conflict, NotReady
+from app.privacy import without_places
 from app.services import projects
 from app.services.context import Context
 from app.services.imports import queue_job
@@ -31,14 +31,14 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
     """A waiting run with everything said so far; one under way that already knows it all is that run."""
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
-    if not prompts_document(session, project.id)["objects"]:
+    if not any(item.masks_key for item in queries.live_objects(session, project.id)):
         raise PromptError("no object has a click on it", hint="click at least one object on the annotate page")
     history.require_open(project)
     chosen = {seam: getattr(body, seam) or getattr(project, seam) for seam in projects.SEAMS}
     for seam, registry in projects.SEAMS.items():
         registry.require(chosen[seam])
     wishes = {**body.model_dump(), **chosen}
-    payload = {**wishes, "inputs": inputs_key(session, project.id)}
+    payload = {**wishes, "inputs": project.inputs}
     active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
     for job in session.exec(active):
         if job.state == "queued" and job.started is None:
@@ -53,16 +53,17 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
 def list_jobs(context: Context, project_id: str | None, limit: int) -> list[schemas.Job]:
     """Jobs, newest first."""
     with reading(context.engine) as session:
-        query = select(Job).order_by(col(Job.id).desc()).limit(min(max(limit, 1), 500))
+        shown = col(Job.project_id).not_in(context.access.hidden(context.person))
+        query = select(Job).where(shown).order_by(col(Job.id).desc()).limit(min(max(limit, 1), 500))
         if project_id is not None:
             query = query.where(Job.project_id == project_id)
-        return [queries.job_shape(session, row) for row in session.exec(query)]
+        return queries.job_shapes(session, session.exec(query).all())
 
 
 def get_job(context: Context, job_id: int) -> schemas.Job:
     """One job."""
     with reading(context.engine) as session:
-        return queries.job_shape(session, queries.job_row(session, job_id))
+        return queries.job_shapes(session, [queries.job_row(session, job_id)])[0]
 
 
 def cancel(context: Context, job_id: int) -> schemas.Job:
@@ -83,7 +84,7 @@ def retry(context: Context, job_id: int) -> schemas.Job:
                 context, session, project, schemas.RunRequest(**{k: v for k, v in row.payload.items() if k != "inputs"})
             )
         else:
-            if said := queries.no_retry(row, project):
+            if said := queries.no_retry(row.kind, project.source_path):
                 raise Conflict(said, hint="delete the project, and upload another one")
             project.status, project.error = "importing", None
             session.add(project)
@@ -112,7 +113,8 @@ def log(context: Context, job_id: int, tail: int) -> str:
     wanted = min(max(tail, 1), 2_000_000)
     with Path(path).open("rb") as handle:
         handle.seek(max(Path(path).stat().st_size - wanted, 0))
-        return handle.read(wanted).decode(errors="replace")
+        text = handle.read(wanted).decode(errors="replace")
+    return text if context.person.may("admin") else without_places(text, context.settings)
 
 
 def _check_backends(body: schemas.RunRequest) -> None:

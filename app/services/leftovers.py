@@ -1,5 +1,12 @@
-"""What a crash left on the disk and nothing knows of any more: deleted once it is old enough to be nobody's beginning."""
+"""What lies in the data folder and no row knows of: set aside for an admin to look at, never deleted.
 
+A row may be missing because a crash came before it, but also because the database was lost or an older one restored. Only
+what says itself that it is half made goes: a mesh that was still being received, the folder of an upload whose sender gave
+it up while it was being made a project.
+"""
+
+import logging
+import shutil
 import time
 from pathlib import Path
 
@@ -7,23 +14,44 @@ from sqlmodel import select
 
 from app.db.engine import reading
 from app.db.tables import Project, Upload
-from app.files import delete_folder
+from app.files import delete_folder, free_name, half_received, project_files
 from app.services.context import Context
+
+_log = logging.getLogger(__name__)
 
 OLD_S = 3600.0  # what begins just now has no row yet
 
 
 def tidy(context: Context) -> None:
-    """Delete bytes in the uploads folder that belong to no upload, and folders of projects that are none."""
+    """Delete what is marked as half made and nobody's any more; move what else is unknown to `unknown/`."""
+    data = context.settings.data_dir
     with reading(context.engine) as session:
         uploads = set(session.exec(select(Upload.id)))
-        known = uploads | set(session.exec(select(Project.id)))
+        projects = set(session.exec(select(Project.id)))
     for path in context.settings.uploads.glob("*"):
-        if path.stem not in uploads and _is_old(path):
+        if path.stem in uploads or not _is_old(path):
+            continue
+        if half_received(path):
             path.unlink(missing_ok=True)
-    for folder in (context.settings.data_dir / "projects").glob("*"):
-        if folder.name not in known and _is_old(folder):
+        else:
+            set_aside(context.settings.unknown, path)
+    for folder in (data / "projects").glob("*"):
+        half_made = project_files(data, folder.name).half_made
+        if folder.name in projects or (half_made and folder.name in uploads) or not _is_old(folder):
+            continue
+        if half_made:
             delete_folder(folder)
+        else:
+            set_aside(context.settings.unknown, folder)
+
+
+def set_aside(unknown: Path, path: Path) -> Path:
+    """Move a file or folder to `unknown/`, under a name that is free; where it is now."""
+    target = free_name(unknown, path.name)
+    unknown.mkdir(parents=True, exist_ok=True)
+    shutil.move(path, target)
+    _log.warning("%s: the database does not know it; moved to %s, where an admin can adopt it", path, target)
+    return target
 
 
 def _is_old(path: Path) -> bool:

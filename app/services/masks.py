@@ -1,25 +1,39 @@
 """Masks that follow from the clicks: live ones while annotating, else those of the last run."""
 
 import json
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlmodel import Session, select
+import numpy as np
+from sqlmodel import col, select
 
 from app import schemas
 from app.db import queries
 from app.db.engine import reading
-from app.db.tables import Point, Project, SceneObject
+from app.db.keys import masks_key
+from app.db.tables import Project, SceneObject
 from app.errors import NotReady
-from app.files import ProjectFiles
+from app.file_cache import FileCache
+from app.files import ProjectFiles, project_files
 from app.jobs import mask_store
-from app.jobs.mask_store import MaskFile, mask_path, prompt_key
+from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_path
 from app.jobs.mask_wire import mask_bits
 from app.services.context import Context
 from r2c2r_core.errors import PromptError
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
+
+_INDEX_BYTES = 64 << 20  # of where masks are: 3000 objects of 500 frames
+_STORED: FileCache[StoredMasks | None] = FileCache(_INDEX_BYTES)
+_FINISHED: FileCache[dict[str, str]] = FileCache(1 << 20)
+
+
+class Found(NamedTuple):
+    """The masks that belong to an object's clicks, how far they are, and where they come from."""
+
+    state: schemas.SegmentState
+    masks: Masks
+    source: str  # live | run
 
 
 def status(context: Context, project_id: str) -> schemas.LiveStatus:
@@ -39,24 +53,22 @@ def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
     return context.live.status(project_id)
 
 
-def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+def segment(context: Context, project_id: str, object_id: int) -> None:
     """Compute the object's masks now, also when there are some for these clicks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        points = queries.points_of(session, object_id)
-    if not any(point.label for point in points):
+        clicks = queries.clicks_of(session, object_id)
+    if not item.masks_key:
         raise PromptError(f"{item.name} has no click on it", hint="click on the object first")
-    _start(context, project, item, points)
-    return _told(context, project_id, object_id)
+    _start(context, project, item, clicks)
 
 
-def cancel(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+def cancel(context: Context, project_id: str, object_id: int) -> None:
     """Stop computing the object's masks."""
     with reading(context.engine) as session:
         queries.object_row(session, project_id, object_id)
     context.live.cancel(project_id, object_id)
-    return _told(context, project_id, object_id)
 
 
 def follow(context: Context, project_id: str, object_id: int) -> None:
@@ -64,175 +76,171 @@ def follow(context: Context, project_id: str, object_id: int) -> None:
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id, deleted=True)
-        points = queries.points_of(session, object_id)
-    state, _, _ = state_of(context, project, item, points)
-    if item.deleted or not any(point.label for point in points):
+        clicks = queries.clicks_of(session, object_id)
+    found = found_of(context, project, item)
+    if item.deleted or not item.masks_key:
         context.live.cancel(project_id, object_id)
-    elif state == "done" and _found(context, project, item, points) is not None:
-        files, key = context.files(project), _key(project, item, points)
-        found = mask_store.read(mask_path(files.masks, object_id, key))
-        if found is None or found.end != "done":  # the run's masks: nothing to show anew
+    elif found is not None and found.state == "done":
+        if found.source == "run":  # nothing to show anew
             return
-        counts = {"done": len(found.frames), "total": len(found.frames)}
+        counts = {"done": len(found.masks), "total": len(found.masks)}
         context.live.cancel(project_id, object_id)
         context.hub.publish("segment", project_id, object=object_id, state="done", error=None, restart=True, **counts)
-        for entry in found.frames.values():
-            shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
-            context.hub.publish("mask", project_id, object=object_id, **counts, **shown)
+        for frame in found.masks.seen()[:, 0].astype(int).tolist():
+            if (entry := found.masks.entry(frame)) is not None:
+                shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
+                context.hub.publish("mask", project_id, object=object_id, **counts, **shown)
     elif project.status == "ready":
-        _start(context, project, item, points)
+        _start(context, project, item, clicks)
 
 
 def resume(context: Context) -> None:
     """Go on with masks that were being computed when the server went away."""
     with reading(context.engine) as session:
-        projects = [row for row in session.exec(select(Project)) if row.status == "ready"]
-        wanted = [(row, item, points) for row in projects for item, points in _prompted(session, row.id)]
-    for project, item, points in wanted:
-        stored = mask_store.read(mask_path(context.files(project).masks, item.id or 0, _key(project, item, points)))
+        drawn = select(Project.id, Project.work_path, SceneObject.id, SceneObject.masks_key).join(SceneObject)
+        drawn = drawn.where(Project.status == "ready", col(SceneObject.deleted).is_(False), SceneObject.masks_key != "")
+        wanted = session.exec(drawn).all()
+    for project_id, work, number, key in wanted:
+        files = project_files(context.settings.data_dir, project_id, work)
+        stored = mask_store.read(mask_path(files.masks, number or 0, key))
         if stored is not None and stored.end is None:
-            _start(context, project, item, points)
+            segment(context, project_id, number or 0)
 
 
-def state_of(
-    context: Context, project: Project, item: SceneObject, points: list[Point]
-) -> tuple[schemas.SegmentState, int, list[str]]:
+def state_of(context: Context, project: Project, item: SceneObject) -> tuple[schemas.SegmentState, int, list[str]]:
     """How far the object's masks are, on how many frames it is seen, and what went wrong."""
-    if not any(point.label for point in points):
-        return "none", 0, []
-    found = _found(context, project, item, points)
+    found = found_of(context, project, item)
     if found is None:
         return "none", 0, []
-    state, masks, _ = found
-    notices = [f"{masks.error['message']}; {masks.error['hint']}".rstrip("; ")] if masks.error else []
-    return state, len(masks.frames), notices
-
-
-def frames_of(context: Context, project: Project, item: SceneObject, points: list[Point]) -> list[dict[str, Any]]:
-    """The object's masks, by frame, with their confidence; none while there are none."""
-    found = _found(context, project, item, points)
-    return list(found[1].frames.values()) if found is not None else []
+    error = found.masks.error
+    notices = [f"{error['message']}; {error['hint']}".rstrip("; ")] if error else []
+    return found.state, len(found.masks), notices
 
 
 def lanes(context: Context, project_id: str) -> list[schemas.Lane]:
     """Where each object is seen."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        found = [(item, _found(context, project, item, points)) for item, points in _prompted(session, project_id)]
-    return [_lane(item, masks) for item, masks in found]
+        items = queries.live_objects(session, project_id)
+    files = context.files(project)
+    return [_lane(item, found_of(context, project, item, files)) for item in items]
 
 
 def on_frame(context: Context, project_id: str, frame: int) -> list[schemas.FrameMask]:
     """All objects' masks on one frame."""
-    shown = []
+    return on_frames(context, project_id, {frame})[frame]
+
+
+def on_frames(context: Context, project_id: str, frames: set[int]) -> dict[int, list[schemas.FrameMask]]:
+    """All objects' masks, by frame."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        for item, points in _prompted(session, project_id):
-            found = _found(context, project, item, points)
-            if found is None or frame not in found[1].frames:
-                continue
-            entry = found[1].frames[frame]
-            mask = schemas.MaskBits(**entry["mask"])
-            source: Any = found[2]
-            shown.append(
-                schemas.FrameMask(object=item.id or 0, frame=frame, confidence=entry["confidence"], source=source, mask=mask)
-            )
+        items = queries.live_objects(session, project_id)
+    shown: dict[int, list[schemas.FrameMask]] = {frame: [] for frame in frames}
+    files = context.files(project)
+    for item in items:
+        found = found_of(context, project, item, files)
+        for frame in frames if found else ():
+            if found and (entry := found.masks.entry(frame)) is not None:
+                shown[frame].append(_frame_mask(item, found, entry))
     return shown
 
 
-def _start(context: Context, project: Project, item: SceneObject, points: list[Point]) -> None:
-    prompt = {"name": item.name, "category": item.category, "points": [_click(point) for point in points]}
-    key = _key(project, item, points)
-    context.live.segment(project.id, context.files(project), project.segmenter, item.id or 0, key, prompt)
-
-
-def _told(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    from app.services.prompts import tell_object  # the two know each other: clicks bring masks, masks show objects
-
-    return tell_object(context, project_id, object_id)
-
-
-def _prompted(session: Session, project_id: str) -> list[tuple[SceneObject, list[Point]]]:
-    return [(item, queries.points_of(session, item.id)) for item in queries.live_objects(session, project_id)]
-
-
-def _found(
-    context: Context, project: Project, item: SceneObject, points: list[Point]
-) -> tuple[schemas.SegmentState, MaskFile, str] | None:
-    """The masks that belong to these clicks, how far they are, and where they come from."""
-    number, key, files = item.id or 0, _key(project, item, points), context.files(project)
+def found_of(context: Context, project: Project, item: SceneObject, files: ProjectFiles | None = None) -> Found | None:
+    """The masks that belong to the object's clicks; None while there are none. Who asks for many gives the project's files."""
+    number, key, files = item.id or 0, item.masks_key, files or context.files(project)
+    if not key:
+        return None
     live = context.live.task(project.id, number, key)
     if live is not None:
-        return (*live, "live")
-    path = mask_path(files.masks, number, key)
-    stored = _stored(path)
+        return Found(*live, "live")
+    stored = _stored(mask_path(files.masks, number, key))
     if stored is not None and stored.end == "done":
-        return "done", stored, "live"
-    run = _run_masks(files, item, points, project.segmenter, context.settings.preview_width)
+        return Found("done", stored, "live")
+    run = _run_masks(files, item, project.segmenter, context.settings.preview_width)
     if run is not None:
-        return "done", run, "run"
+        return Found("done", run, "run")
     if stored is None:
         return None
-    return ("failed" if stored.end == "failed" else "partial"), stored, "live"
+    return Found("failed" if stored.end == "failed" else "partial", stored, "live")
 
 
-def _lane(item: SceneObject, found: tuple[schemas.SegmentState, MaskFile, str] | None) -> schemas.Lane:
+def _frame_mask(item: SceneObject, found: Found, entry: Entry) -> schemas.FrameMask:
+    return schemas.FrameMask(
+        object=item.id or 0,
+        frame=entry["frame"],
+        confidence=entry["confidence"],
+        source=found.source,  # type: ignore[arg-type]  # it is one of the two
+        mask=schemas.MaskBits(**entry["mask"]),
+    )
+
+
+def _start(context: Context, project: Project, item: SceneObject, clicks: list[queries.Click]) -> None:
+    points = [{"frame": click.frame, "x": click.x, "y": click.y, "label": click.label} for click in clicks]
+    prompt = {"name": item.name, "category": item.category, "points": points}
+    context.live.segment(project.id, context.files(project), project.segmenter, item.id or 0, item.masks_key, prompt)
+
+
+def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
     if found is None:
-        return schemas.Lane(object=item.id or 0, state="none", source="none", complete=False, frames=[])
-    state, masks, source = found
-    entries = sorted(masks.frames.values(), key=lambda entry: int(entry["frame"]))
-    frames = [schemas.LaneEntry(frame=e["frame"], area=e["area"], confidence=e["confidence"]) for e in entries]
-    where: Any = source
-    return schemas.Lane(object=item.id or 0, state=state, source=where, complete=state == "done", frames=frames)
+        return schemas.Lane(object=item.id or 0, state="none", source="none", complete=False, frames=[], confidences=[])
+    seen = found.masks.seen()
+    return schemas.Lane(
+        object=item.id or 0,
+        state=found.state,
+        source=found.source,  # type: ignore[arg-type]  # it is one of the two
+        complete=found.state == "done",
+        frames=seen[:, 0].astype(int).tolist(),
+        confidences=(np.floor(seen[:, 1] * 100 + 1e-9) / 100).tolist(),  # a lane shows no more; what is doubtful stays it
+    )
 
 
-def _run_masks(files: ProjectFiles, item: SceneObject, points: list[Point], segmenter: str, width: int) -> MaskFile | None:
-    """The last run's masks, when it ran with these clicks and this segmenter."""
-    path = files.work / "nouns" / "segment" / f"{item.name}.noun"
-    prompts = files.finished_prompts
-    if not (path.is_file() and prompts.is_file()):
+def _run_masks(files: ProjectFiles, item: SceneObject, segmenter: str, width: int) -> StoredMasks | None:
+    """The last run's masks, when it ran with these clicks and this segmenter; made for the browser once."""
+    noun = Workspace(files.work).noun_path("segment", item.name)
+    if not noun.is_file() or _finished_key(files, segmenter, item.name) != item.masks_key:
         return None
-    for entry in _prompts_at(prompts, prompts.stat().st_mtime_ns):
-        if entry["name"] == item.name and entry["category"] == item.category and entry["points"] == [_click(p) for p in points]:
-            backend, found = _track_at(path, path.stat().st_mtime_ns, files.work, item.name, width)
-            return found if backend == segmenter else None
-    return None
+    kept = files.previews / "masks" / f"{item.name}-{noun.stat().st_mtime_ns:x}.jsonl"
+    if not kept.is_file():
+        track: MaskTrack | None = Workspace(files.work).load_latest("segment", item.name)
+        if track is None:
+            return None
+        for older in kept.parent.glob(f"{item.name}-*.jsonl"):
+            older.unlink(missing_ok=True)
+        mask_store.write(kept, _entries(track, width), track.backend)
+    found = _stored(kept)
+    return found if found is not None and found.backend == segmenter else None
 
 
-@lru_cache(maxsize=64)
-def _track_at(path: Path, _changed: int, work: Path, name: str, width: int) -> tuple[str, MaskFile | None]:
-    track: MaskTrack | None = Workspace(work).load_latest("segment", name)
-    if track is None:
-        return "", None
-    found = MaskFile(end="done")
-    for frame, packed in track.masks.items():
-        area = packed.area_px / max(packed.width * packed.height, 1)
-        entry = {"frame": frame, "confidence": track.confidence[frame], "area": area, "mask": mask_bits(packed, width)}
-        found.frames[frame] = entry
-    return track.backend, found
+def _entries(track: MaskTrack, width: int) -> list[Entry]:
+    """A run's masks as live ones are stored."""
+    return [
+        {
+            "frame": frame,
+            "confidence": track.confidence[frame],
+            "area": packed.area_px / max(packed.width * packed.height, 1),
+            "mask": mask_bits(packed, width),
+        }
+        for frame, packed in track.masks.items()
+    ]
 
 
-@lru_cache(maxsize=16)
-def _prompts_at(path: Path, _changed: int) -> list[dict[str, Any]]:
+def _finished_key(files: ProjectFiles, segmenter: str, name: str) -> str | None:
+    """Key of the masks that the last run drew of the object, had that segmenter drawn them."""
+    path = files.finished_prompts
+    keys = _FINISHED.get(path, lambda: _keys_in(path, segmenter), lambda keys, _: 100 * len(keys), about=segmenter)
+    return keys.get(name) if keys is not None else None
+
+
+def _keys_in(path: Path, segmenter: str) -> dict[str, str]:
     objects: list[dict[str, Any]] = json.loads(path.read_text())["objects"]
-    return objects
+    clicks = {entry["name"]: [_click(point) for point in entry["points"]] for entry in objects}
+    return {entry["name"]: masks_key(segmenter, entry["category"], clicks[entry["name"]]) for entry in objects}
 
 
-def _stored(path: Path) -> MaskFile | None:
-    try:
-        return _stored_at(path, path.stat().st_mtime_ns)
-    except FileNotFoundError:
-        return None
+def _click(point: dict[str, Any]) -> tuple[int, float, float, int]:
+    return int(point["frame"]), float(point["x"]), float(point["y"]), int(point["label"])
 
 
-@lru_cache(maxsize=128)
-def _stored_at(path: Path, _changed: int) -> MaskFile | None:
-    return mask_store.read(path)
-
-
-def _key(project: Project, item: SceneObject, points: list[Point]) -> str:
-    return prompt_key(item.category, [(p.frame, p.x, p.y, p.label) for p in points], project.segmenter)
-
-
-def _click(point: Point) -> dict[str, Any]:
-    return {"frame": point.frame, "x": point.x, "y": point.y, "label": point.label}
+def _stored(path: Path) -> StoredMasks | None:
+    return _STORED.get(path, lambda: mask_store.read(path), lambda found, _: found.bytes if found else 0)

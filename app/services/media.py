@@ -11,9 +11,10 @@ from app.db import queries
 from app.db.engine import reading
 from app.errors import NotFound, NotReady
 from app.files import ProjectFiles, inside
-from app.services import projects
+from app.services import projects, views
 from app.services.candidates import candidate_mesh, generate_key
 from app.services.context import Context
+from r2c2r_core.ingest.store import depth_path, rgb_path
 from r2c2r_core.workspace import write_atomically
 
 WIDTHS = (160, 320, 480, 960, 1920)
@@ -39,7 +40,7 @@ def depth(context: Context, project_id: str, index: int) -> Path:
     """A frame's depth in colours, at the size of its preview; what was not measured is filled in faintly."""
     files = _files(context, project_id)
     colour, _ = _stored_frame(files, index)
-    stored = files.work / "capture" / "depth" / f"{index:06d}.png"
+    stored = depth_path(views.frames_folder(files), index)
     if not stored.is_file():
         raise NotFound(f"frame {index} has no depth image")
     return kept_file(
@@ -93,7 +94,7 @@ def _object_files(context: Context, project_id: str, object_id: int) -> tuple[Pr
 def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int]]:
     for entry in projects.frame_table(files):
         if entry["index"] == index:
-            stored = files.work / "capture" / "rgb" / f"{index:06d}.jpg"
+            stored = rgb_path(views.frames_folder(files), index)
             if not stored.is_file():
                 raise NotReady(f"frame {index} is being read again", hint="wait for the running job")
             return stored, (int(entry["width"]), int(entry["height"]))

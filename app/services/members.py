@@ -1,6 +1,7 @@
-"""Who may sign in at this server: what an admin sees of the accounts and changes about them."""
+"""Who may sign in at this server: what an admin sees of the accounts and changes about them.
 
-import threading
+What takes a password hashes it: call it behind the gate of passwords.
+"""
 
 from sqlalchemy import func
 from sqlmodel import Session, col, select
@@ -8,11 +9,8 @@ from sqlmodel import Session, col, select
 from app import schemas
 from app.db.engine import reading
 from app.db.tables import Account, SignIn
-from app.errors import Conflict
-from app.services import accounts
+from app.services import accounts, audit
 from app.services.context import Context
-
-_changing = threading.Lock()  # two admins at once do not both pass as not the last one
 
 
 def everyone(context: Context) -> list[schemas.AccountInfo]:
@@ -21,38 +19,29 @@ def everyone(context: Context) -> list[schemas.AccountInfo]:
         return [_shape(context, session, account) for account in session.exec(select(Account).order_by(col(Account.name)))]
 
 
+def record(context: Context, before: int | None, limit: int) -> schemas.AuditPage:
+    """Sign-ins, refusals and changes of accounts, newest first."""
+    return audit.entries(context.engine, before, limit)
+
+
 def add(context: Context, body: schemas.AccountIn) -> schemas.AccountInfo:
     """A new account."""
-    accounts.add(context.engine, body.name, body.role, body.password)
+    accounts.add(context.engine, body.name, body.role, body.password, by=context.who)
     return _one(context, body.name)
 
 
 def change(context: Context, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
     """Another role, another password; both hold at once, on open connections too."""
-    with _changing:
-        if body.role is not None and body.role != "admin":
-            _refuse_last_admin(context, name)
-        if body.password is not None:
-            accounts.set_password(context.engine, name, body.password)
-        if body.role is not None:
-            accounts.set_role(context.engine, name, body.role)
+    accounts.change(context.engine, name, role=body.role, password=body.password, by=context.who)
     context.people.look_again()
     return _one(context, name)
 
 
 def remove(context: Context, name: str) -> None:
     """Delete the account: its sessions and open connections end; what the person did keeps the name."""
-    with _changing:
-        _refuse_last_admin(context, name)
-        accounts.remove(context.engine, name)
+    accounts.remove(context.engine, name, by=context.who)
     context.people.look_again()
-
-
-def _refuse_last_admin(context: Context, name: str) -> None:
-    """A server that others can reach keeps somebody who may let people in."""
-    admins = [person.name for person in accounts.everyone(context.engine) if person.role == "admin"]
-    if context.settings.accounts_only and admins == [name.lower()]:
-        raise Conflict(f"{name} is the only admin", hint="make somebody else admin first")
+    context.access.look_again()
 
 
 def _one(context: Context, name: str) -> schemas.AccountInfo:

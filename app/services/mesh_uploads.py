@@ -13,7 +13,7 @@ from app import schemas
 from app.db import history, queries
 from app.db.engine import reading
 from app.errors import TooLarge
-from app.files import require_free, safe_name
+from app.files import receiving, require_free, safe_name
 from app.services import probing, reviews
 from app.services.context import Context
 from r2c2r_core.errors import OverrideError
@@ -34,13 +34,14 @@ async def upload(
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
         raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(SUFFIXES)}")
+    context.gates.looks.check(context.who)  # before a byte is received
     folder = await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, version)
     stem, token = re.sub(r"[^A-Za-z0-9_]+", "_", Path(name).stem)[:40] or "mesh", secrets.token_hex(4)
-    received, target = context.settings.uploads / f"{token}{suffix}", folder / f"{stem}-{token}{suffix}"
-    wish = schemas.OverridePatch(candidate=str(target), rerun=rerun, version=version)
+    received, target = receiving(context.settings.uploads, f"{token}{suffix}"), folder / f"{stem}-{token}{suffix}"
+    wish = schemas.OverridePatch.model_construct(candidate=str(target), rerun=rerun, version=version)  # ours, however long
     try:
         await _receive(stream, received)
-        await anyio.to_thread.run_sync(probing.look_at, context, "mesh", received, name)
+        await context.gates.looks.run(context.who, probing.look_at, context, "mesh", received, name)
         return await anyio.to_thread.run_sync(_adopt, context, project_id, object_id, received, wish)
     except ClientDisconnect as error:
         raise OverrideError("the sender left before the last byte", hint="upload it again") from error

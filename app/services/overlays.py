@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -15,11 +14,12 @@ from app.files import ProjectFiles
 from app.services import masks, media, views
 from app.services.context import Context
 from r2c2r_core.arrays import Points
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import Intrinsics, unproject
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import decode_depth
+from r2c2r_core.ingest.store import depth_path
 from r2c2r_core.model.scene import SceneObject
 
 WIDTH = 640
@@ -45,11 +45,11 @@ def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectP
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        found = masks.frames_of(context, project, item, queries.points_of(session, object_id))
         files = context.files(project)
-    best = sorted(found, key=lambda entry: -float(entry["area"]) * float(entry["confidence"]))[: 6 * PHOTOS]
-    spread = sorted(best, key=lambda entry: int(entry["frame"]))[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
-    shown = [photo for entry in spread if (photo := _photo(files, entry)) is not None]
+    found = masks.found_of(context, project, item)
+    best = sorted(found.masks.seen().tolist() if found else [], key=lambda seen: -seen[2] * seen[1])[: 6 * PHOTOS]
+    spread = sorted(best)[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
+    shown = [photo for frame, sure, _ in spread if (photo := _photo(files, int(frame), sure)) is not None]
     fitted = _scene_object(files, "warp", item.name) or _scene_object(files, "synthesize", item.name)
     stages: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
     return schemas.ObjectPhotos(
@@ -93,8 +93,8 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
     z = float(depth[row, column])
     if z <= 0:
         return None
-    ray = np.array([(x * scale - camera.cx) / camera.fx, (y * scale - camera.cy) / camera.fy, 1.0])
-    return [float(value) for value in frame.world_from_camera.apply((ray * z)[None])[0]]
+    point = unproject(np.array([[x * scale, y * scale]]), np.array([z]), camera)
+    return [float(value) for value in frame.world_from_camera.apply(point)[0]]
 
 
 def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf) -> list[Part]:
@@ -184,7 +184,7 @@ def _outline(depth: np.ndarray) -> np.ndarray:
 
 def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> np.ndarray:
     """BGRA at depth size: red where the mesh stands before the measured surface, blue where behind, pale where they agree."""
-    raw = cv2.imread(str(files.work / "capture" / "depth" / f"{index:06d}.png"), cv2.IMREAD_UNCHANGED)
+    raw = cv2.imread(str(depth_path(views.frames_folder(files), index)), cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise NotFound(f"frame {index} has no depth image")
     measured = decode_depth(raw)
@@ -200,8 +200,8 @@ def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrin
     return np.dstack([image.astype(np.uint8), alpha.astype(np.uint8)])
 
 
-def _photo(files: ProjectFiles, entry: dict[str, Any]) -> schemas.Photo | None:
-    frame = views.frame_of(files, int(entry["frame"]))
+def _photo(files: ProjectFiles, index: int, confidence: float) -> schemas.Photo | None:
+    frame = views.frame_of(files, index)
     if frame is None:
         return None
     camera = frame.rgb_camera
@@ -214,7 +214,7 @@ def _photo(files: ProjectFiles, entry: dict[str, Any]) -> schemas.Photo | None:
         cx=camera.cx,
         cy=camera.cy,
         camera_from_world=frame.world_from_camera.inverse.matrix.tolist(),
-        confidence=float(entry["confidence"]),
+        confidence=confidence,
     )
 
 

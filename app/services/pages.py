@@ -13,6 +13,7 @@ from posixpath import join, normpath
 from app.db import queries
 from app.db.engine import reading
 from app.errors import NotFound, NotReady
+from app.security import Person
 from app.services import projects
 from app.services.context import Context
 
@@ -21,10 +22,11 @@ SHOWN_WIDTH = 960  # of a frame, as static/js/annotate/frames.js asks for it
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
 
 
-def html(context: Context, path: str, frame: str = "") -> str:
+def html(context: Context, path: str, frame: str = "", person: Person | None = None) -> str:
     """The page at a path, asking at once for that page's modules and, where frames are clicked, for the one shown first."""
     page, project = shown_at(path)
-    head = _first_frame(context, project, frame) if page == "annotate" else []
+    shown = page == "annotate" and context.access.sees(person or context.person, project)
+    head = _first_frame(context, project, frame) if shown else []
     head += [f'<link rel="modulepreload" href="/static/{module}" />' for module in modules(context.static, page)]
     text = (context.static / "index.html").read_text(encoding="utf-8")
     return text.replace("</head>", "".join(f"  {line}\n  " for line in head) + "</head>", 1)

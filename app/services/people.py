@@ -3,45 +3,53 @@
 import asyncio
 import contextlib
 import hashlib
-import hmac
+import logging
 import secrets
 import time
+from collections.abc import Callable
 
 import anyio
 from sqlalchemy import Engine
-from sqlmodel import col, delete, select
+from sqlmodel import Session, col, delete, select
 
 from app.db.engine import reading, writing
 from app.db.tables import Account, SignIn
 from app.errors import Conflict, Forbidden, Unauthorised
+from app.gates import Gate
 from app.security import Person
-from app.services import accounts
+from app.services import accounts, audit, launch_keys
 from app.services.attempts import Attempts
 from app.settings import Settings
 from r2c2r_core.errors import R2C2RError
 
+_log = logging.getLogger(__name__)
+
 KEPT_S = 30 * 24 * 3600.0  # since it was last used
 REMEMBERED_S = 2.0  # a person is looked up again after this: `r2c2r user` changes the file from another process
+KEY_REFUSAL_S = 10.0  # a wrong key is noted at most this often: it costs its sender nothing
 LOOK_UPS = 4  # at a time, in threads of their own: slow requests take those of requests
 
 
 class People:
-    """Signs in, signs out, and knows whose a session is. Every method may be called from any thread."""
+    """Signs in, signs out, and knows whose a session is. What is no coroutine may be called from any thread."""
 
-    def __init__(self, engine: Engine, settings: Settings) -> None:
-        self._engine, self._settings = engine, settings
+    def __init__(self, engine: Engine, settings: Settings, passwords: Gate) -> None:
+        self._engine, self._settings, self._passwords = engine, settings, passwords
         self._attempts = Attempts()
         self._known: dict[str, tuple[float, Person]] = {}
         self._threads = anyio.CapacityLimiter(LOOK_UPS)
         self._changes = 0  # so that what was read before a change is not remembered after it
         self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
+        self._ended: dict[str, tuple[str, str]] = {}  # digests of sessions that ended and may still be stored: who, from where
+        self._key_refused = -KEY_REFUSAL_S
+        launch_keys.begin(engine, None if settings.accounts_only else settings.launch_token)
 
     async def of(self, session_id: str) -> Person | None:
         """Whose session it is; None when nobody's. Nobody else waits for the database meanwhile."""
         found = self._known.get(session_id)
         if found is not None and time.monotonic() < found[0]:
             return found[1]
-        return await anyio.to_thread.run_sync(self._look_up, session_id, limiter=self._threads)
+        return await anyio.to_thread.run_sync(self.look_up, session_id, limiter=self._threads)
 
     async def until_other(self, session_id: str, person: Person) -> Person | None:
         """Wait until the session is not that person's any more: then whose it is, such as the same one's with another role.
@@ -68,49 +76,82 @@ class People:
             with contextlib.suppress(RuntimeError):  # its loop is gone
                 loop.call_soon_threadsafe(woken.set)
 
-    def enter_with_key(self, key: str) -> str:
-        """A new session of whoever started the server; raises Unauthorised for a wrong key."""
-        if self._settings.accounts_only or not hmac.compare_digest(key.encode(), self._settings.launch_token.encode()):
-            raise Unauthorised("the key in this address is not valid any more", hint="open the address that r2c2r printed last")
-        return self._begin(None)
-
-    def sign_in(self, name: str, password: str, client: str) -> str:
-        """A new session; raises Unauthorised for a wrong name or password, TooMany after too many of them."""
-        self._attempts.check(name, client)
-        account = accounts.verified(self._engine, name, password)
-        if account is None:
-            self._attempts.failed(name, client)
-            raise Unauthorised("the name or the password is wrong", hint="an admin can set a new one: r2c2r user password NAME")
-        self._attempts.succeeded(name, client)
-        return self._begin(account.id)
-
-    def sign_out(self, session_id: str) -> None:
-        """The session is nobody's any more."""
+    def enter_with_key(self, key: str, client: str) -> str:
+        """A new session of whoever started the server; raises Unauthorised for a wrong key, or one that was used."""
         with writing(self._engine) as session:
-            session.exec(delete(SignIn).where(col(SignIn.digest) == _digest(session_id)))
-        self.look_again()
+            if not self._settings.accounts_only and launch_keys.use(session, key):
+                return self._begin(session, None, self._settings.user, client, "by a printed address")
+        if time.monotonic() - self._key_refused > KEY_REFUSAL_S:
+            self._key_refused = time.monotonic()
+            audit.note_refusal(self._engine, "", client, "a printed address that is used or not this server's")
+        raise Unauthorised("the key in this address is not valid any more", hint="r2c2r key prints a new address")
 
-    def change_password(self, person: Person, old: str, new: str, client: str) -> str:
+    async def sign_in(self, name: str, password: str, client: str) -> str:
+        """A new session; raises Unauthorised for a wrong name or password, TooMany while too many of them wait."""
+        return await self._guess(name, client, self._signed_in, name, password, client)
+
+    async def change_password(self, person: Person, old: str, new: str, client: str) -> str:
         """The person's own password; every session of theirs ends, and a new one is returned."""
         if not person.account:
             raise Conflict("who started the server has no password", hint="make an account: r2c2r user add NAME --role admin")
-        self._attempts.check(person.name, client)
-        account = accounts.verified(self._engine, person.name, old)
-        if account is None:
-            self._attempts.failed(person.name, client)
-            raise Forbidden("the present password is wrong", hint="an admin can set a new one")
-        accounts.set_password(self._engine, person.name, new)
-        self.look_again()
-        return self._begin(account.id)
+        return await self._guess(person.name, client, self._changed_password, person.name, old, new, client)
 
-    def _begin(self, account_id: int | None) -> str:
-        session_id, now = secrets.token_urlsafe(32), time.time()
-        with writing(self._engine) as session:
-            session.exec(delete(SignIn).where(col(SignIn.used) < now - KEPT_S))
-            session.add(SignIn(digest=_digest(session_id), account_id=account_id, created=now, used=now))
+    def sign_out(self, session_id: str, who: str, client: str) -> None:
+        """The session is nobody's from now on, also where a full disk keeps it stored."""
+        self._ended[_digest(session_id)] = (who, client)
+        self.look_again()
+        self.forget_ended()
+
+    def forget_ended(self) -> None:
+        """Delete sessions that ended; what cannot be deleted now is tried again."""
+        ended = dict(self._ended)
+        if not ended:
+            return
+        try:
+            with writing(self._engine) as session:
+                session.exec(delete(SignIn).where(col(SignIn.digest).in_(ended)))
+                for who, client in ended.values():
+                    audit.note(session, "signed out", account=who, who=who, client=client)
+        except R2C2RError as error:
+            _log.warning("ended sessions are still stored: %s", error)
+            return
+        for digest in ended:
+            del self._ended[digest]
+
+    async def _guess(self, name: str, client: str, look: Callable[..., str], *arguments: str) -> str:
+        """What `look` returns when the password is right; it is counted before, and waits outside any thread."""
+        self._passwords.check(client)
+        await pause(self._attempts.take(name, client))
+        session_id = await self._passwords.run(client, look, *arguments)
+        self._attempts.succeeded(name, client)
         return session_id
 
-    def _look_up(self, session_id: str) -> Person | None:
+    def _signed_in(self, name: str, password: str, client: str) -> str:
+        account = accounts.verified(self._engine, name, password)
+        if account is None:
+            audit.note_refusal(self._engine, name, client, "a wrong name or password")
+            raise Unauthorised("the name or the password is wrong", hint="an admin can set a new one: r2c2r user password NAME")
+        with writing(self._engine) as session:
+            return self._begin(session, account.id, account.name, client, "by password")
+
+    def _changed_password(self, name: str, old: str, new: str, client: str) -> str:
+        account = accounts.verified(self._engine, name, old)
+        if account is None:
+            audit.note_refusal(self._engine, name, client, "a wrong password, to change it")
+            raise Forbidden("the present password is wrong", hint="an admin can set a new one")
+        accounts.change(self._engine, name, password=new, by=name)
+        self.look_again()
+        with writing(self._engine) as session:
+            return self._begin(session, account.id, name, client, "after a new password")
+
+    def _begin(self, session: Session, account_id: int | None, who: str, client: str, detail: str) -> str:
+        session_id, now = secrets.token_urlsafe(32), time.time()
+        session.exec(delete(SignIn).where(col(SignIn.used) < now - KEPT_S))
+        session.add(SignIn(digest=_digest(session_id), account_id=account_id, created=now, used=now))
+        audit.note(session, "signed in", account=who if account_id is not None else "", who=who, client=client, detail=detail)
+        return session_id
+
+    def look_up(self, session_id: str) -> Person | None:
         """Whose session it is, as stored, and remembered for a moment."""
         until, changes = time.monotonic() + REMEMBERED_S, self._changes
         person = self._stored(session_id)
@@ -125,7 +166,7 @@ class People:
         with reading(self._engine) as session:
             query = select(SignIn, Account).join(Account, isouter=True).where(SignIn.digest == _digest(session_id))
             found = session.exec(query).first()
-        if found is None or found[0].used < now - KEPT_S:
+        if found is None or found[0].used < now - KEPT_S or found[0].digest in self._ended:
             return None
         sign_in, account = found
         if account is None and self._settings.accounts_only:
@@ -135,6 +176,9 @@ class People:
                 sign_in.used = now
                 session.merge(sign_in)
         return accounts.person(account) if account else Person(self._settings.user, "admin")
+
+
+pause = anyio.sleep
 
 
 def _digest(session_id: str) -> str:

@@ -2,31 +2,32 @@
 
 import os
 import queue
-import threading
 from pathlib import Path
 from typing import Literal
 
-from app.errors import told_body
-from app.process import Worker
+from app.errors import Unavailable, told_body
 from app.services.context import Context
 from r2c2r_core.errors import CaptureError, InputError, OverrideError
 
 Kind = Literal["recording", "mesh"]
 PROBE_S: dict[Kind, float] = {"recording": 120.0, "mesh": 300.0}
 _REFUSAL: dict[Kind, type[InputError]] = {"recording": CaptureError, "mesh": OverrideError}
-_probing = threading.BoundedSemaphore(2)
 
 
 def look_at(context: Context, kind: Kind, path: Path, name: str) -> None:
-    """Raise CaptureError or OverrideError, in one line, for a file that the core could not use; it is called `name`."""
-    with _probing:
-        worker = Worker((*context.runner.commands.probe, kind, str(path), name), Path(os.devnull))
+    """Raise CaptureError or OverrideError, in one line, for a file that the core could not use; it is called `name`.
+
+    It waits for a process: call it behind the gate of looks. Raises Unavailable when the server stops meanwhile, which says
+    nothing about the file.
+    """
+    command = (*context.runner.commands.probe, kind, str(path), name)
+    with context.probes.running(command, Path(os.devnull)) as worker:
         try:
             line = worker.next_line(timeout=PROBE_S[kind])
         except queue.Empty:
             line = None
-        finally:
-            worker.close()
+    if line is None and context.probes.stopped:
+        raise Unavailable("the server stops", hint="what was sent is kept: finish it when the server is there again")
     if line is None:
         raise _REFUSAL[kind](f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
     if "error" in line:

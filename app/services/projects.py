@@ -3,42 +3,49 @@
 import json
 import secrets
 import time
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import func
+from sqlalchemy.orm import defer
 from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import history as events
-from app.db import once, queries
-from app.db.documents import inputs_key
+from app.db import keys, once, queries
 from app.db.engine import reading, writing
-from app.db.tables import Comment, Event, Job, Point, Project, SceneObject, Verdict
+from app.db.tables import Event, Job, Project
 from app.errors import Conflict, NotReady
-from app.files import ProjectFiles, delete_folder, folder_bytes
-from app.services import masks
+from app.file_cache import FileCache
+from app.files import ProjectFiles, delete_folder
+from app.services import masks, project_shapes
 from app.services.context import Context
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.errors import BackendUnavailable
 from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.registry import Registry
 from r2c2r_core.segment.stage import SEGMENTERS
 
-SEAMS = {"segmenter": SEGMENTERS, "generator": GENERATORS, "matcher": MATCHERS}  # what a person may choose for a project
+SEAMS: dict[str, Registry[Any]] = {  # what a person may choose for a project
+    "segmenter": SEGMENTERS,
+    "generator": GENERATORS,
+    "matcher": MATCHERS,
+}
 
 
-def list_projects(context: Context) -> list[schemas.Project]:
-    """All projects, last touched first."""
+_FRAMES: FileCache[list[dict[str, Any]]] = FileCache(64 << 20)
+_FRAMES_GROW = 4  # what a frame table takes in memory, over its file
+
+
+def list_projects(context: Context) -> list[schemas.ProjectSummary]:
+    """All projects that the person may see, last touched first."""
     with reading(context.engine) as session:
-        rows = session.exec(select(Project).order_by(col(Project.updated).desc())).all()
-        return [shape(context, session, row) for row in rows]
+        return project_shapes.listed(session, context.access.hidden(context.person))
 
 
 def get_project(context: Context, project_id: str) -> schemas.Project:
     """One project."""
     with reading(context.engine) as session:
-        return shape(context, session, queries.project_row(session, project_id))
+        return project_shapes.whole(session, queries.project_row(session, project_id))
 
 
 def new_project(
@@ -49,12 +56,14 @@ def new_project(
     work: Path | None = None,
     project_id: str | None = None,
     began: float | None = None,
+    owner_id: int | None = None,
 ) -> Project:
     """A project's row, still importing; `began` is when its upload did."""
     now, number = time.time(), project_id or secrets.token_hex(6)
     project = Project(id=number, name=name, status="importing", created=began or now, updated=now, source_name=source_name)
     project.source_path = str(source_path) if source_path else None
     project.work_path = str(work) if work else None
+    project.owner_id = owner_id
     session.add(project)
     session.flush()
     return project
@@ -70,7 +79,7 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
                 raise BackendUnavailable(f"{wanted}: {reason}", hint="or choose another one")
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
-        name = body.name.strip() if body.name is not None else row.name
+        name = body.name or row.name
         if name != row.name:
             _note(context, session, row, "rename", f"renamed to {name}", {"name": name})
         changed = [seam for seam in SEAMS if getattr(body, seam) not in (None, getattr(row, seam))]
@@ -79,8 +88,12 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
             text = f"{seam} {getattr(body, seam)} instead of {getattr(row, seam)}"
             _note(context, session, row, seam, text, {seam: getattr(body, seam)})
         if "segmenter" in changed:
-            context.live.close(project_id)
+            keys.note_segmenter(session, row)
+        if changed:
+            keys.note_project(session, row)
         objects = [item.id or 0 for item in queries.live_objects(session, project_id)] if body.segmenter else []
+    if "segmenter" in changed:  # once that is stored: to end a process that hangs takes seconds, and nobody could write
+        context.live.close(project_id)
     for number in objects:
         masks.follow(context, project_id, number)
     tell(context, project_id)
@@ -127,10 +140,10 @@ def frames(context: Context, project_id: str) -> list[schemas.FrameInfo]:
 
 def frame_table(files: ProjectFiles) -> list[dict[str, Any]]:
     """frames.json; NotReady until the recording was read."""
-    try:
-        return _frames_at(files.frames, files.frames.stat().st_mtime_ns)
-    except FileNotFoundError as error:
-        raise NotReady("the recording has not been read yet", hint="wait for the import") from error
+    found = _FRAMES.get(files.frames, lambda: json.loads(files.frames.read_text()), lambda _, size: _FRAMES_GROW * size)
+    if found is None:
+        raise NotReady("the recording has not been read yet", hint="wait for the import")
+    return found
 
 
 def history(
@@ -144,50 +157,11 @@ def history(
             query = query.where(Event.object_id == object_id)
         if before is not None:
             query = query.where(col(Event.id) < before)
-        undone = {
-            e.id
-            for scope in ("prompts", "review")
-            for s in events.all_stacks(session, project_id, scope).values()
-            for e in s.undone
-        }
-        rows = session.exec(query.order_by(col(Event.id).desc()).limit(min(max(limit, 1), 1000))).all()
-        return [_entry(row, row.id in undone) for row in rows]
+        query = query.order_by(col(Event.id).desc()).limit(min(max(limit, 1), 1000))
+        return [_entry(row) for row in session.exec(query.options(*_UNSHOWN))]
 
 
-def _facts(stored: dict[str, Any]) -> schemas.CaptureFacts:
-    """What the doctor said when the recording was read, as far as this version still says it."""
-    return schemas.CaptureFacts(**{name: stored[name] for name in schemas.CaptureFacts.model_fields if name in stored})
-
-
-def shape(context: Context, session: Session, row: Project) -> schemas.Project:
-    """A project as it goes over the wire."""
-    active = select(Job).where(Job.project_id == row.id).order_by(col(Job.state).in_(queries.ACTIVE).desc(), col(Job.id).desc())
-    job = session.exec(active).first()
-    bundle = queries.newest_bundle(session, row.id)
-    shown = queries.bundle_shape(bundle, row.name, inputs_key(session, row.id)) if bundle else None
-    ready = row.status == "ready"
-    return schemas.Project(
-        id=row.id,
-        name=row.name,
-        status=row.status,  # type: ignore[arg-type]  # the column holds no other
-        created=row.created,
-        updated=row.updated,
-        source_name=row.source_name,
-        media_version=row.media_version,
-        capture=_facts(row.capture) if row.capture else None,
-        notices=row.notices,
-        error=schemas.ErrorBody(**row.error) if row.error else None,
-        counts=_counts(session, row.id),
-        job=queries.job_shape(session, job) if job else None,
-        result="none" if shown is None else "current" if shown.current else "stale",
-        bundle=shown,
-        thumbnail=f"/media/{row.id}/thumbnail.jpg?v={row.media_version}" if ready else None,
-        size_bytes=_size(context.files(row).root, int(row.updated)),
-        segmenter=row.segmenter,
-        generator=row.generator,
-        matcher=row.matcher,
-        review_state=row.review_state,  # type: ignore[arg-type]
-    )
+_UNSHOWN = (defer(Event.before), defer(Event.after))  # type: ignore[arg-type]  # columns, to SQLAlchemy
 
 
 def tell(context: Context, project_id: str) -> None:
@@ -196,7 +170,7 @@ def tell(context: Context, project_id: str) -> None:
     context.hub.publish("projects", None)
 
 
-def _entry(row: Event, undone: bool) -> schemas.HistoryEntry:
+def _entry(row: Event) -> schemas.HistoryEntry:
     return schemas.HistoryEntry(
         id=row.id or 0,
         object=row.object_id,
@@ -206,34 +180,5 @@ def _entry(row: Event, undone: bool) -> schemas.HistoryEntry:
         frame=row.frame,
         who=row.who,
         at=row.at,
-        undone=undone,
+        undone=row.standing == "undone",
     )
-
-
-def _counts(session: Session, project_id: str) -> schemas.ProjectCounts:
-    mine = (SceneObject.project_id == project_id, col(SceneObject.deleted).is_(False))
-    objects = session.exec(select(func.count()).select_from(SceneObject).where(*mine)).one()
-    points = session.exec(select(func.count()).select_from(Point).join(SceneObject).where(*mine)).one()
-    said = (
-        select(Verdict.verdict, func.count()).select_from(Verdict).join(SceneObject).where(*mine).group_by(col(Verdict.verdict))
-    )
-    verdicts = dict(session.exec(said).all())
-    open_comments = select(func.count()).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
-    return schemas.ProjectCounts(
-        objects=objects,
-        points=points,
-        accepted=verdicts.get("accepted", 0),
-        rejected=verdicts.get("rejected", 0),
-        open_comments=session.exec(open_comments).one(),
-    )
-
-
-@lru_cache(maxsize=16)
-def _frames_at(path: Path, _changed: int) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads(path.read_text())
-    return found
-
-
-@lru_cache(maxsize=256)
-def _size(root: Path, _updated: int) -> int:
-    return folder_bytes(root)

@@ -3,7 +3,6 @@
 from app import schemas
 from app.db import queries
 from app.db.engine import reading, writing
-from app.db.tables import Point
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
 from app.services.prompts import after_change, check_point
@@ -13,9 +12,9 @@ def export(context: Context, project_id: str) -> schemas.PromptsFile:
     """The clicks as the command line reads them."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
-        objects = []
+        clicks, objects = queries.clicks_by_object(session, project_id), []
         for item in queries.live_objects(session, project_id):
-            points = [_file_point(point) for point in queries.points_of(session, item.id)]
+            points = [_file_point(click) for click in clicks.get(item.id or 0, [])]
             objects.append(schemas.PromptsFileObject(name=item.name, category=item.category, points=points))
         return schemas.PromptsFile(version=1, objects=objects)
 
@@ -31,5 +30,5 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
     return [after_change(context, project_id, item.id, infer=False) for item in items]
 
 
-def _file_point(point: Point) -> schemas.PromptsFilePoint:
-    return schemas.PromptsFilePoint(frame=point.frame, x=point.x, y=point.y, label=1 if point.label else 0)
+def _file_point(click: queries.Click) -> schemas.PromptsFilePoint:
+    return schemas.PromptsFilePoint(frame=click.frame, x=click.x, y=click.y, label=1 if click.label else 0)

@@ -3,12 +3,12 @@
 import re
 
 from sqlalchemy import func
-from sqlmodel import Session, col, select
+from sqlmodel import Session, select
 
 from app import schemas
 from app.db import history, queries
 from app.db.engine import reading, writing
-from app.db.tables import Event, Point, Project, SceneObject
+from app.db.tables import Point, Project, SceneObject
 from app.errors import Conflict, NotFound
 from app.services import masks
 from app.services.context import Context
@@ -22,12 +22,16 @@ def list_objects(context: Context, project_id: str, deleted: bool) -> list[schem
     """The project's objects in the order they were made."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        query = select(SceneObject).where(SceneObject.project_id == project_id).order_by(col(SceneObject.id))
-        if not deleted:
-            query = query.where(col(SceneObject.deleted).is_(False))
-        stacks = history.all_stacks(session, project_id, "prompts")
-        empty = history.Stacks((), ())
-        return [_shape(context, session, project, item, stacks.get(item.id, empty)) for item in session.exec(query)]
+        items = queries.live_objects(session, project_id, deleted=deleted)
+        clicks = queries.clicks_by_object(session, project_id)
+        steps = history.steps(session, project_id, "prompts")
+        saved = queries.saved(session, project_id)
+    return [
+        _shape(
+            context, project, item, clicks.get(item.id or 0, []), steps.get(item.id, history.Steps()), saved.get(item.id, 0.0)
+        )
+        for item in items
+    ]
 
 
 def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
@@ -66,7 +70,7 @@ def refuse_overtaken(
     """Raise Conflict, with what is stored now, when somebody changed the object since the sender last looked."""
     if body.version is None or body.version == item.version:
         return
-    current = _shape(context, session, project, item, None).model_dump()
+    current = _shape_of(context, session, project, item).model_dump()
     raise Conflict(f"{item.name} was changed meanwhile", hint="look at what is stored now", current=current)
 
 
@@ -135,10 +139,22 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
     return after_change(context, project_id, object_id, infer)
 
 
+def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+    """Compute the object's masks now, also when there are some for these clicks."""
+    masks.segment(context, project_id, object_id)
+    return tell_object(context, project_id, object_id)
+
+
+def cancel_segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
+    """Stop computing the object's masks; those there stay."""
+    masks.cancel(context, project_id, object_id)
+    return tell_object(context, project_id, object_id)
+
+
 def _create(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
     for point in body.points:
         check_point(context, project, point.frame, point.x, point.y)
-    category = _category(body.category)
+    category = body.category
     name = _free_name(session, project.id, category) if not body.name else _name(session, project.id, body.name, None)
     count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
     item = SceneObject(project_id=project.id, name=name, category=category, colour=count, deleted=True)
@@ -157,7 +173,7 @@ def object_shape(context: Context, project_id: str, object_id: int) -> schemas.S
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id, deleted=True)
-        return _shape(context, session, project, item, None)
+        return _shape_of(context, session, project, item)
 
 
 def tell_object(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -174,15 +190,16 @@ def after_change(context: Context, project_id: str, object_id: int | None, infer
     return tell_object(context, project_id, object_id or 0)
 
 
+def _shape_of(context: Context, session: Session, project: Project, item: SceneObject) -> schemas.SceneObject:
+    steps = history.steps(session, project.id, "prompts", item.id).get(item.id, history.Steps())
+    saved = queries.saved(session, project.id, item.id).get(item.id, 0.0)
+    return _shape(context, project, item, queries.clicks_of(session, item.id), steps, saved)
+
+
 def _shape(
-    context: Context, session: Session, project: Project, item: SceneObject, stacks: history.Stacks | None
+    context: Context, project: Project, item: SceneObject, clicks: list[queries.Click], steps: history.Steps, saved: float
 ) -> schemas.SceneObject:
-    stacks = stacks or history.stacks_of(session, item.project_id, item.id, "prompts")
-    points = queries.points_of(session, item.id)
-    state, frames, notices = masks.state_of(context, project, item, points)
-    saved = session.exec(
-        select(func.max(Event.at)).where(Event.project_id == item.project_id, Event.object_id == item.id)
-    ).one()
+    state, frames, notices = masks.state_of(context, project, item)
     return schemas.SceneObject(
         id=item.id or 0,
         project=item.project_id,
@@ -191,14 +208,14 @@ def _shape(
         colour=item.colour,
         version=item.version,
         deleted=item.deleted,
-        points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in points],
-        can_undo=bool(stacks.done),
-        can_redo=bool(stacks.undone),
+        points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
+        can_undo=steps.undo,
+        can_redo=steps.redo,
         segment=state,
         mask_frames=frames,
         mask_backend=project.segmenter if frames else "",
         notices=[*notices, *_category_notice(item.category)],
-        saved=saved or 0.0,
+        saved=saved,
     )
 
 
@@ -207,8 +224,8 @@ def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> d
     wanted: dict[str, object] = {}
     if body.name is not None and body.name != item.name:
         wanted["name"] = _name(session, item.project_id, body.name, item.id)
-    if body.category is not None and _category(body.category) != item.category:
-        wanted["category"] = _category(body.category)
+    if body.category is not None and body.category != item.category:
+        wanted["category"] = body.category
     if body.colour is not None and body.colour != item.colour:
         wanted["colour"] = body.colour
     return wanted
@@ -235,7 +252,6 @@ def check_point(context: Context, project: Project, frame: int, x: float, y: flo
 
 def _name(session: Session, project_id: str, name: str, mine: int | None) -> str:
     """The name, when simulators accept it and no other object has it."""
-    name = name.strip()
     if not _NAME.fullmatch(name):
         raise PromptError(
             f"the name '{name}' is not usable", hint="use letters, digits and underscores: simulators accept no more"
@@ -258,15 +274,8 @@ def _names(session: Session, project_id: str, without: int | None) -> set[str]:
     return {item.name.casefold() for item in queries.live_objects(session, project_id) if item.id != without}
 
 
-def _category(category: str) -> str:
-    cleaned = " ".join(category.split())
-    if not cleaned:
-        raise PromptError("the category is empty", hint="write what it is: drawer, cabinet, bottle …")
-    return cleaned
-
-
 def _category_notice(category: str) -> list[str]:
-    from r2c2r_core.synthesize.fixtures.table import fixture_for
+    from r2c2r_core.kitchen.names import named
 
-    notice = fixture_for(category)[1]
+    notice = named(category).notice
     return [notice] if notice else []

@@ -4,7 +4,6 @@ import time
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
 from sqlmodel import Session, col, select
 
 from app import schemas
@@ -80,8 +79,8 @@ def _look(context: Context, project_id: str) -> _Found:
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         dismissed = _dismissed(session, project_id)
-        points = [point for item in queries.live_objects(session, project_id) for point in queries.points_of(session, item.id)]
-    clicks = {(point.frame, point.x, point.y) for point in points if point.label}
+        there, by_object = queries.live_objects(session, project_id), queries.clicks_by_object(session, project_id)
+    clicks = {(c.frame, c.x, c.y) for item in there for c in by_object.get(item.id or 0, []) if c.label}
     at_work = context.live.proposing(project_id)
     stored = read_proposals(context.files(project).proposals) if at_work is None else None
     lines = at_work[1] if at_work is not None else stored or []
@@ -120,16 +119,24 @@ def _dismissed(session: Session, project_id: str) -> set[str]:
 
 def _without_covered(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The proposals that no object's mask covers: what was clicked by hand is proposed no more."""
-    shown: dict[int, list[np.ndarray]] = {}
+    shown = masks.on_frames(context, project_id, {line["frame"] for line in lines})
     left = []
     for line in lines:
-        frame = line["frame"]
-        if frame not in shown:
-            shown[frame] = [bits_mask(mask.mask.model_dump()) for mask in masks.on_frame(context, project_id, frame)]
-        outline = bits_mask(line["mask"])
-        if not is_taken(outline, [mask for mask in shown[frame] if mask.shape == outline.shape]):
+        near = [found.mask for found in shown[line["frame"]] if _may_cover(found.mask, line["mask"])]
+        if not is_taken(bits_mask(line["mask"]), (bits_mask(mask.model_dump()) for mask in near)):
             left.append(line)
     return left
+
+
+def _may_cover(mask: schemas.MaskBits, outline: dict[str, Any]) -> bool:
+    """Whether their boxes meet: most of a kitchen's masks need not be unpacked."""
+    return (
+        (mask.width, mask.height) == (outline["width"], outline["height"])
+        and mask.left < outline["left"] + outline["box_width"]
+        and outline["left"] < mask.left + mask.box_width
+        and mask.top < outline["top"] + outline["box_height"]
+        and outline["top"] < mask.top + mask.box_height
+    )
 
 
 def _shape(line: dict[str, Any]) -> schemas.Proposal:

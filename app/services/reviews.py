@@ -9,25 +9,24 @@ from sqlmodel import Session, select
 
 from app import schemas
 from app.db import history, queries
-from app.db.documents import overrides_entry
 from app.db.engine import reading, writing
+from app.db.keys import overrides_entry
 from app.db.tables import Project, SceneObject, Verdict
 from app.errors import Conflict, NotFound, NotReady
 from app.files import inside
 from app.services import jobs
-from app.services.candidates import facts_of, group_of, override_shape
+from app.services.candidates import facts_of, groups_of, override_shape
 from app.services.context import Context
 from app.services.prompts import tell_object
 from r2c2r_core.errors import OverrideError, PromptError
-from r2c2r_core.overrides import MOST_BATCHES
+from r2c2r_core.schema.overrides import MOST_BATCHES
 
 
 def groups(context: Context, project_id: str) -> list[schemas.CandidateGroup]:
     """Every object's candidates; objects without any are left out."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        found = [group_of(context, session, project, item) for item in queries.live_objects(session, project_id)]
-    return [group for group in found if group is not None]
+        return groups_of(context, session, project, queries.live_objects(session, project_id))
 
 
 def group(context: Context, project_id: str, object_id: int) -> schemas.CandidateGroup:
@@ -35,10 +34,10 @@ def group(context: Context, project_id: str, object_id: int) -> schemas.Candidat
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        found = group_of(context, session, project, item)
-    if found is None:
+        found = groups_of(context, session, project, [item])
+    if not found:
         raise NotReady(f"{item.name} has no candidates yet", hint="run the project first")
-    return found
+    return found[0]
 
 
 def give_verdict(context: Context, project_id: str, object_id: int, body: schemas.VerdictIn) -> schemas.Reviewed:
@@ -102,16 +101,16 @@ def refuse_overtaken(
     """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
     if body.version is None or body.version == history.version_of(session, item, "review"):
         return
-    shown = group_of(context, session, project, item)
-    last = history.stacks_of(session, project.id, item.id, "review").done[-1:]
-    said = f": {last[0].who}, {last[0].text}" if last else ""
+    shown = groups_of(context, session, project, [item])
+    last = history.last_done(session, item, "review")
+    said = f": {last.who}, {last.text}" if last else ""
     raise Conflict(
         f"{item.name} was reviewed meanwhile{said}",
         hint="look at both, then keep yours or take theirs",
         current={
             "version": history.version_of(session, item, "review"),
-            "override": history.override_data(session, item),
-            "group": shown.model_dump() if shown else None,
+            "override": override_shape(history.override_data(session, item)).model_dump(),
+            "group": shown[0].model_dump() if shown else None,
             "yours": body.model_dump(exclude_unset=True, exclude={"rerun", "version"}),
         },
     )
@@ -154,8 +153,6 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
     from r2c2r_core.overrides import overrides_from
 
     files = context.files(project)
-    if merged.get("joint_lower") is not None and merged.get("joint_upper") is None:
-        raise OverrideError("a lower limit without an upper one", hint="give both")
     document = {"version": 1, "objects": {item.name: overrides_entry(merged)}}
     overrides_from(json.loads(json.dumps(document)), files.work / "overrides.json")
     wanted = merged.get("candidate")
@@ -178,6 +175,8 @@ def _in_words(key: str, value: Any) -> str:
     name = {"pose": "place", "dimensions_m": "size", "joint_lower": "opens from", "joint_upper": "opens to"}.get(key, key)
     if value is None:
         return f"{name} computed again"
+    if key == "candidate":
+        return f"{name} {Path(value).name}"  # of an uploaded mesh the name, not where it lies
     if key == "pose":
         return f"{name} ({', '.join(f'{row[3]:.3f}' for row in value[:3])}) m"
     if key == "dimensions_m":
@@ -195,5 +194,7 @@ def reviewed_shape(context: Context, project_id: str, object_id: int, job_id: in
     context.hub.publish("review", project_id, object=object_id)
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        shown = group_of(context, session, project, queries.object_row(session, project_id, object_id))
-    return schemas.Reviewed(group=shown, job=jobs.get_job(context, job_id) if job_id is not None else None, text=text)
+        shown = groups_of(context, session, project, [queries.object_row(session, project_id, object_id)])
+    return schemas.Reviewed(
+        group=shown[0] if shown else None, job=jobs.get_job(context, job_id) if job_id is not None else None, text=text
+    )

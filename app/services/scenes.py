@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from functools import lru_cache
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,17 @@ from app.db import queries
 from app.db.engine import reading
 from app.db.tables import SceneObject
 from app.errors import NotReady
+from app.file_cache import FileCache
 from app.files import ProjectFiles
 from app.jobs.plain import plain
+from app.services import views
 from app.services.context import Context
+from r2c2r_core.model.scene import ArticulatedScene
+from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
+
+_MOST_MANIFEST = 1 << 20  # bytes, about; a bundle may hold pictures and meshes of any size beside it
+_MANIFESTS: FileCache[dict[str, Any]] = FileCache(32 << 20)
 
 
 def summary(context: Context, project_id: str) -> schemas.SceneSummary:
@@ -30,13 +37,14 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
     scene = fitted(files)
     if scene is None:
         raise NotReady("there is no finished scene yet", hint="run the project first")
+    taken = Workspace(files.work).seconds()
     described = manifest(files.bundles / bundle.path) if bundle else {}
     failures = described.get("failures") if isinstance(described.get("failures"), dict) else {}
     return schemas.SceneSummary(
         items=[_item(entry, ids.get(entry["name"]), files) for entry in scene["objects"]],
         failures={str(name): str(line) for name, line in (failures or {}).items()},
         warnings=scene["warnings"],
-        stages=[_stage(entry) for entry in described.get("stages", [])],
+        stages=[_stage(entry, taken) for entry in described.get("stages", [])],
         glb=f"/media/{project_id}/scene.glb?v={bundle.version}" if bundle else None,
         preview=f"/media/{project_id}/preview.png?v={bundle.version}" if bundle else None,
     )
@@ -44,18 +52,14 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
 
 def fitted(files: ProjectFiles) -> dict[str, Any] | None:
     """The scene after the fit (or before it, when there was no fit) as JSON, without its meshes."""
+    work = Workspace(files.work)
     for stage in ("warp", "synthesize"):
-        path = files.work / "nouns" / stage / "scene.noun"
-        if path.is_file():
-            return _scene_at(path, path.stat().st_mtime_ns, files.work, stage)
+        if work.noun_path(stage, "scene").is_file():
+            return views.facts(files, stage, "scene", _scene_facts)
     return None
 
 
-@lru_cache(maxsize=16)
-def _scene_at(path: Path, _changed: int, work: Path, stage: str) -> dict[str, Any] | None:
-    scene = Workspace(work).load_latest(stage, "scene")
-    if scene is None:
-        return None
+def _scene_facts(scene: ArticulatedScene) -> dict[str, Any]:
     kept = (
         "name",
         "category",
@@ -71,20 +75,12 @@ def _scene_at(path: Path, _changed: int, work: Path, stage: str) -> dict[str, An
     return {"objects": objects, "warnings": plain(scene.warnings)}
 
 
-@lru_cache(maxsize=256)
-def _noun_facts(path: Path, _changed: int, work: Path, stage: str, name: str) -> Any:
-    noun = Workspace(work).load_latest(stage, name)
-    if noun is None:
-        return None
-    return len(noun.masks) if stage == "segment" else plain(float(noun.rms_m))
-
-
-def _facts(files: ProjectFiles, stage: str, name: str) -> Any:
-    path = files.work / "nouns" / stage / f"{name}.noun"
-    return _noun_facts(path, path.stat().st_mtime_ns, files.work, stage, name) if path.is_file() else None
+def _mask_count(track: MaskTrack) -> int:
+    return len(track.masks)
 
 
 def _item(entry: dict[str, Any], number: int | None, files: ProjectFiles) -> schemas.SceneItem:
+    placement = views.facts(files, "align", entry["name"], plain)
     return schemas.SceneItem(
         object=number,
         name=entry["name"],
@@ -94,8 +90,8 @@ def _item(entry: dict[str, Any], number: int | None, files: ProjectFiles) -> sch
         dimension_sources=entry["dimension_sources"],
         joints=[_joint(joint) for joint in entry["joints"]],
         movable=entry["movable"],
-        mask_frames=_facts(files, "segment", entry["name"]) or 0,
-        placement_rms_m=_facts(files, "align", entry["name"]),
+        mask_frames=views.facts(files, "segment", entry["name"], _mask_count) or 0,
+        placement_rms_m=placement["rms_m"] if placement else None,
         warp_residual_m=entry["warp_residual_m"],
         warnings=entry["warnings"],
     )
@@ -113,22 +109,17 @@ def _joint(joint: dict[str, Any]) -> schemas.SceneJoint:
     )
 
 
-def _stage(entry: dict[str, Any]) -> schemas.StageInfo:
-    return schemas.StageInfo(
-        name=str(entry["name"]), backend=str(entry.get("backend", "")), seconds=float(entry.get("seconds", 0.0))
-    )
+def _stage(entry: dict[str, Any], taken: Mapping[str, float]) -> schemas.StageInfo:
+    name = str(entry["name"])
+    return schemas.StageInfo(name=name, backend=str(entry.get("backend", "")), seconds=taken.get(name))
 
 
 def manifest(bundle: Path) -> dict[str, Any]:
     """A bundle's manifest; empty when it has none."""
-    try:
-        return _manifest_at(bundle, bundle.stat().st_mtime_ns)
-    except FileNotFoundError:
-        return {}
+    return _MANIFESTS.get(bundle, lambda: _read_manifest(bundle), lambda _, size: min(size, _MOST_MANIFEST)) or {}
 
 
-@lru_cache(maxsize=32)
-def _manifest_at(bundle: Path, _changed: int) -> dict[str, Any]:
+def _read_manifest(bundle: Path) -> dict[str, Any]:
     try:
         with zipfile.ZipFile(bundle) as archive:
             name = min((n for n in archive.namelist() if n.rsplit("/", 1)[-1] == "manifest.json"), key=len)

@@ -10,9 +10,8 @@ from sqlalchemy import func
 from sqlmodel import Session, col, select
 
 from app import schemas
-from app.db import history, queries
+from app.db import queries
 from app.db.computing import computing_s
-from app.db.documents import inputs_key
 from app.db.engine import reading, writing
 from app.db.tables import Comment, Event, Project, Verdict
 from app.errors import Conflict
@@ -45,7 +44,7 @@ def status(context: Context, project_id: str) -> schemas.ReviewStatus:
 
 def step(context: Context, project_id: str, body: schemas.ReviewStep) -> schemas.ReviewStatus:
     """Go there, if it is legal from here; what is unmet, or a refusal, needs a written reason."""
-    reason = " ".join(body.reason.split())
+    reason = body.reason
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         if project.review_state != body.from_state:
@@ -80,9 +79,8 @@ def _ready_to_review(context: Context, session: Session, project: Project) -> li
         return ["no object was clicked yet"]
     unclicked, unseen = [], []
     for item in items:
-        points = queries.points_of(session, item.id)
-        frames = masks.state_of(context, project, item, points)[1]
-        if not any(point.label for point in points):
+        frames = masks.state_of(context, project, item)[1]
+        if not item.masks_key:
             unclicked.append(item.name)
         elif frames < LEAST_FRAMES:
             unseen.append(f"{item.name} ({frames})")
@@ -96,7 +94,7 @@ def _approvable(context: Context, session: Session, project: Project) -> list[st
     if bundle is None:
         return ["there is no bundle"]
     unmet = []
-    if bundle.inputs != inputs_key(session, project.id):
+    if bundle.inputs != project.inputs:
         unmet.append("something was changed since the bundle was made")
     if not (bundle.certificate or {}).get("passed"):
         unmet.append("the certificate did not pass")
@@ -171,7 +169,8 @@ def _figures(session: Session, project: Project) -> schemas.Figures:
         col(Verdict.object_id).in_([item.id for item in items]), Verdict.verdict == "accepted"
     )
     said = set(session.exec(accepted))
-    named = [bool(history.override_data(session, item).get("candidate")) for item in items if item.id in said]
+    corrected = queries.overrides_by_object(session, project.id)
+    named = [bool(corrected.get(item.id or 0, {}).get("candidate")) for item in items if item.id in said]
     approved = session.exec(
         select(func.min(Event.at)).where(Event.project_id == project.id, Event.scope == SCOPE, Event.action == "approved")
     ).one()

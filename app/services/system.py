@@ -9,6 +9,7 @@ from app.files import free_bytes
 from app.services.context import Context
 from r2c2r_core import __version__
 from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.export.writers.table import formats
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Backend, Registry
 from r2c2r_core.segment.stage import SEGMENTERS
@@ -29,13 +30,14 @@ def describe(context: Context) -> schemas.SystemInfo:
         account=context.person.account,
         max_upload_bytes=settings.max_upload_bytes,
         free_bytes=free_bytes(settings.data_dir),
-        import_roots=[str(root) for root in settings.roots],
+        import_roots=[str(root) for root in settings.roots] if context.person.may("admin") else [],
         categories=_categories(),
         palette=PALETTE,
         viewer=context.viewer.enabled,
         segmenters=_backends(SEGMENTERS),
         generators=_backends(GENERATORS),
         matchers=_backends(MATCHERS),
+        formats=[schemas.BundleFormat(name=f.name, file=f.file, opened_by=f.opened_by) for f in formats()],
     )
 
 
@@ -68,10 +70,18 @@ def allowed_path(context: Context, path: str) -> Path:
         resolved = Path(path).expanduser().resolve()
     except (OSError, RuntimeError) as error:
         raise NotFound(f"{path}: {error}") from error
+    if any(part.startswith(".") for part in _below_root(context, resolved).parts):
+        raise Forbidden(f"{resolved} is in a hidden folder", hint="recordings are taken from folders that are shown")
     if not _is_allowed(context, resolved):
         roots = ", ".join(str(root) for root in context.settings.roots)
         raise Forbidden(f"{resolved} is outside the folders recordings may come from", hint=f"allowed: {roots}")
     return resolved
+
+
+def _below_root(context: Context, path: Path) -> Path:
+    """The part of a path below the allowed root it is in, the deepest one; empty outside them."""
+    roots = [root.resolve() for root in context.settings.roots if path.is_relative_to(root.resolve())]
+    return path.relative_to(max(roots, key=lambda root: len(root.parts))) if roots else Path()
 
 
 def _is_allowed(context: Context, path: Path) -> bool:
@@ -108,9 +118,14 @@ def _backend(registry: Registry, backend: Backend) -> schemas.Backend:
 
 
 def _categories() -> list[schemas.Category]:
-    from r2c2r_core.synthesize.fixtures.table import FIXTURES
+    """All names of the category table; the label of what else a kind is called says what it is taken for."""
+    from r2c2r_core.kitchen.categories import every_category
 
-    return [schemas.Category(name=s.name, label=s.name.replace("_", " "), joint=_JOINTS[s.opening]) for s in FIXTURES]
+    return [
+        schemas.Category(name=name, label=category.label, joint=_JOINTS[category.opens])
+        for category in every_category()
+        for name in category.names
+    ]
 
 
 _JOINTS = {

@@ -6,11 +6,9 @@ project's: finishing twice, or again after a crash, is finishing once.
 
 import contextlib
 import secrets
-import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Literal
 
 import anyio
 from sqlmodel import Session, col, select
@@ -21,13 +19,11 @@ from app.db.engine import reading, writing
 from app.db.tables import Project, Upload
 from app.errors import Conflict, NotFound, TooLarge, Unavailable
 from app.files import delete_folder, project_files, require_free, safe_name
-from app.services import imports, probing
+from app.services import imports, probing, projects, quotas
 from app.services.context import Context
 from r2c2r_core.errors import CaptureError
 
 SPARE = 2.5  # a recording needs its own size again when it is read, and some more
-_busy: dict[str, Literal["sent", "finished"]] = {}  # uploads that a request is at work on
-_lock = threading.Lock()
 
 
 def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
@@ -36,9 +32,11 @@ def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
     require_free(context.settings.data_dir, int(body.size * SPARE), context.settings.min_free_bytes)
     row = Upload(id=secrets.token_hex(6), who=context.who, created=time.time(), **body.model_dump())
     path = _path(context, row.id)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.touch()
     with writing(context.engine) as session:
+        quotas.check_project(context, session)
+        quotas.check_upload(context, session, body.size)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
         session.add(row)
     return _shape(context, row)
 
@@ -58,7 +56,7 @@ def state(context: Context, upload_id: str) -> schemas.Upload:
 
 async def append(context: Context, upload_id: str, offset: int, stream: AsyncIterator[bytes]) -> int:
     """Store what comes from `offset` on; the new offset. What arrived stays when the sender leaves."""
-    with _alone(upload_id, "sent"):
+    with context.uploads.on(upload_id, "sent"):
         found = await anyio.to_thread.run_sync(state, context, upload_id)
         at = found.offset
         if offset != at:
@@ -69,13 +67,14 @@ async def append(context: Context, upload_id: str, offset: int, stream: AsyncIte
 
 
 def finish(context: Context, upload_id: str) -> schemas.Project:
-    """The project of an upload that is complete; one that cannot be read is refused, and nothing of it stays."""
-    from app.services import projects
+    """The project of an upload that is complete; one that cannot be read is refused, and nothing of it stays.
 
+    It waits for a process: call it behind the gate of looks.
+    """
     with reading(context.engine) as session:
         if session.get(Project, upload_id) is not None:  # asked twice
             return projects.get_project(context, upload_id)
-    with _alone(upload_id, "finished"):
+    with context.uploads.on(upload_id, "finished"):
         with reading(context.engine) as session:
             row = _row(context, session, upload_id)
         found = _shape(context, row)
@@ -84,16 +83,15 @@ def finish(context: Context, upload_id: str) -> schemas.Project:
         try:
             _check(context, _present(context, row), row.file_name)
         except CaptureError:
-            _forget(context, upload_id)
+            _delete(context, upload_id)
             raise
         return imports.from_finished_upload(context, row, _path(context, upload_id))
 
 
 def forget(context: Context, upload_id: str) -> None:
     """Delete an upload and its bytes; raises Unavailable while it is made a project."""
-    if _busy.get(upload_id) == "finished":
-        raise Unavailable("this upload is being made a project", hint="wait a moment, then delete the project")
-    _forget(context, upload_id)
+    with context.uploads.on(upload_id, "deleted"):
+        _delete(context, upload_id)
 
 
 async def whole(
@@ -101,7 +99,8 @@ async def whole(
 ) -> schemas.Project:
     """A project from one request; nothing stays when it breaks off or is refused."""
     _refuse_size(context, size or 0)
-    wish = schemas.UploadIn(file_name=filename[:300] or "recording", size=size or 1, name=(name or "")[:120] or None)
+    context.gates.looks.check(context.who)  # before a byte is received
+    wish = schemas.UploadIn(file_name=filename, size=size or 1, name=name)
     upload = await anyio.to_thread.run_sync(begin, context, wish)
     try:
         received = await _store(context, upload.id, 0, size or context.settings.max_upload_bytes, stream)
@@ -110,7 +109,7 @@ async def whole(
         if size is not None and received != size:
             raise CaptureError(f"{received} of {size} bytes arrived", hint="upload it again")
         await anyio.to_thread.run_sync(_set_size, context, upload.id, received)
-        return await anyio.to_thread.run_sync(finish, context, upload.id)
+        return await context.gates.looks.run(context.who, finish, context, upload.id)
     except BaseException as error:
         with anyio.CancelScope(shield=True), contextlib.suppress(NotFound):  # refused ones are gone already
             await anyio.to_thread.run_sync(forget, context, upload.id)
@@ -121,14 +120,13 @@ async def whole(
 
 def forget_stopped(context: Context) -> None:
     """Forget uploads that did not go on for long."""
-    limit, forgotten = time.time() - context.settings.upload_kept_s, []
-    with writing(context.engine) as session:
-        for row in session.exec(select(Upload)):
-            if row.id not in _busy and _touched(_path(context, row.id), row.created) < limit:
-                session.delete(row)
-                forgotten.append(row.id)
-    for upload_id in forgotten:
-        delete_bytes(context, upload_id)
+    limit = time.time() - context.settings.upload_kept_s
+    with reading(context.engine) as session:
+        rows = session.exec(select(Upload)).all()
+    for row in rows:
+        with contextlib.suppress(Unavailable, NotFound), context.uploads.on(row.id, "finished"):
+            if _touched(_path(context, row.id), row.created) < limit:
+                _delete(context, row.id)
 
 
 async def _store(context: Context, upload_id: str, at: int, size: int, stream: AsyncIterator[bytes]) -> int:
@@ -154,29 +152,21 @@ def _check(context: Context, path: Path, file_name: str) -> None:
     probing.look_at(context, "recording", path, name)
 
 
-def _forget(context: Context, upload_id: str) -> None:
+def _delete(context: Context, upload_id: str) -> None:
     with writing(context.engine) as session:
         session.delete(_row(context, session, upload_id))
     delete_bytes(context, upload_id)
 
 
 def delete_bytes(context: Context, upload_id: str) -> None:
-    """The bytes of an upload without a row, also where they were moved before finishing it was interrupted."""
+    """The bytes of an upload that was given up, also where they were moved before finishing it was interrupted.
+
+    A folder that is not marked as the upload's is a project's, whatever a restored database says: it stays.
+    """
     _path(context, upload_id).unlink(missing_ok=True)
-    delete_folder(project_files(context.settings.data_dir, upload_id).root)
-
-
-@contextlib.contextmanager
-def _alone(upload_id: str, being: Literal["sent", "finished"]) -> Iterator[None]:
-    """Only one request at a time sends or finishes an upload."""
-    with _lock:
-        if upload_id in _busy:
-            raise Unavailable("another request is still sending this file", hint="wait a moment, then ask for its offset")
-        _busy[upload_id] = being
-    try:
-        yield
-    finally:
-        del _busy[upload_id]
+    files = project_files(context.settings.data_dir, upload_id)
+    if files.half_made:
+        delete_folder(files.root)
 
 
 def _row(context: Context, session: Session, upload_id: str) -> Upload:

@@ -1,17 +1,17 @@
 """The 3D view: what it shows, and who reaches it."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import anyio
 from fastapi import WebSocket
 from fastapi.responses import Response
 
 from app import schemas
 from app.db import queries
 from app.db.engine import reading
-from app.errors import Forbidden, NotReady, Unavailable
+from app.errors import Forbidden, NotReady, TooMany, Unavailable
 from app.services import bundles, marks
 from app.services.context import Context
 from app.viewer import proxy
@@ -75,19 +75,27 @@ def place(context: Context, project_id: str, session_id: str, body: schemas.View
 
 async def page(context: Context, token: str, path: str, session_id: str) -> Response:
     """The 3D view's page, or a file of it."""
-    port = await anyio.to_thread.run_sync(context.viewer.port, token, session_id)
+    port = await _port(context, token, session_id)
     return await proxy.fetch_page(port, quote(path), context.viewer.key)
 
 
 async def socket(context: Context, token: str, connection: WebSocket) -> None:
     """The 3D view's connection."""
     try:
-        port = await anyio.to_thread.run_sync(context.viewer.port, token, connection.state.session)
-    except (Forbidden, Unavailable) as error:
+        port = await _port(replace(context, person=connection.state.person), token, connection.state.session)
+    except (Forbidden, TooMany, Unavailable) as error:
         await connection.close(4403 if isinstance(error, Forbidden) else 1013, error.message)
         return
     with context.viewer.watched(token):
         await proxy.pump(connection, port, context.viewer.key, lambda: _session_end(context, connection))
+
+
+async def _port(context: Context, token: str, session_id: str) -> int:
+    """Where the view behind the token is; only one that has to be started anew is waited for."""
+    running = context.viewer.running_port(token, session_id)
+    if running is not None:
+        return running
+    return await context.gates.views.run(context.who, context.viewer.port, token, session_id)
 
 
 async def _session_end(context: Context, connection: WebSocket) -> None:

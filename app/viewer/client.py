@@ -8,7 +8,7 @@ import queue
 import secrets
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +53,7 @@ class Opened:
 
 
 class Viewer:
-    """All open 3D views. Every method may be called from any thread."""
+    """All open 3D views. Every method may be called from any thread; those that ask the process wait for it, up to ANSWER_S."""
 
     def __init__(self, settings: Settings, command: tuple[str, ...] = WORKER, *, enabled: bool = True) -> None:
         self.enabled = enabled
@@ -63,6 +63,7 @@ class Viewer:
         self._worker: Worker | None = None
         self._lock = threading.RLock()
         self._number = 0
+        self._stopped = False
 
     def open(self, project: str, workdir: Path, session: str) -> str:
         """A token by which this session reaches its view; raises Unavailable when there is no viewer."""
@@ -87,16 +88,26 @@ class Viewer:
 
         Raises Forbidden for a token of somebody else, Unavailable when there is no viewer.
         """
-        view = self._view_of(token)
-        if view is None or view.session != session or view.until < time.monotonic():
-            raise Forbidden("this 3D view belongs to another session or has expired", hint="open the review page again")
+        view = self._opened(token, session)
         return self._running_view(view.project, view.workdir, session)[1]
 
-    def close(self, project: str) -> None:
-        """Close everybody's views of a project; their tokens are worth nothing any more."""
-        for view in [view for view in tuple(self._views.values()) if view.project == project]:
-            self._views.pop((view.project, view.session), None)
-            self._end(view)
+    def running_port(self, token: str, session: str) -> int | None:
+        """The same without waiting for anything: None while its view does not run."""
+        view = self._opened(token, session)
+        view.used = time.monotonic()
+        return self._port_of(view)
+
+    def project_of(self, token: str) -> str | None:
+        """The project of the view behind a token; None where there is none."""
+        view = self._view_of(token)
+        return view.project if view else None
+
+    def close(self, project: str, of: Callable[[str], bool] = lambda session: True) -> None:
+        """Close everybody's views of a project, or some sessions'; their tokens are worth nothing any more."""
+        for view in tuple(self._views.values()):
+            if view.project == project and of(view.session):
+                self._views.pop((view.project, view.session), None)
+                self._end(view)
 
     def close_idle(self) -> None:
         """Close views that nobody has looked at for a while; their tokens open them again."""
@@ -121,13 +132,24 @@ class Viewer:
             view.used = time.monotonic()
 
     def stop(self) -> None:
-        """End the process."""
-        with self._lock:
-            if self._worker is not None:
-                self._forget(self._worker)
+        """End the process for good; takes no lock, for whoever waits for its answer holds it and is woken by this."""
+        self._stopped = True
+        worker = self._worker
+        if worker is not None:
+            worker.kill()
+            worker.close()
+
+    def _opened(self, token: str, session: str) -> Opened:
+        """The session's view behind a token; raises Forbidden for anything else."""
+        view = self._view_of(token)
+        if view is None or view.session != session or view.until < time.monotonic():
+            raise Forbidden("this 3D view belongs to another session or has expired", hint="open the review page again")
+        return view
 
     def _view_of(self, token: str) -> Opened | None:
-        return next((view for view in tuple(self._views.values()) if secrets.compare_digest(view.token, token)), None)
+        return next(
+            (view for view in tuple(self._views.values()) if secrets.compare_digest(view.token.encode(), token.encode())), None
+        )
 
     def _ask_view(self, project: str, workdir: Path, session: str, command: dict[str, Any]) -> tuple[Opened, dict[str, Any]]:
         """Ask the session's view; one that was closed between finding it and asking it is opened again."""
@@ -228,10 +250,14 @@ class Viewer:
     def _running(self) -> Worker:
         if not self.enabled:
             raise Unavailable("the 3D view is switched off", hint="see the picture and the mesh instead")
+        if self._stopped:
+            raise Unavailable("the server stops", hint="try again in a moment")
         if self._worker is not None and not self._worker.alive:
             self._forget(self._worker)
         if self._worker is None:
             self._worker = Worker(self._command, self._settings.data_dir / "logs" / "viewer.log")
+            if self._stopped:  # looked at after it was assigned: stop() sees it, or we see that it was called
+                self._worker.kill()
             self._worker.say({"key": self.key})
         return self._worker
 

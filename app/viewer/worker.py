@@ -18,6 +18,7 @@ from app.errors import told
 from app.viewer import contract
 from app.viewer.scene import View
 from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.workspace import Workspace
 
 AMBIENT = 1.6  # textures carry the room's light already: shown darker than the scan beside them, they look wrong
@@ -37,6 +38,9 @@ def main() -> int:
             answer: dict[str, Any] = {"ok": _COMMANDS[command["cmd"]](views, key, command)}
         except R2C2RError as error:
             answer = {"error": told(error)}
+        except MemoryError:
+            traceback.print_exc()
+            answer = {"error": told(memory_met())}
         except Exception as error:  # one wish must not end the view of everybody
             traceback.print_exc()
             answer = {"error": {"kind": "internal", "message": f"unexpected: {error}", "hint": "see the viewer's log"}}
@@ -108,4 +112,5 @@ _COMMANDS: dict[str, Callable[[dict[str, View], str, dict[str, Any]], dict[str, 
 }
 
 if __name__ == "__main__":
+    limit_this_process()
     sys.exit(main())

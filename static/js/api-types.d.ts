@@ -22,6 +22,23 @@ export interface AccountPatch {
   password?: string | null;
 }
 
+/** One line of the record of sign-ins and accounts. */
+export interface AuditEntry {
+  id: number;
+  at: number;
+  action: "signed in" | "signed out" | "refused" | "added" | "removed" | "role" | "password";
+  account: string;
+  who: string;
+  client: string;
+  detail: string;
+}
+
+/** Some lines of the record, newest first, and how many there are. */
+export interface AuditPage {
+  entries: AuditEntry[];
+  total: number;
+}
+
 /** One way to do a stage's work. */
 export interface Backend {
   name: string;
@@ -62,6 +79,13 @@ export interface BundleCheck {
   version: number;
   intact: boolean;
   findings: Finding[];
+}
+
+/** One file of a bundle that carries the scene. */
+export interface BundleFormat {
+  name: string;
+  file: string;
+  opened_by: string;
 }
 
 /** One candidate mesh with its evidence. */
@@ -335,20 +359,14 @@ export interface JointVerdict {
   blocked_by: BlockerVerdict[];
 }
 
-/** Where an object is seen. */
+/** Where an object is seen: frames, and the confidence on each. */
 export interface Lane {
   object: number;
   state: "none" | "waiting" | "running" | "partial" | "done" | "failed";
   source: "live" | "run" | "none";
   complete: boolean;
-  frames: LaneEntry[];
-}
-
-/** An object on one frame of the film-strip. */
-export interface LaneEntry {
-  frame: number;
-  area: number;
-  confidence: number;
+  frames: number[];
+  confidences: number[];
 }
 
 /** The project's live segmenter. */
@@ -375,6 +393,12 @@ export interface MaskBits {
   box_width: number;
   box_height: number;
   bits: string;
+}
+
+/** Who may see a project from now on; the owner always does. */
+export interface MembersIn {
+  members_only: boolean;
+  members?: string[];
 }
 
 /** A new object; without a name it gets its category's and the next number. */
@@ -419,6 +443,7 @@ export interface OverrideData {
   pose: number[][] | null;
   joint_lower: number | null;
   joint_upper: number | null;
+  joints: Record<string, [number | null, number | null]>;
   rejected: string[];
   regenerate: number;
 }
@@ -431,6 +456,7 @@ export interface OverridePatch {
   pose?: number[][] | null;
   joint_lower?: number | null;
   joint_upper?: number | null;
+  joints?: Record<string, [number | null, number | null]> | null;
   regenerate?: number | null;
   rerun?: boolean;
   version?: number | null;
@@ -510,7 +536,7 @@ export interface PoseSpread {
   scale: number;
 }
 
-/** One recording and what became of it. */
+/** A project by itself, with what the doctor said of its recording. */
 export interface Project {
   id: string;
   name: string;
@@ -519,8 +545,7 @@ export interface Project {
   updated: number;
   source_name: string;
   media_version: string;
-  capture: CaptureFacts | null;
-  notices: string[];
+  frame_count: number;
   error: ErrorBody | null;
   counts: ProjectCounts;
   job: Job | null;
@@ -532,6 +557,8 @@ export interface Project {
   generator: string;
   matcher: string;
   review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  capture: CaptureFacts | null;
+  notices: string[];
 }
 
 /** What is in a project. */
@@ -543,12 +570,44 @@ export interface ProjectCounts {
   open_comments: number;
 }
 
+/** Who may see a project: everybody, or its owner, its members and admins. */
+export interface ProjectMembers {
+  members_only: boolean;
+  owner: string | null;
+  members: string[];
+  may_change: boolean;
+  accounts: string[];
+}
+
 /** What changes: its name, or which backends do its stages. */
 export interface ProjectPatch {
   name?: string | null;
   segmenter?: string | null;
   generator?: string | null;
   matcher?: string | null;
+}
+
+/** One recording and what became of it, as the list of all shows it. */
+export interface ProjectSummary {
+  id: string;
+  name: string;
+  status: "importing" | "failed" | "ready";
+  created: number;
+  updated: number;
+  source_name: string;
+  media_version: string;
+  frame_count: number;
+  error: ErrorBody | null;
+  counts: ProjectCounts;
+  job: Job | null;
+  result: "none" | "stale" | "current";
+  bundle: Bundle | null;
+  thumbnail: string | null;
+  size_bytes: number;
+  segmenter: string;
+  generator: string;
+  matcher: string;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
 }
 
 /** prompts.json. */
@@ -708,7 +767,7 @@ export interface SceneSummary {
 export interface StageInfo {
   name: string;
   backend: string;
-  seconds: number;
+  seconds: number | null;
 }
 
 /** One stage of a job. */
@@ -732,6 +791,7 @@ export interface SystemInfo {
   segmenters: Backend[];
   generators: Backend[];
   matchers: Backend[];
+  formats: BundleFormat[];
 }
 
 /** One free-standing thing, left alone. */
@@ -754,6 +814,22 @@ export interface Undone {
   text: string;
   frame: number | null;
   version: number;
+}
+
+/** One file or folder that was set aside, and what is in it. */
+export interface UnknownFolder {
+  entry: string;
+  kind: "project" | "newer" | "other";
+  name: string;
+  path: string;
+  size_bytes: number;
+  changed: number | null;
+  objects: number;
+  clicks: number;
+  bundles: number;
+  recording: boolean;
+  why_not: string;
+  left: boolean;
 }
 
 /** A recording on its way in; what comes next starts at `offset`. */
@@ -848,6 +924,8 @@ export interface Operations {
   removeAccount: { parameters: { name: string }; body: undefined; answer: unknown };
   /** PATCH /api/accounts/{name} */
   changeAccount: { parameters: { name: string }; body: AccountPatch; answer: AccountInfo };
+  /** GET /api/audit */
+  listAudit: { parameters: { before?: number | null; limit?: number }; body: undefined; answer: AuditPage };
   /** GET /api/browse */
   browse: { parameters: { path?: string | null }; body: undefined; answer: FolderListing };
   /** GET /api/health */
@@ -869,7 +947,7 @@ export interface Operations {
   /** POST /api/logout */
   signOut: { parameters: Record<string, never>; body: undefined; answer: unknown };
   /** GET /api/projects */
-  listProjects: { parameters: Record<string, never>; body: undefined; answer: Project[] };
+  listProjects: { parameters: Record<string, never>; body: undefined; answer: ProjectSummary[] };
   /** POST /api/projects/import */
   importProject: { parameters: Record<string, never>; body: ImportPath; answer: Project };
   /** POST /api/projects/sample */
@@ -912,6 +990,10 @@ export interface Operations {
   openLive: { parameters: { project: string }; body: undefined; answer: LiveStatus };
   /** GET /api/projects/{project}/masks/{frame} */
   getMasks: { parameters: { project: string; frame: number }; body: undefined; answer: FrameMask[] };
+  /** GET /api/projects/{project}/members */
+  getMembers: { parameters: { project: string }; body: undefined; answer: ProjectMembers };
+  /** PUT /api/projects/{project}/members */
+  setMembers: { parameters: { project: string }; body: MembersIn; answer: ProjectMembers };
   /** GET /api/projects/{project}/objects */
   listObjects: { parameters: { project: string; deleted?: boolean }; body: undefined; answer: SceneObject[] };
   /** POST /api/projects/{project}/objects */
@@ -980,6 +1062,12 @@ export interface Operations {
   showInViewer: { parameters: { project: string }; body: ViewerShow; answer: ViewerShown };
   /** GET /api/system */
   getSystem: { parameters: Record<string, never>; body: undefined; answer: SystemInfo };
+  /** GET /api/unknown */
+  listUnknown: { parameters: Record<string, never>; body: undefined; answer: UnknownFolder[] };
+  /** POST /api/unknown/{entry}/adopt */
+  adoptUnknown: { parameters: { entry: string }; body: undefined; answer: Project };
+  /** POST /api/unknown/{entry}/leave */
+  leaveUnknown: { parameters: { entry: string }; body: undefined; answer: UnknownFolder };
   /** GET /api/uploads */
   listUploads: { parameters: Record<string, never>; body: undefined; answer: Upload[] };
   /** POST /api/uploads */
@@ -993,7 +1081,7 @@ export interface Operations {
   /** POST /api/uploads/{upload}/finish */
   finishUpload: { parameters: { upload: string }; body: undefined; answer: Project };
   /** GET /media/{project}/bundles/{version}.zip */
-  downloadBundle: { parameters: { project: string; version: number; formats?: ("urdf" | "mjcf" | "usd" | "glb")[] }; body: undefined; answer: unknown };
+  downloadBundle: { parameters: { project: string; version: number; formats?: string[] }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.glb */
   candidateMesh: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.png */

@@ -1,12 +1,14 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, Project, FrameInfo, SceneObject, Lane, Proposals, FrameMask, LiveStatus, Job, JobEvent,
+ *   SystemInfo, FolderListing, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, FrameMask, LiveStatus, Job, JobEvent,
  *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
- *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch
+ *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
+ *   UnknownFolder, ProjectMembers, MembersIn
  * } from "./api-types" */
 
+import { patiently } from "./lib/patience.js";
 import { sendRest, stoppedUpload } from "./lib/resumable.js";
 
 const OFFLINE = { kind: "offline", message: "the server cannot be reached", hint: "is r2c2r serve running?" };
@@ -15,13 +17,15 @@ export class ApiError extends Error {
   /**
    * @param {number} status 0 when the server could not be reached
    * @param {Omit<ErrorBody, "current"> & { current?: unknown }} body
+   * @param {number | null} retryMs when it may be tried again, where the server says so
    */
-  constructor(status, body) {
+  constructor(status, body, retryMs = null) {
     super(body.message);
     this.status = status;
     this.kind = body.kind;
     this.hint = body.hint ?? "";
     this.current = body.current;
+    this.retryMs = retryMs;
   }
 
   /** Whether nobody answered for the server: not it, or only what stands before it. */
@@ -54,7 +58,8 @@ async function call(path, { method = "GET", json, body, signal, headers: more = 
   }
   if (response.status === 401 && path !== "/api/login")
     location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
-  if (!response.ok) throw new ApiError(response.status, await errorBody(response));
+  const seconds = Number(response.headers.get("Retry-After"));
+  if (!response.ok) throw new ApiError(response.status, await errorBody(response), seconds > 0 ? seconds * 1000 : null);
   return response;
 }
 
@@ -81,6 +86,20 @@ const get = async (path, signal) => (await call(path, { signal })).json();
  * @param {unknown} [json]
  */
 const send = async (method, path, json = {}) => (await call(path, { method, json })).json();
+/** @param {number} ms @returns {Promise<void>} */
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+/**
+ * Ask for heavy work until it is taken on; that it waits is said in the corner of the page.
+ * @template T
+ * @param {() => Promise<T>} ask
+ * @param {(error: ApiError) => void} [told]
+ */
+const takenOn = (ask, told = (error) => window.dispatchEvent(new CustomEvent("r2c2r-waits", { detail: error }))) =>
+  patiently(ask, {
+    retryMs: (error) => (error instanceof ApiError && error.status === 429 ? error.retryMs : null),
+    told: (error) => told(/** @type {ApiError} */ (error)),
+    wait,
+  });
 /** @param {string} id */
 const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
 
@@ -101,13 +120,17 @@ export const perform = async (method, path, json, key, person) => {
   });
 };
 
-/** @param {string} name @param {string} password */
-export const signIn = (name, password) => call("/api/login", { method: "POST", json: { name, password } });
+/** @param {string} name @param {string} password @param {(error: ApiError) => void} told while it waits for its turn */
+export const signIn = (name, password, told) =>
+  takenOn(() => call("/api/login", { method: "POST", json: { name, password } }), told);
 export const signOut = () => call("/api/logout", { method: "POST", json: {} });
 /** @param {string} old @param {string} now */
 export const changePassword = (old, now) => call("/api/account/password", { method: "POST", json: { old, new: now } });
 /** @returns {Promise<AccountInfo[]>} */
 export const listAccounts = () => get("/api/accounts");
+/** @param {number | null} before @returns {Promise<AuditPage>} */
+export const listAudit = (before) =>
+  get(`/api/audit?${new URLSearchParams(before === null ? {} : { before: String(before) })}`);
 /** @param {AccountIn} account @returns {Promise<AccountInfo>} */
 export const addAccount = (account) => send("POST", "/api/accounts", account);
 /** @param {string} name @param {Partial<AccountPatch>} patch @returns {Promise<AccountInfo>} */
@@ -119,7 +142,7 @@ export const getSystem = () => get("/api/system");
 /** @param {string} path @returns {Promise<FolderListing>} */
 export const browse = (path) => get(`/api/browse?${new URLSearchParams({ path })}`);
 
-/** @param {AbortSignal} [signal] @returns {Promise<Project[]>} */
+/** @param {AbortSignal} [signal] @returns {Promise<ProjectSummary[]>} */
 export const listProjects = (signal) => get("/api/projects", signal);
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Project>} */
 export const getProject = (id, signal) => get(of(id), signal);
@@ -131,10 +154,21 @@ export const makeSample = (request) => send("POST", "/api/projects/sample", requ
 export const changeProject = (id, patch) => send("PATCH", of(id), patch);
 /** @param {string} id @returns {Promise<Deleted>} */
 export const deleteProject = (id) => send("DELETE", of(id));
+/** @param {string} id @param {AbortSignal} [signal] @returns {Promise<ProjectMembers>} */
+export const getMembers = (id, signal) => get(`${of(id)}/members`, signal);
+/** @param {string} id @param {MembersIn} members @returns {Promise<ProjectMembers>} */
+export const setMembers = (id, members) => send("PUT", `${of(id)}/members`, members);
 /** @param {string} id @returns {Promise<FrameInfo[]>} */
 export const listFrames = (id) => get(`${of(id)}/frames`);
 /** @param {string} id @returns {Promise<HistoryEntry[]>} */
 export const getHistory = (id) => get(`${of(id)}/history?limit=100`);
+
+/** @returns {Promise<UnknownFolder[]>} */
+export const listUnknown = () => get("/api/unknown");
+/** @param {string} entry @returns {Promise<Project>} */
+export const adoptUnknown = (entry) => send("POST", `/api/unknown/${encodeURIComponent(entry)}/adopt`);
+/** @param {string} entry @returns {Promise<UnknownFolder>} */
+export const leaveUnknown = (entry) => send("POST", `/api/unknown/${encodeURIComponent(entry)}/leave`);
 
 /** @returns {Promise<Upload[]>} */
 export const listUploads = () => get("/api/uploads");
@@ -163,9 +197,9 @@ export async function uploadRecording(file, onProgress, signal) {
     mayPass: (error) =>
       error instanceof ApiError && (error.status === 0 || error.status === 409 || error.status === 503),
     onProgress: (sent, waiting) => onProgress(sent / file.size, waiting),
-    wait: (ms) => new Promise((resolve) => setTimeout(resolve, ms)),
+    wait,
   });
-  return send("POST", `${path}/finish`);
+  return takenOn(() => send("POST", `${path}/finish`));
 }
 
 /** @param {string} id @returns {Promise<SceneObject[]>} */
@@ -205,7 +239,8 @@ export const listCandidates = (id) => get(`${of(id)}/candidates`);
 /** @param {string} id @param {CandidateGroup} seen @param {File} file @returns {Promise<Reviewed>} */
 export const uploadCandidate = async (id, seen, file) => {
   const query = new URLSearchParams({ filename: file.name, version: String(seen.version) });
-  return (await call(`${of(id)}/objects/${seen.object}/candidates?${query}`, { method: "POST", body: file })).json();
+  const path = `${of(id)}/objects/${seen.object}/candidates?${query}`;
+  return (await takenOn(() => call(path, { method: "POST", body: file }))).json();
 };
 
 /** @param {string} id @returns {Promise<ReviewStatus>} */
@@ -233,10 +268,10 @@ export const checkBundle = (id, version) => get(`${of(id)}/bundles/${version}/ch
 /** @param {string} id @param {number} version @param {number} since @returns {Promise<BundleChange[]>} */
 export const compareBundles = (id, version, since) => get(`${of(id)}/bundles/${version}/changes?since=${since}`);
 /** @param {string} id @returns {Promise<ViewerSession>} */
-export const openViewer = (id) => send("POST", `${of(id)}/viewer`);
+export const openViewer = (id) => takenOn(() => send("POST", `${of(id)}/viewer`));
 /** @param {string} id @param {Partial<ViewerShow>} what @returns {Promise<ViewerShown>} */
-export const showInViewer = (id, what) => send("POST", `${of(id)}/viewer/show`, what);
+export const showInViewer = (id, what) => takenOn(() => send("POST", `${of(id)}/viewer/show`, what));
 /** @param {string} id @param {Record<string, number>} values @returns {Promise<ViewerShown>} */
-export const moveJoints = (id, values) => send("POST", `${of(id)}/viewer/joints`, { values });
+export const moveJoints = (id, values) => takenOn(() => send("POST", `${of(id)}/viewer/joints`, { values }));
 /** Put what is being moved in the 3D view somewhere; with null, learn where it was dragged. @param {string} id @param {number[][] | null} pose @returns {Promise<ViewerPlaced>} */
-export const placeInViewer = (id, pose) => send("POST", `${of(id)}/viewer/place`, { pose });
+export const placeInViewer = (id, pose) => takenOn(() => send("POST", `${of(id)}/viewer/place`, { pose }));

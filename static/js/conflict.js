@@ -16,6 +16,7 @@ const LABELS = {
   hinge: "Hinge",
   joint_lower: "Opens from",
   joint_upper: "Opens to",
+  joints: "Each joint opens to",
   dimensions_m: "Width, depth, height",
   pose: "Place",
   candidate: "Candidate",

@@ -3,6 +3,7 @@
 /** @type {Record<string, () => Promise<CustomElementConstructor>>} */
 const ELEMENTS = {
   "r2c2r-annotate": async () => (await import("./pages/annotate.js")).AnnotatePage,
+  "r2c2r-audit-record": async () => (await import("./elements/audit-record.js")).AuditRecord,
   "r2c2r-backend": async () => (await import("./elements/backend-choice.js")).BackendChoice,
   "r2c2r-comments": async () => (await import("./elements/comment-list.js")).CommentList,
   "r2c2r-download": async () => (await import("./pages/download.js")).DownloadPage,
@@ -10,6 +11,7 @@ const ELEMENTS = {
   "r2c2r-folder-dialog": async () => (await import("./elements/folder-dialog.js")).FolderDialog,
   "r2c2r-frame-canvas": async () => (await import("./elements/frame-canvas.js")).FrameCanvas,
   "r2c2r-job": async () => (await import("./elements/job-panel.js")).JobPanel,
+  "r2c2r-members": async () => (await import("./elements/member-list.js")).MemberList,
   "r2c2r-mosaic": async () => (await import("./elements/frame-mosaic.js")).FrameMosaic,
   "r2c2r-object-cloud": async () => (await import("./elements/object-cloud.js")).ObjectCloud,
   "r2c2r-object-list": async () => (await import("./elements/object-list.js")).ObjectList,
@@ -20,14 +22,16 @@ const ELEMENTS = {
   "r2c2r-proposal-list": async () => (await import("./elements/proposal-list.js")).ProposalList,
   "r2c2r-review": async () => (await import("./pages/review.js")).ReviewPage,
   "r2c2r-run": async () => (await import("./pages/run.js")).RunPage,
+  "r2c2r-unknown-list": async () => (await import("./elements/unknown-list.js")).UnknownList,
   "r2c2r-viewer": async () => (await import("./elements/viewer-frame.js")).ViewerFrame,
 };
 
 /** What a page is made of beside itself. @type {Record<string, string[]>} */
 const PARTS = {
   annotate: ["film-strip", "frame-canvas", "object-list", "proposal-list", "mosaic", "object-cloud", "comments"],
-  overview: ["backend", "job", "viewer"],
-  projects: ["folder-dialog"],
+  people: ["audit-record"],
+  overview: ["backend", "job", "members", "viewer"],
+  projects: ["folder-dialog", "unknown-list"],
   review: ["photo-check", "comments", "viewer"],
   run: ["job"],
 };

@@ -3,6 +3,8 @@
 /** @typedef {{ type: string, seq?: number, [key: string]: unknown }} Message */
 
 const SESSION_ENDED = 4401;
+const TOO_MANY_TABS = 4429;
+const CROWDED_MS = 15_000; // until a tab too many asks again
 
 class Live extends EventTarget {
   /** @type {WebSocket | null} */
@@ -20,6 +22,9 @@ class Live extends EventTarget {
   get connected() {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
+
+  /** Why the server keeps no connection to this tab; empty when it does, or does not answer. */
+  refusal = "";
 
   /** What the server calls this tab. */
   tab = "";
@@ -57,14 +62,14 @@ class Live extends EventTarget {
     const socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/api/live?${query}`);
     this.#socket = socket;
     socket.addEventListener("open", () => {
-      this.#wait = 500;
       this.#tell();
-      this.dispatchEvent(new Event("online"));
     });
     socket.addEventListener("message", (event) => this.#receive(JSON.parse(String(event.data))));
-    socket.addEventListener("close", ({ code }) => {
+    socket.addEventListener("close", ({ code, reason }) => {
       if (code === SESSION_ENDED)
         return location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
+      this.refusal = code === TOO_MANY_TABS ? reason : "";
+      if (this.refusal) this.#wait = CROWDED_MS;
       this.dispatchEvent(new Event("offline"));
       setTimeout(() => this.#open(), this.#wait);
       this.#wait = Math.min(this.#wait * 1.8, 8000);
@@ -74,11 +79,14 @@ class Live extends EventTarget {
   /** @param {Message} message */
   #receive(message) {
     if (message.type === "hello") {
+      this.#wait = 500;
+      this.refusal = "";
       this.#epoch = String(message.epoch);
       this.tab = String(message.tab);
       if (message.reset || this.#seq === 0) this.#seq = Number(message.seq);
     }
     if (message.seq !== undefined) this.#seq = Math.max(this.#seq, message.seq);
+    if (message.type === "hello") this.dispatchEvent(new Event("online"));
     this.dispatchEvent(new CustomEvent(message.type, { detail: message }));
   }
 }

@@ -8,14 +8,24 @@ const alertLine = /** @type {HTMLElement} */ (form.querySelector("[role=alert]")
 const theme = localStorage.getItem("theme");
 if (theme) document.documentElement.dataset.theme = theme;
 
+if (new URLSearchParams(location.search).has("token")) {
+  /** @type {HTMLElement} */ (document.querySelector("#used")).hidden = false;
+  history.replaceState(null, "", "/login"); // the key leaves the address, and the next reload asks for no key
+}
+
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
   const said = new FormData(form);
-  alertLine.textContent = "";
+  const button = /** @type {HTMLButtonElement} */ (form.querySelector("button"));
+  button.disabled = true; // after wrong passwords the answer takes its time
+  alertLine.textContent = "Signing in…";
+  const waits = (/** @type {ApiError} */ error) =>
+    (alertLine.textContent = `${error.message}: it goes on by itself in ${Math.ceil((error.retryMs ?? 0) / 1000)} s`);
   try {
-    await signIn(String(said.get("name")), String(said.get("password")));
+    await signIn(String(said.get("name")), String(said.get("password")), waits);
     location.assign(nextPage(new URLSearchParams(location.search).get("next"), location.origin));
   } catch (error) {
     alertLine.textContent = error instanceof ApiError ? `${error.message}: ${error.hint}` : String(error);
+    button.disabled = false;
   }
 });

@@ -3,6 +3,9 @@
 /** @typedef {import("../api-types").FrameMask} FrameMask */
 /** @typedef {import("../api-types").Lane} Lane */
 
+/** Confidence by frame. @param {Lane} lane */
+const confidencesOf = (lane) => new Map(lane.frames.map((frame, k) => [frame, lane.confidences[k] ?? 0]));
+
 export class Masks {
   /** @type {Map<string, FrameMask>} by "object/frame" */
   #masks = new Map();
@@ -12,7 +15,7 @@ export class Masks {
   /** @param {Lane[]} lanes */
   fill(lanes) {
     this.#masks.clear();
-    this.#lanes = new Map(lanes.map((lane) => [lane.object, new Map(lane.frames.map((e) => [e.frame, e.confidence]))]));
+    this.#lanes = new Map(lanes.map((lane) => [lane.object, confidencesOf(lane)]));
   }
 
   /** @param {FrameMask} mask */

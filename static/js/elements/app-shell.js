@@ -13,7 +13,7 @@ import { go } from "../router.js";
 import { CommandPalette } from "./command-palette.js";
 import { HelpOverlay } from "./help-overlay.js";
 import { stateChip } from "./review-state.js";
-import { sayError, Toasts } from "./toasts.js";
+import { sayError, sayWaiting, Toasts } from "./toasts.js";
 import { WhoIsIn } from "./who.js";
 
 /** @typedef {import("../router.js").Route} Route */
@@ -83,6 +83,7 @@ export class AppShell extends LiveElement {
     for (const type of ["offline", "online"]) live.addEventListener(type, () => this.#drawOnline(), { signal });
     outbox.addEventListener("change", () => this.#drawOnline(), { signal });
     outbox.addEventListener("refused", (event) => sayError(detailOf(event)), { signal });
+    window.addEventListener("r2c2r-waits", (event) => sayWaiting(detailOf(event)), { signal });
     live.addEventListener("project", () => this.#route && this.#drawProject(this.#route), { signal });
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
   }
@@ -143,7 +144,9 @@ export class AppShell extends LiveElement {
       ? ` ${counted(outbox.waiting, "change")} not stored yet: kept in this browser and sent by ${outbox.waiting === 1 ? "itself" : "themselves"}${outbox.safe ? "" : ", as long as this page stays open"}.`
       : "";
     this.#online.hidden = live.connected && !outbox.stuck;
-    this.#online.textContent = `The server does not answer; trying again.${waiting}`;
+    this.#online.textContent = live.refusal
+      ? `This page is not told what others do: ${live.refusal}.${waiting}`
+      : `The server does not answer; trying again.${waiting}`;
   }
 
   /** @param {KeyboardEvent} event */

@@ -9,6 +9,7 @@ import { h, LiveElement } from "../dom.js";
 import { drawBox, drawClick, drawCrosshair, drawPin, isOnClick, isOnPin } from "../lib/frame-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
+import { Newest } from "../lib/newest.js";
 import { drawOutline } from "../lib/outlines.js";
 import { clamped, fit, isInside, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 
@@ -17,6 +18,7 @@ import { clamped, fit, isInside, pinch, toImage, toScreen, zoom } from "../lib/v
 /** @typedef {import("../lib/gestures.js").At} At */
 /** @typedef {{ object: number, colour: [number, number, number], mask: MaskBits, current: boolean }} Layer */
 /** @typedef {Point & { colour: string, number: number, object: number, current: boolean }} Marker */
+/** @typedef {{ box: MaskBits, bitmap: ImageBitmap, close(): void }} Painted */
 /** @typedef {{ id: number, x: number, y: number, text: string }} Pin */
 /** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
@@ -31,9 +33,8 @@ export class FrameCanvas extends LiveElement {
   #fitted = true;
   /** @type {HTMLImageElement | null} */
   #image = null;
-  /** @type {{ box: MaskBits, bitmap: ImageBitmap }[]} */
-  #painted = [];
-  #paintings = 0;
+  /** @type {Newest<Painted>} */
+  #painted = new Newest();
   /** @type {Marker[]} */
   #markers = [];
   /** @type {Outline[]} */
@@ -83,14 +84,8 @@ export class FrameCanvas extends LiveElement {
 
   /** @param {Layer[]} layers */
   async setMasks(layers) {
-    const painting = ++this.#paintings;
-    const painted = await Promise.all(
-      layers.filter(({ mask }) => mask.box_width > 0).map((layer) => paint(layer, this.opacity)),
-    );
-    if (painting !== this.#paintings) return; // a newer set is on its way
-    for (const { bitmap } of this.#painted) bitmap.close();
-    this.#painted = painted;
-    this.#draw();
+    const painting = layers.filter(({ mask }) => mask.box_width > 0).map((layer) => paint(layer, this.opacity));
+    if (await this.#painted.take(painting)) this.#draw();
   }
 
   /** @param {Marker[]} markers */
@@ -160,7 +155,7 @@ export class FrameCanvas extends LiveElement {
   /** @param {CanvasRenderingContext2D} context */
   #drawOver(context) {
     const { scale, x, y } = this.#view;
-    for (const { box, bitmap } of this.#painted) {
+    for (const { box, bitmap } of this.#painted.held) {
       const step = (this.#size.width / box.width) * scale; // masks come at preview size
       context.drawImage(bitmap, x + box.left * step, y + box.top * step, box.box_width * step, box.box_height * step);
     }
@@ -281,9 +276,11 @@ export class FrameCanvas extends LiveElement {
 /**
  * @param {Layer} layer
  * @param {number} opacity of the current object's
+ * @returns {Promise<Painted>}
  */
 async function paint({ mask, colour, current }, opacity) {
   const pixels = await decodeBox(mask);
   const rgba = paintBox(pixels, mask.box_width, mask.box_height, colour, current ? opacity : 0.6 * opacity);
-  return { box: mask, bitmap: await createImageBitmap(new ImageData(rgba, mask.box_width, mask.box_height)) };
+  const bitmap = await createImageBitmap(new ImageData(rgba, mask.box_width, mask.box_height));
+  return { box: mask, bitmap, close: () => bitmap.close() };
 }

@@ -39,6 +39,14 @@ export function say(text, options) {
 }
 
 /**
+ * Say that something goes on by itself when the server has time for it.
+ * @param {ApiError} error
+ */
+export function sayWaiting(error) {
+  say(error.message, { hint: `It goes on by itself in ${Math.ceil((error.retryMs ?? 0) / 1000)} s.` });
+}
+
+/**
  * Say what went wrong; a cancelled request is not news.
  * @param {unknown} error
  */

@@ -1,6 +1,6 @@
 /** The bundle: formats, certificate, versions with checksums. */
 
-import { ApiError, checkBundle, compareBundles, getCertificate, listBundles } from "../api.js";
+import { ApiError, checkBundle, compareBundles, getCertificate, getSystem, listBundles } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
 import { certificateCard } from "../elements/results.js";
 import { say, sayError } from "../elements/toasts.js";
@@ -9,13 +9,6 @@ import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Bundle} Bundle */
 
-/** @type {[string, string, string][]} format, file, who opens it */
-const FORMATS = [
-  ["urdf", "scene.urdf", "ROS, PyBullet, SAPIEN, MuJoCo, Isaac's importer"],
-  ["mjcf", "scene.xml", "MuJoCo, with textures"],
-  ["usd", "scene.usda", "Isaac Sim, Omniverse"],
-  ["glb", "scene.glb", "the web, editors"],
-];
 const CONTENT = [
   ["meshes/", "textured OBJ visuals and convex colliders, relative paths"],
   ["manifest.json", "every dimension and joint with where it came from"],
@@ -35,7 +28,7 @@ export class DownloadPage extends LiveElement {
 
   async #load() {
     try {
-      const bundles = await listBundles(this.project);
+      const [bundles, { formats }] = await Promise.all([listBundles(this.project), getSystem()]);
       const newest = bundles[0];
       if (!newest) return this.#empty();
       const certificate = await getCertificate(this.project).catch((error) => {
@@ -52,7 +45,7 @@ export class DownloadPage extends LiveElement {
         newest.current
           ? ""
           : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
-        h("div", { class: "split" }, this.#choice(newest), certificate ? certificateCard(certificate) : ""),
+        h("div", { class: "split" }, this.#choice(newest, formats), certificate ? certificateCard(certificate) : ""),
         this.#versions(bundles),
       );
     } catch (error) {
@@ -73,9 +66,13 @@ export class DownloadPage extends LiveElement {
     );
   }
 
-  /** Which formats, and the button that fetches them. @param {Bundle} bundle */
-  #choice(bundle) {
-    const boxes = FORMATS.map(([name]) => h("input", { type: "checkbox", value: name, checked: true }));
+  /**
+   * Which formats, and the button that fetches them.
+   * @param {Bundle} bundle
+   * @param {import("../api-types").BundleFormat[]} formats
+   */
+  #choice(bundle, formats) {
+    const boxes = formats.map(({ name }) => h("input", { type: "checkbox", value: name, checked: true }));
     const link = h(
       "a",
       { class: "button primary", download: "" },
@@ -93,8 +90,8 @@ export class DownloadPage extends LiveElement {
     };
     for (const box of boxes) box.addEventListener("change", draw);
     draw();
-    const lines = FORMATS.map(([, file, who], k) =>
-      h("label", { class: "row" }, boxes[k], h("code", {}, file), h("span", { class: "muted" }, who)),
+    const lines = formats.map(({ file, opened_by }, k) =>
+      h("label", { class: "row" }, boxes[k], h("code", {}, file), h("span", { class: "muted" }, opened_by)),
     );
     return h(
       "section",

@@ -5,6 +5,7 @@ import { detailOf, h, LiveElement } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
 import { BackendChoice } from "../elements/backend-choice.js";
 import { JobPanel } from "../elements/job-panel.js";
+import { MemberList } from "../elements/member-list.js";
 import { sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
 import { ago, bytes, counted } from "../lib/format.js";
@@ -16,14 +17,27 @@ const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher"]);
 
 export class OverviewPage extends LiveElement {
   project = "";
-  #body = h("div", { class: "page" });
+  #head = h("header");
+  #importing = h("section", { class: "card stack", hidden: true });
+  #scan = h("div", { class: "split", hidden: true });
+  #work = h("div", { class: "split", hidden: true });
+  #history = h("section", { class: "stack" });
   #job = new JobPanel();
   #viewer = new ViewerFrame();
+  #members = new MemberList();
   #choices = SEAMS.map((seam) => Object.assign(new BackendChoice(), { seam }));
   #shown = false;
+  #read = ""; // what was drawn of the recording: the same again would make the page jump
 
   connected() {
-    this.replaceChildren(this.#body);
+    this.#members.project = this.project;
+    this.#work.replaceChildren(
+      h("div", { class: "stack" }, ...this.#choices),
+      h("section", { class: "card cloud" }, this.#viewer),
+    );
+    this.replaceChildren(
+      h("div", { class: "page" }, this.#head, this.#importing, this.#scan, this.#work, this.#members, this.#history),
+    );
     const { signal } = this;
     for (const choice of this.#choices) {
       choice.addEventListener("choose", (event) => this.#choose(detailOf(event)), { signal });
@@ -59,24 +73,29 @@ export class OverviewPage extends LiveElement {
     if (project.id !== this.project) return;
     for (const choice of this.#choices) choice.chosen = project[choice.seam];
     this.#job.job = project.status === "ready" ? null : project.job;
-    const capture = project.capture;
-    this.#body.replaceChildren(
-      h("header", {}, h("h1", {}, project.name), nextStep(project)),
-      project.status === "ready"
-        ? ""
-        : h("section", { class: "card stack" }, h("h2", {}, "Importing"), failure(project), this.#job),
-      ...(capture && project.status === "ready"
-        ? [
-            h("div", { class: "split" }, this.#facts(project, capture), scanCard(project)),
-            h("div", { class: "split" }, h("div", { class: "stack" }, ...this.#choices), this.#cloud()),
-          ]
-        : []),
-      h("section", { class: "stack" }, h("h2", {}, "History"), this.#history()),
-    );
-    if (capture && project.status === "ready" && !this.#shown) {
+    const ready = project.status === "ready";
+    const capture = ready ? project.capture : null;
+    this.#head.replaceChildren(h("h1", {}, project.name), nextStep(project));
+    this.#importing.hidden = ready;
+    this.#importing.replaceChildren(h("h2", {}, "Importing"), failure(project) ?? "", this.#job);
+    this.#scan.hidden = this.#work.hidden = !capture;
+    if (capture) this.#drawScan(project, capture);
+    this.#drawHistory();
+    if (capture && !this.#shown) {
       this.#shown = true;
       this.#viewer.open(this.project, { mode: "cloud" });
     }
+  }
+
+  /**
+   * @param {Project} project
+   * @param {NonNullable<Project["capture"]>} capture
+   */
+  #drawScan(project, capture) {
+    const read = JSON.stringify([capture, project.notices, project.size_bytes, project.media_version]);
+    if (read === this.#read) return;
+    this.#read = read;
+    this.#scan.replaceChildren(this.#facts(project, capture), scanCard(project));
   }
 
   /**
@@ -107,31 +126,33 @@ export class OverviewPage extends LiveElement {
     );
   }
 
-  #cloud() {
-    return h("section", { class: "card cloud" }, this.#viewer);
-  }
-
-  #history() {
-    const table = h("table", {}, h("tbody", {}));
-    getHistory(this.project).then((entries) => {
+  async #drawHistory() {
+    try {
+      const entries = await getHistory(this.project);
       const now = Date.now() / 1000;
-      table.tBodies[0]?.replaceChildren(
-        ...entries
-          .slice(0, 20)
-          .map((entry) =>
-            h(
-              "tr",
-              {},
-              h("td", {}, entry.undone ? h("s", {}, entry.text) : entry.text),
-              h("td", { class: "muted" }, entry.who),
-              h("td", { class: "muted" }, ago(entry.at, now)),
-            ),
-          ),
-      );
-      if (!entries.length) table.replaceWith(h("p", { class: "muted" }, "No one has changed anything yet."));
-    }, sayError);
-    return table;
+      const rows = entries.slice(0, 20).map((entry) => historyRow(entry, now));
+      const told = rows.length
+        ? h("table", {}, h("tbody", {}, ...rows))
+        : h("p", { class: "muted" }, "No one has changed anything yet.");
+      this.#history.replaceChildren(h("h2", {}, "History"), told);
+    } catch (error) {
+      sayError(error);
+    }
   }
+}
+
+/**
+ * @param {import("../api-types").HistoryEntry} entry
+ * @param {number} now
+ */
+function historyRow(entry, now) {
+  return h(
+    "tr",
+    {},
+    h("td", {}, entry.undone ? h("s", {}, entry.text) : entry.text),
+    h("td", { class: "muted" }, entry.who),
+    h("td", { class: "muted" }, ago(entry.at, now)),
+  );
 }
 
 /** @param {Project} project */

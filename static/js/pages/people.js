@@ -2,6 +2,7 @@
 
 import { addAccount, changeAccount, changePassword, getSystem, listAccounts, removeAccount } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
+import { AuditRecord } from "../elements/audit-record.js";
 import { say, sayError } from "../elements/toasts.js";
 import { ago } from "../lib/format.js";
 
@@ -18,10 +19,11 @@ const SHORTEST = 10;
 export class PeoplePage extends LiveElement {
   #own = h("section", { class: "card stack", hidden: true });
   #all = h("section", { class: "card stack", hidden: true });
+  #record = h("section", { class: "card stack", hidden: true });
 
   connected() {
     this.replaceChildren(
-      h("div", { class: "page people" }, h("header", {}, h("h1", {}, "People")), this.#all, this.#own),
+      h("div", { class: "page people" }, h("header", {}, h("h1", {}, "People")), this.#all, this.#own, this.#record),
     );
     getSystem().then((system) => this.#draw(system), sayError);
   }
@@ -31,6 +33,8 @@ export class PeoplePage extends LiveElement {
     this.#own.hidden = !account;
     this.#own.replaceChildren(h("h2", {}, "Your own password"), this.#passwordForm());
     this.#all.hidden = role !== "admin";
+    this.#record.hidden = role !== "admin";
+    this.#record.replaceChildren(...(role === "admin" ? [new AuditRecord()] : []));
     if (role === "admin") this.#load(account);
   }
 

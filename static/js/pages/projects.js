@@ -15,16 +15,18 @@ import { detailOf, h, icon, LiveElement } from "../dom.js";
 import { FolderDialog } from "../elements/folder-dialog.js";
 import { stateChip as stateOf } from "../elements/review-state.js";
 import { say, sayError } from "../elements/toasts.js";
+import { UnknownList } from "../elements/unknown-list.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { go } from "../router.js";
 
-/** @typedef {import("../api-types").Project} Project */
+/** @typedef {import("../api-types").ProjectSummary} Project */
 
 export class ProjectsPage extends LiveElement {
   #cards = h("ul", { class: "cards" });
   #upload = h("div", { class: "card", hidden: true });
   #stopped = h("ul", { class: "cards stopped", "aria-label": "Uploads that stopped" });
+  #unknown = new UnknownList();
   #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
   #folders = new FolderDialog();
   #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
@@ -52,6 +54,7 @@ export class ProjectsPage extends LiveElement {
         ),
         this.#upload,
         this.#stopped,
+        this.#unknown,
         this.#cards,
       ),
       this.#picker,
@@ -74,7 +77,8 @@ export class ProjectsPage extends LiveElement {
     this.#limit = system.max_upload_bytes;
     this.#admin = system.role === "admin";
     this.#browse.hidden = !this.#admin;
-    if (!this.#admin) this.#load();
+    if (this.#admin) this.#unknown.load();
+    else this.#load();
   }
 
   async #load() {
@@ -116,7 +120,7 @@ export class ProjectsPage extends LiveElement {
   #card(project) {
     const { counts, job } = project;
     const busy = job && ["queued", "running", "cancelling"].includes(job.state) ? job : null;
-    const facts = project.capture ? counted(project.capture.frame_count, "frame") : "";
+    const facts = project.frame_count ? counted(project.frame_count, "frame") : "";
     const thumb = project.thumbnail
       ? h("img", { class: "thumb", src: project.thumbnail, alt: "", loading: "lazy" })
       : h("div", { class: "thumb" });

@@ -26,7 +26,7 @@ export function corrections(group, item, { move, open }, change) {
       "div",
       { class: "stack" },
       hinge(group, change),
-      limits(group, item, change),
+      ...limits(group, item, change),
       move && h("button", { type: "button", onClick: move }, "Move or resize it…"),
     ),
   );
@@ -34,7 +34,13 @@ export function corrections(group, item, { move, open }, change) {
 
 /** @param {CandidateGroup} group */
 function hasCorrection({ override }) {
-  return Boolean(override.hinge || override.pose || override.dimensions_m || override.joint_upper);
+  return Boolean(
+    override.hinge ||
+    override.pose ||
+    override.dimensions_m ||
+    override.joint_upper ||
+    Object.keys(override.joints).length,
+  );
 }
 
 /**
@@ -54,27 +60,44 @@ function hinge(group, change) {
 }
 
 /**
+ * How far each joint opens. The only joint of an object needs no name; one of several is named.
+ *
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
 function limits(group, item, change) {
-  const joint = item?.joints[0];
-  if (!joint) return null;
-  const unit = joint.type === "revolute" ? DEGREES : 0.01;
-  const field = numberField(joint.type === "revolute" ? "Opens to (degrees)" : "Opens to (cm)", joint.upper / unit, {
-    min: "1",
-    step: "any",
+  const said = group.override.joints;
+  return (item?.joints ?? []).map((joint, _, joints) => {
+    if (joints.length === 1) {
+      return limit(joint, "", group.override.joint_upper !== null, (upper) =>
+        change(upper === null ? { joint_lower: null, joint_upper: null } : { joint_lower: 0, joint_upper: upper }),
+      );
+    }
+    const part = joint.name
+      .slice(group.name.length + 1)
+      .replace(/_joint$/, "")
+      .replaceAll("_", " ");
+    return limit(joint, `${part}: `, joint.name in said, (upper) => {
+      const others = Object.fromEntries(Object.entries(said).filter(([name]) => name !== joint.name));
+      change({ joints: upper === null ? others : { ...others, [joint.name]: [0, upper] } });
+    });
   });
+}
+
+/**
+ * @param {SceneItem["joints"][number]} joint
+ * @param {string} part
+ * @param {boolean} isSaid
+ * @param {(upper: number | null) => void} change
+ */
+function limit(joint, part, isSaid, change) {
+  const unit = joint.type === "revolute" ? DEGREES : 0.01;
+  const label = `${part}Opens to (${joint.type === "revolute" ? "degrees" : "cm"})`;
+  const field = numberField(label, joint.upper / unit, { min: "1", step: "any" });
   const set = h("button", { type: "button" }, "Set");
-  set.addEventListener("click", () => change({ joint_lower: 0, joint_upper: Number(field.input.value) * unit }));
-  return h(
-    "div",
-    { class: "row" },
-    field.label,
-    set,
-    group.override.joint_upper ? again(() => change({ joint_lower: null, joint_upper: null })) : null,
-  );
+  set.addEventListener("click", () => change(Number(field.input.value) * unit));
+  return h("div", { class: "row" }, field.label, set, isSaid ? again(() => change(null)) : null);
 }
 
 /** @param {() => void} act */

@@ -1,0 +1,109 @@
+"""`r2c2r backup` and `r2c2r restore`: the data folder carried away, and back.
+
+A backup is one database file, or a folder with that file and the projects' files. Neither command deletes anything.
+"""
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.db.sqlite import copy_database
+from app.db.usable import require_usable
+from app.errors import Conflict
+from app.files import folder_bytes, only_server, require_free
+from app.settings import DATABASE, Settings
+from r2c2r_core.disk import keep_private, resolved
+from r2c2r_core.errors import InputError
+
+LEFT_OUT = {"previews"}  # of a project's folder: made again when somebody looks
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What a backup or a restore moved."""
+
+    database_bytes: int
+    projects: int
+    files: int
+    files_bytes: int
+
+
+def backup(data_dir: Path, target: Path) -> Moved:
+    """Copy the database, and with it the projects' files unless `target` ends in .db; the server may run meanwhile.
+
+    Raises InputError where the target exists or there is no database, NoSpace, DatabaseUnusable for a damaged one.
+    """
+    settings, target = Settings(data_dir=resolved(data_dir)), target.expanduser().absolute()
+    if target.exists():
+        raise InputError(f"{target}: is there already", hint="choose a new name: backups are never written over")
+    if not settings.database.is_file():
+        raise InputError(f"{settings.database}: no such file", hint="name the data folder: r2c2r backup DATA -o OUT")
+    require_usable(settings.database)
+    only_database = target.suffix == ".db"
+    needed = settings.database.stat().st_size + (0 if only_database else folder_bytes(_projects(settings)))
+    require_free(target.parent, needed, settings.min_free_bytes)
+    if only_database:
+        copy_database(settings.database, target)
+        return Moved(target.stat().st_size, 0, 0, 0)
+    part = target.with_name(f".{target.name}.part")
+    copy_database(settings.database, part / DATABASE)  # first: what it names is there, for files come before their rows
+    moved = _copy_missing(_projects(settings), part / "projects")
+    part.rename(target)
+    return Moved((target / DATABASE).stat().st_size, *moved)
+
+
+def restore(source: Path, data_dir: Path) -> Moved:
+    """Put a backup's database in place, and those of its files that are missing; what is there stays.
+
+    The database that was there is kept in backups/. Raises EnvironmentProblem while a server runs on the folder.
+    """
+    settings, source = Settings(data_dir=resolved(data_dir)), source.expanduser().absolute()
+    database = source / DATABASE if source.is_dir() else source
+    if not database.is_file():
+        raise InputError(f"{database}: no such file", hint="name a .db file or a folder that r2c2r backup made")
+    if database.resolve() == settings.database:
+        raise Conflict(f"{database}: that is the database itself", hint="name a backup")
+    require_usable(database, to_write=False)
+    keep_private(settings.data_dir, DATABASE)
+    with only_server(settings.data_dir):
+        files = folder_bytes(source / "projects") if source.is_dir() else 0
+        require_free(settings.data_dir, database.stat().st_size + files, 0)
+        arriving = settings.data_dir / f".{DATABASE}.arriving"
+        copy_database(database, arriving)
+        _keep_replaced(settings)
+        arriving.rename(settings.database)
+        moved = _copy_missing(source / "projects", _projects(settings)) if source.is_dir() else (0, 0, 0)
+    return Moved(settings.database.stat().st_size, *moved)
+
+
+def _projects(settings: Settings) -> Path:
+    return settings.data_dir / "projects"
+
+
+def _keep_replaced(settings: Settings) -> None:
+    """Move the database away with what SQLite keeps beside it: damaged or not, somebody may want to look into it."""
+    kept = settings.data_dir / "backups" / f"replaced-{time.strftime('%Y%m%d-%H%M%S')}"
+    for path in settings.data_dir.glob(f"{DATABASE}*"):
+        kept.mkdir(parents=True, exist_ok=True)
+        path.rename(kept / path.name)
+
+
+def _copy_missing(source: Path, target: Path) -> tuple[int, int, int]:
+    """Copy files that are not there; how many projects they are of, how many they are, and their bytes."""
+    projects, files, size = set(), 0, 0
+    for path in source.rglob("*"):
+        parts = path.relative_to(source).parts
+        place = target.joinpath(*parts)
+        if path.is_symlink() or not path.is_file() or place.exists() or len(parts) < 2 or parts[1] in LEFT_OUT:
+            continue
+        part = place.with_name(f".{place.name}.part")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            shutil.copy2(path, part)
+        except FileNotFoundError:  # the server works meanwhile: it was replaced or deleted
+            continue
+        part.rename(place)
+        projects.add(parts[0])
+        files, size = files + 1, size + place.stat().st_size
+    return len(projects), files, size

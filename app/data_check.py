@@ -1,0 +1,119 @@
+"""`r2c2r check-data`: whether the database and the files agree, both ways, and who may read them."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from sqlmodel import Session, select
+
+from app.db.description import changed, read_description
+from app.db.engine import opened, reading
+from app.db.sqlite import connected
+from app.db.tables import Bundle, Override, Project, Upload
+from app.files import ProjectFiles, half_received, project_files
+from app.settings import Settings
+from r2c2r_core.disk import open_to_others, resolved
+from r2c2r_core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class DataFinding:
+    """One thing that is not as it should be."""
+
+    what: str  # damaged | missing | unknown | outdated | open
+    where: str
+    detail: str
+
+    def to_json(self) -> dict[str, str]:
+        """As a JSON table."""
+        return asdict(self)
+
+
+def check_data(data_dir: Path) -> list[DataFinding]:
+    """All findings; the server may run meanwhile. Raises InputError where there is no data folder, DatabaseUnusable."""
+    settings = Settings(data_dir=resolved(data_dir))
+    if not settings.data_dir.is_dir():
+        raise InputError(f"{data_dir}: no such folder", hint="name the data folder")
+    found = list(_modes(settings))
+    with opened(settings.database) as engine, reading(engine) as session:
+        found += [*_damage(settings.database), *_missing(session, settings), *_unknown(session, settings)]
+    return found
+
+
+def _modes(settings: Settings) -> Iterator[DataFinding]:
+    for path in (settings.data_dir, *settings.data_dir.glob(f"{settings.database.name}*")):
+        if mode := open_to_others(path):
+            yield DataFinding("open", str(path), f"others may use it ({mode}): chmod go= {path}")
+
+
+def _damage(database: Path) -> Iterator[DataFinding]:
+    with connected(database) as connection:
+        for (said,) in connection.execute("PRAGMA integrity_check(20)"):
+            if said != "ok":
+                yield DataFinding("damaged", str(database), said)
+        for table, row, parent, _ in connection.execute("PRAGMA foreign_key_check"):
+            yield DataFinding("damaged", str(database), f"row {row} of {table} belongs to a row of {parent} that is not there")
+
+
+def _missing(session: Session, settings: Settings) -> Iterator[DataFinding]:
+    """Files that rows tell of and that are not there, or are not what the rows say."""
+    for project in session.exec(select(Project)):
+        files = project_files(settings.data_dir, project.id, project.work_path)
+        named = [("recording", Path(project.source_path))] if project.source_path else []
+        if project.status == "ready":
+            named += [("frame table", files.frames), ("facts", files.facts), ("workspace", files.work)]
+        for override in session.exec(select(Override).where(Override.project_id == project.id)):
+            mesh = str(override.data.get("candidate") or "")
+            named += [("uploaded mesh", Path(mesh))] if mesh.startswith("/") else []
+        for what, path in named:
+            if not path.exists():
+                yield DataFinding("missing", str(path), f"{what} of {project.name}")
+        yield from _bundles(session, project, files)
+        yield from _description(session, project, files)
+
+
+def _bundles(session: Session, project: Project, files: ProjectFiles) -> Iterator[DataFinding]:
+    rows = session.exec(select(Bundle).where(Bundle.project_id == project.id)).all()
+    for row in rows:
+        kept = files.bundles / row.path
+        if not kept.is_file():
+            yield DataFinding("missing", str(kept), f"bundle {row.version} of {project.name}")
+        elif _sha256(kept) != row.sha256:
+            yield DataFinding("damaged", str(kept), f"bundle {row.version} of {project.name}: other bytes than were certified")
+    known = {row.path for row in rows}
+    for kept in files.bundles.glob("v*.zip"):
+        if kept.name not in known:
+            yield DataFinding("unknown", str(kept), f"a bundle of {project.name} that the database does not know")
+
+
+def _description(session: Session, project: Project, files: ProjectFiles) -> Iterator[DataFinding]:
+    if not files.root.is_dir():
+        yield DataFinding("missing", str(files.root), f"the folder of {project.name}")
+        return
+    try:
+        then = read_description(files.description).changed
+    except (FileNotFoundError, InputError):
+        yield DataFinding("missing", str(files.description), f"what {project.name} is; `r2c2r serve` writes it")
+        return
+    if then != changed(session, project):
+        yield DataFinding("outdated", str(files.description), f"it is not of what the database says of {project.name}")
+
+
+def _unknown(session: Session, settings: Settings) -> Iterator[DataFinding]:
+    """Files that no row tells of."""
+    projects, uploads = set(session.exec(select(Project.id))), set(session.exec(select(Upload.id)))
+    for folder in (settings.data_dir / "projects").glob("*"):
+        half_made = project_files(settings.data_dir, folder.name).half_made
+        if folder.name not in projects and not (half_made and folder.name in uploads):
+            yield DataFinding("unknown", str(folder), "a project's folder that the database does not know")
+    for path in settings.uploads.glob("*"):
+        if path.stem not in uploads and not half_received(path):
+            yield DataFinding("unknown", str(path), "bytes of an upload that the database does not know")
+    for path in settings.unknown.glob("*"):
+        yield DataFinding("unknown", str(path), "set aside; an admin can adopt it on the page Projects")
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()

@@ -1,0 +1,82 @@
+"""A project's rows as the `project.json` of its folder, and that file read again."""
+
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from sqlmodel import Session, col, select
+
+from app.db.tables import Bundle, Comment, Event, Override, Point, Project, SceneObject, Verdict
+from app.files import ProjectFiles
+from app.schemas.description import DescribedObject, DescribedPoint, Description
+from r2c2r_core.errors import InputError
+
+_OF_ACCOUNTS = {"owner_id"}  # numbers of accounts mean others in another database
+_DERIVED = {"certificate"}  # it is in the bundle itself
+
+
+def describe(session: Session, project: Project, files: ProjectFiles) -> Description:
+    """What people made of the project, by a fixed number of queries."""
+    of_project = SceneObject.project_id == project.id
+    objects = session.exec(select(SceneObject).where(of_project).order_by(col(SceneObject.id))).all()
+    points: dict[int, list[DescribedPoint]] = defaultdict(list)
+    for point in session.exec(select(Point).join(SceneObject).where(of_project).order_by(col(Point.id))):
+        click = DescribedPoint.model_construct(frame=point.frame, x=point.x, y=point.y, label=point.label)
+        points[point.object_id].append(click)
+    verdicts: dict[int, list[dict[str, Any]]] = defaultdict(list)
+    for verdict in session.exec(select(Verdict).join(SceneObject).where(of_project).order_by(col(Verdict.id))):
+        verdicts[verdict.object_id].append(verdict.model_dump(exclude={"id", "object_id"}))
+    overrides = {row.object_id: row.data for row in session.exec(select(Override).where(Override.project_id == project.id))}
+    comments = session.exec(select(Comment).where(Comment.project_id == project.id).order_by(col(Comment.id)))
+    bundles = session.exec(select(Bundle).where(Bundle.project_id == project.id).order_by(col(Bundle.version)))
+    return Description(
+        id=project.id,
+        changed=changed(session, project),
+        project=relative(project.model_dump(exclude=_OF_ACCOUNTS), files.root),
+        objects=[
+            DescribedObject(
+                **item.model_dump(include={"id", "name", "category", "colour", "deleted"}),
+                points=points[item.id or 0],
+                override=relative(overrides.get(item.id, {}), files.root),
+                verdicts=verdicts[item.id or 0],
+            )
+            for item in objects
+        ],
+        comments=[row.model_dump(exclude={"id", "project_id"}) for row in comments],
+        bundles=[row.model_dump(exclude={"id", "project_id", *_DERIVED}) for row in bundles],
+    )
+
+
+def changed(session: Session, project: Project) -> float:
+    """When anybody last changed the project."""
+    last = session.exec(select(Event.at).where(Event.project_id == project.id).order_by(col(Event.id).desc())).first()
+    return max(project.updated, last or 0.0)
+
+
+def read_description(path: Path) -> Description:
+    """A project.json; raises InputError for a file that is none, FileNotFoundError where there is none."""
+    try:
+        return Description.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise InputError(f"{path}: {where}: {first['msg']}", hint="expected a project.json of version 1") from error
+
+
+def relative(row: dict[str, Any], root: Path) -> dict[str, Any]:
+    """The row with paths below `root` relative to it: a folder may be moved."""
+    inside = f"{root}/"
+    return {key: v.removeprefix(inside) if isinstance(v, str) else v for key, v in row.items()}
+
+
+def placed(row: dict[str, Any], root: Path, *names: str) -> dict[str, Any]:
+    """The row with these fields' paths where they lie below `root` now; what is no file there stays as it is."""
+    found = {name: str(root / row[name]) for name in names if isinstance(row.get(name), str) and (root / row[name]).exists()}
+    return {**row, **found}
+
+
+def written(description: Description) -> bytes:
+    """The file's content."""
+    return json.dumps(description.model_dump(), separators=(",", ":")).encode()

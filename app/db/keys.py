@@ -1,0 +1,78 @@
+"""Keys of what people gave, stored beside it: masks and results are current while theirs is this one.
+
+They are made when something changes, from the object that changed, and read by every list.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from sqlmodel import Session, col, select
+
+from app.db.queries import Click, clicks_by_object, live_objects
+from app.db.tables import Project, SceneObject
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.workspace import content_key
+
+
+def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]]) -> str:
+    """Key of what an object's masks depend on, its name not among it; empty while no click (frame, x, y, label) is on it."""
+    given = [[frame, x, y, label] for frame, x, y, label in clicks]
+    if not any(label for *_, label in given):
+        return ""
+    return hashlib.sha256(json.dumps([segmenter, category, given]).encode()).hexdigest()[:20]
+
+
+def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any]) -> str:
+    """Key of everything about an object that a result depends on; empty where none does."""
+    prompt = [[c.frame, c.x, c.y, c.label] for c in clicks] if any(c.label for c in clicks) else None
+    corrected = overrides_entry(override)
+    return content_key(name, category if prompt else "", prompt, corrected) if prompt or corrected else ""
+
+
+def overrides_entry(stored: dict[str, Any]) -> dict[str, Any]:
+    """One object of overrides.json, from what is stored about it."""
+    data = {key: value for key, value in stored.items() if value not in (None, [], {})}
+    limits = [data.pop("joint_lower", None), data.pop("joint_upper", None)]
+    return data if limits == [None, None] else {**data, "joint_limits": limits}
+
+
+def stored_entry(entry: dict[str, Any]) -> dict[str, Any]:
+    """What is stored about an object, from its entry in overrides.json: the inverse of `overrides_entry`."""
+    lower, upper = entry.get("joint_limits") or (None, None)
+    limits = {"joint_lower": lower, "joint_upper": upper}
+    rest = {key: value for key, value in entry.items() if key != "joint_limits"}
+    return rest | {key: value for key, value in limits.items() if value is not None}
+
+
+def note_object(session: Session, item: SceneObject, segmenter: str, clicks: list[Click], override: dict[str, Any]) -> None:
+    """Store the keys of an object that changed."""
+    item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks])
+    item.inputs = object_key(item.name, item.category, clicks, override)
+    session.add(item)
+
+
+def note_project(session: Session, project: Project) -> None:
+    """Store the key of everything a person gave, after something of it changed."""
+    session.flush()
+    mine = select(SceneObject.inputs).where(SceneObject.project_id == project.id, col(SceneObject.deleted).is_(False))
+    given = session.exec(mine.where(SceneObject.inputs != "").order_by(col(SceneObject.id))).all()
+    project.inputs = content_key(list(given), project.segmenter, _chosen(project))
+    session.add(project)
+
+
+def note_segmenter(session: Session, project: Project) -> None:
+    """Store the keys of the masks after another segmenter was chosen to draw them."""
+    clicks = clicks_by_object(session, project.id)
+    for item in live_objects(session, project.id, deleted=True):
+        drawn = [(c.frame, c.x, c.y, c.label) for c in clicks.get(item.id or 0, [])]
+        item.masks_key = masks_key(project.segmenter, item.category, drawn)
+        session.add(item)
+
+
+def _chosen(project: Project) -> dict[str, str]:
+    """Backends that are not the default, by seam: a new seam leaves the keys of older results as they are."""
+    usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default}
+    return {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}

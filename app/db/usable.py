@@ -1,0 +1,57 @@
+"""Whether the app can work with a database file: said in one line, with the next step, before anything is built on it."""
+
+import sqlite3
+from pathlib import Path
+
+from app.db.migrations import revisions
+from app.db.sqlite import RESTORE, connected, require_sound
+from app.errors import DatabaseUnusable
+
+
+def require_usable(database: Path, *, anew: bool = False, to_write: bool = True) -> None:
+    """Raise DatabaseUnusable unless the file is a sound database that this r2c2r knows, or may be begun.
+
+    Beside projects none is begun unless `anew` says that they will be adopted. `to_write`: it has to be writable too.
+    """
+    if database.is_dir():
+        raise DatabaseUnusable(f"{database}: a folder, where the database should be", hint="move it away")
+    begun = database.is_file() and database.stat().st_size > 0 and _checked_tables(database, to_write)
+    if not begun and not anew:
+        _refuse_beside_projects(database)
+
+
+def _checked_tables(database: Path, to_write: bool) -> bool:
+    """Whether it has tables, once it was found sound, of a known revision and, where that is asked for, writable."""
+    with connected(database) as connection:
+        require_sound(connection, database, "quick_check")
+        if to_write:
+            connection.execute("BEGIN IMMEDIATE")
+            connection.execute("CREATE TABLE of_a_moment (it)")  # BEGIN itself takes a file that may only be read
+            connection.execute("ROLLBACK")
+        tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if tables:
+            _require_known(connection, database, tables)
+    return bool(tables)
+
+
+def _require_known(connection: sqlite3.Connection, database: Path, tables: set[str]) -> None:
+    """Raise DatabaseUnusable unless the tables say which of our revisions they are."""
+    row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if "alembic_version" in tables else None
+    if row is None:
+        raise DatabaseUnusable(f"{database}: tables that do not say which revision they are", hint=RESTORE)
+    known = revisions()
+    if row[0] not in known:
+        raise DatabaseUnusable(
+            f"{database}: revision {row[0]}, where this r2c2r knows {known[0]} to {known[-1]}",
+            hint="use the r2c2r that made it, or a copy from the folder backups/ beside it",
+        )
+
+
+def _refuse_beside_projects(database: Path) -> None:
+    """Raise DatabaseUnusable rather than begin an empty database that knows nothing of the projects beside it."""
+    folders = [path for path in database.parent.glob("projects/*") if path.is_dir()]
+    if folders:
+        raise DatabaseUnusable(
+            f"{database}: no database beside {len(folders)} project folders; an empty one would not know them",
+            hint="r2c2r restore a backup, or r2c2r serve --adopt makes a new one of what the folders say",
+        )

@@ -1,0 +1,22 @@
+"""Where things lie on the server is the admins' business: messages to others name a file, not the way to it."""
+
+import re
+import tempfile
+from pathlib import Path
+
+from app.settings import Settings
+
+
+def without_places(text: str, settings: Settings) -> str:
+    """The text with the server's folders left out of its paths."""
+    places = {
+        settings.data_dir,
+        *settings.roots,
+        Path.home(),
+        Path(tempfile.gettempdir()),
+        Path.cwd(),
+        Path(__file__).parents[1],
+    }
+    for place in sorted({str(folder) for folder in places} - {"/"}, key=len, reverse=True):
+        text = re.sub(rf"(?<!\w){re.escape(place)}(?![\w-])", "…", text)
+    return text

@@ -1,0 +1,35 @@
+"""Addresses that may be looked up: nothing in them is too long for a file name or cannot be written into a file."""
+
+from urllib.parse import parse_qsl
+
+from fastapi.responses import JSONResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.errors import body
+from app.schemas.text import LONGEST_FILE_NAME
+from r2c2r_core.texts import OBEYED
+
+LONGEST_VALUE = 4096  # characters after a `name=`: a path on the server's machine
+
+
+class Addresses:
+    """The middleware: 404 for a path that nothing can be at, 422 for a value that nothing can be called."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what can be looked up."""
+        refused = _refused(scope) if scope["type"] == "http" else None
+        await (refused or self.app)(scope, receive, send)
+
+
+def _refused(scope: Scope) -> JSONResponse | None:
+    path: str = scope["path"]
+    if OBEYED.search(path) or any(len(part.encode()) > LONGEST_FILE_NAME for part in path.split("/")):
+        return JSONResponse(body("not-found", "there is nothing at this address", "check the address"), 404)
+    for name, value in parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True):
+        if OBEYED.search(value) or len(value) > LONGEST_VALUE:
+            message = f"{name[:60]!a}: it holds what cannot be shown, or more than {LONGEST_VALUE} characters"
+            return JSONResponse(body("invalid", message, "write it without"), 422)
+    return None

@@ -1,0 +1,76 @@
+"""Members of a project: who they are, and the one place where a request about a project of others ends."""
+
+import re
+from collections.abc import Callable
+from typing import Annotated
+
+import anyio
+from fastapi import APIRouter
+from fastapi.responses import JSONResponse
+from pydantic import Field, TypeAdapter, ValidationError
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app import schemas
+from app.deps import Ctx
+from app.errors import body
+from app.services import project_members
+from app.services.context import Context
+
+router = APIRouter(prefix="/api/projects/{project}/members", tags=["projects"])
+
+_ROW_ID = TypeAdapter(Annotated[int, Field(ge=0, lt=2**63)])
+_OF_A_PROJECT = re.compile(r"/(?:api/projects|media)/([^/]+)(?:/.*)?", re.DOTALL)
+_OF_A_JOB = re.compile(r"/api/jobs/([^/]+)(?:/.*)?", re.DOTALL)
+_OF_A_VIEW = re.compile(r"/viewer/([^/]+)(?:/.*)?", re.DOTALL)
+
+
+@router.get("", operation_id="getMembers")
+def get_members(context: Ctx, project: str) -> schemas.ProjectMembers:
+    """Who may see the project."""
+    return project_members.members(context, project)
+
+
+@router.put("", operation_id="setMembers")
+def set_members(context: Ctx, project: str, body: schemas.MembersIn) -> schemas.ProjectMembers:
+    """Open it to everybody who may sign in, or to its owner and these alone; 403 unless yours, or you are an admin."""
+    return project_members.set_members(context, project, body)
+
+
+class MembersOnly:
+    """The middleware, behind the guard: what is of a project that the person may not see is not there for that person."""
+
+    def __init__(self, app: ASGIApp, context_of: Callable[[], Context]) -> None:
+        self.app, self.context_of = app, context_of
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what the person may see."""
+        if scope["type"] not in ("http", "websocket") or await self._sees(scope):
+            await self.app(scope, receive, send)
+        elif scope["type"] == "http":
+            await JSONResponse(body("not-found", "there is nothing here", "it may have been deleted"), 404)(
+                scope, receive, send
+            )
+        else:
+            await receive()
+            await send({"type": "websocket.close", "code": 4404, "reason": "there is nothing here"})
+
+    async def _sees(self, scope: Scope) -> bool:
+        person, path = scope["state"]["person"], scope["path"]
+        if person is None:  # signs in, or brings the printed key: the guard lets nobody else come this far
+            return True
+        context = self.context_of()
+        if found := _OF_A_PROJECT.fullmatch(path):
+            return context.access.sees(person, found[1])
+        if found := _OF_A_VIEW.fullmatch(path):
+            return context.access.sees(person, context.viewer.project_of(found[1]))
+        if found := _OF_A_JOB.fullmatch(path):
+            return await anyio.to_thread.run_sync(context.access.sees_job, person, _number(found[1]))
+        return True
+
+
+def _number(text: str) -> int:
+    """The number as the route will read it; -1, which no job has, where it will refuse it."""
+    try:
+        return _ROW_ID.validate_python(text)
+    except ValidationError:
+        return -1

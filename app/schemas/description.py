@@ -1,0 +1,44 @@
+"""project.json: what a project's folder says it is, enough to make its rows anew.
+
+It is a second copy: the database decides as long as it is there. Paths inside the folder are relative to it.
+"""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+
+
+class DescribedPoint(Shape):
+    """One click, in pixels of the stored RGB frame."""
+
+    frame: int
+    x: float
+    y: float
+    label: int
+
+
+class DescribedObject(Shape):
+    """One object: what people clicked, corrected and said about it."""
+
+    id: int | None  # as the database knew it; None where the folder is of an r2c2r that wrote no project.json
+    name: str
+    category: str
+    colour: int
+    deleted: bool = False
+    points: list[DescribedPoint]
+    override: dict[str, Any] = Field(default_factory=dict)
+    verdicts: list[dict[str, Any]] = Field(default_factory=list)
+
+
+class Description(Shape):
+    """The whole file; `project`, `comments` and `bundles` are rows (db/tables.py)."""
+
+    version: Literal[1] = 1
+    id: str
+    changed: float  # when anybody last changed what is in it
+    project: dict[str, Any]
+    objects: list[DescribedObject]
+    comments: list[dict[str, Any]] = Field(default_factory=list)
+    bundles: list[dict[str, Any]] = Field(default_factory=list)

@@ -1,0 +1,18 @@
+"""What a tab says on its connection."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+
+ProjectId = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+
+
+class Watch(Shape):
+    """Where a tab is: what it hears of, and what the others at the project see of it."""
+
+    type: Literal["watch"]
+    project: ProjectId | None = None
+    page: Literal["", "projects", "people", "overview", "annotate", "run", "review", "download"] = ""  # static/js/router.js
+    object: Annotated[int, Field(ge=0, lt=2**63)] | None = None

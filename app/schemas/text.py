@@ -1,0 +1,45 @@
+"""Text that people give: bounded, without white space around it, and without what would be obeyed instead of shown."""
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, StringConstraints
+
+from r2c2r_core.texts import OBEYED
+
+LONGEST_FILE_NAME = 255  # bytes: what file systems take
+
+
+def readable(value: Any) -> Any:
+    """What was given; ValueError where it is text that cannot be shown (r2c2r_core/texts.py)."""
+    found = OBEYED.search(value) if isinstance(value, str) else None
+    if found is not None:
+        raise ValueError(f"it holds U+{ord(found.group()):04X}, which cannot be shown; write it without")
+    return value
+
+
+def one_line(value: Any) -> Any:
+    """Readable text with each run of white space as one space."""
+    return " ".join(readable(value).split()) if isinstance(value, str) else value
+
+
+def lines(value: Any) -> Any:
+    """Readable text without white space around it."""
+    return readable(value.replace("\r\n", "\n")).strip() if isinstance(value, str) else value
+
+
+def short_enough(text: str) -> str:
+    """The text itself; ValueError where no file can be called that."""
+    if len(text.encode()) > LONGEST_FILE_NAME:
+        raise ValueError(f"it is longer than {LONGEST_FILE_NAME} bytes; choose one of the object's candidates")
+    return text
+
+
+Word = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=60)]  # of an object, a category …
+Title = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=120)]  # of a project
+Remark = Annotated[str, BeforeValidator(one_line), StringConstraints(max_length=1000)]  # a reason, which may be none
+Prose = Annotated[str, BeforeValidator(lines), StringConstraints(min_length=1, max_length=2000)]  # of several lines
+FileName = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=300)]
+ServerPath = Annotated[str, BeforeValidator(readable), StringConstraints(min_length=1, max_length=4096)]
+Reference = Annotated[  # a candidate by its id, or a mesh that was uploaded
+    str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=LONGEST_FILE_NAME), AfterValidator(short_enough)
+]

@@ -1,0 +1,53 @@
+"""Who may see a project: everybody who may sign in, unless its owner or an admin named its members.
+
+Asked for every request and every message, so it is answered from memory; a server has its data folder to itself, and
+changes by the command line (`r2c2r user`) are noticed within a tidy.
+"""
+
+from sqlalchemy import Engine
+from sqlmodel import Session, col, select
+
+from app.db.engine import reading
+from app.db.tables import Account, Job, Project, ProjectMember
+from app.security import Person
+
+
+class Access:
+    """Projects that not everybody may see, and the names of those who may."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self.look_again()
+
+    def sees(self, person: Person, project_id: str | None) -> bool:
+        """Whether the project is there for the person; admins see all, and what is of no project is everybody's."""
+        names = self._closed.get(project_id or "")
+        return names is None or person.may("admin") or (person.account and person.name in names)
+
+    def sees_job(self, person: Person, job_id: int) -> bool:
+        """The same for a job's project."""
+        if not self._closed or person.may("admin"):
+            return True
+        with reading(self._engine) as session:
+            return self.sees(person, session.exec(select(Job.project_id).where(Job.id == job_id)).first())
+
+    def hidden(self, person: Person) -> frozenset[str]:
+        """The projects that the person may not see."""
+        return frozenset(project for project in self._closed if not self.sees(person, project))
+
+    def look_again(self) -> None:
+        """Members or accounts changed."""
+        with reading(self._engine) as session:
+            closed = session.exec(select(Project).where(col(Project.members_only).is_(True))).all()
+            self._closed = {project.id: frozenset(names(session, project)) for project in closed}
+
+
+def owner(session: Session, row: Project) -> str | None:
+    account = session.get(Account, row.owner_id) if row.owner_id is not None else None
+    return account.name if account else None
+
+
+def names(session: Session, row: Project) -> set[str]:
+    """The owner and the members, by name."""
+    query = select(Account.name).join(ProjectMember).where(ProjectMember.project_id == row.id)
+    return {*session.exec(query), *filter(None, [owner(session, row)])}

@@ -1,0 +1,211 @@
+"""A project's rows made anew from what its folder says: after its database was lost, or an older one was restored.
+
+Nothing that is stored is lost by it: objects are matched by name, and what changes about one that is there can be undone.
+"""
+
+import json
+import logging
+import re
+import secrets
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Engine
+from sqlmodel import Session, SQLModel, col, delete, select
+
+from app.db import history, keys
+from app.db.description import placed, read_description
+from app.db.engine import writing
+from app.db.keys import stored_entry
+from app.db.queries import clicks_of
+from app.db.tables import Bundle, Comment, Event, Job, Point, Project, SceneObject, Verdict
+from app.files import ProjectFiles, project_files
+from app.jobs.outcomes import adopt_capture, bundle_row
+from app.schemas.description import DescribedObject, DescribedPoint, Description
+from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.segment.prompts import parse_prompts
+
+_log = logging.getLogger(__name__)
+CHOSEN = {"name", "segmenter", "generator", "matcher", "review_state"}  # what people chose about a project
+_ID = re.compile(r"[0-9a-f]{12}")
+
+
+def adopt_all(engine: Engine, data_dir: Path, who: str) -> list[str]:
+    """Adopt every project folder that the database does not know, where it is; lines that say what became of each."""
+    said = []
+    for folder in sorted(path for path in (data_dir / "projects").glob("*") if path.is_dir()):
+        try:
+            with writing(engine) as session:
+                if session.get(Project, folder.name) is None:
+                    project = adopt(session, data_dir, described(folder), who)
+                    said.append(f"{folder.name}: adopted as {project.name}")
+        except R2C2RError as error:
+            said.append(f"{folder.name}: {error}")
+    return said
+
+
+def described(folder: Path) -> Description:
+    """What a folder says it is; InputError for one that is no project's."""
+    try:
+        return read_description(folder / "project.json")
+    except FileNotFoundError:
+        return _of_an_older_version(ProjectFiles(folder, folder / "work"))
+
+
+def adopt(session: Session, data_dir: Path, description: Description, who: str) -> Project:
+    """The project that the description tells of, its files already in their place; one that is stored gets what is missing."""
+    files = project_files(data_dir, description.id, description.project.get("work_path"))
+    project = session.get(Project, description.id)
+    known, now = project is not None, time.time()
+    row = placed(description.project, files.root, "source_path")
+    if project is None:
+        project = Project(**_fields(Project, {"status": "failed", "created": now, **row, "id": description.id, "updated": now}))
+        session.add(project)
+    project.review_state = "draft"  # what was approved is closed to changes until all of it is back
+    session.flush()
+    items = _adopt_objects(session, project, files, description, who, deleted_too=not known)
+    _adopt_comments(session, project, description, items)
+    _adopt_bundles(session, project, files, description)
+    if not known:
+        _read_again(session, project, files, who)
+    for name in CHOSEN & row.keys():
+        setattr(project, name, row[name])
+    project.updated = now
+    clicks = sum(len(entry.points) for entry in description.objects)
+    text = f"adopted from its folder: {len(items)} objects, {clicks} clicks"
+    session.add(Event(project_id=project.id, scope="project", action="adopt", text=text, who=who, at=now))
+    session.add(project)
+    return project
+
+
+def _adopt_objects(
+    session: Session, project: Project, files: ProjectFiles, description: Description, who: str, *, deleted_too: bool
+) -> dict[int | None, SceneObject]:
+    """The project's objects as described, by the number they had; deleted ones first, for their names may be others' since."""
+    stored = select(SceneObject).where(SceneObject.project_id == project.id, col(SceneObject.deleted).is_(False))
+    by_name = {item.name.casefold(): item for item in session.exec(stored)}
+    deleted = [entry for entry in description.objects if entry.deleted and deleted_too]
+    items = {}
+    for entry in (*deleted, *(entry for entry in description.objects if not entry.deleted)):
+        known = by_name.get(entry.name.casefold())
+        item = known or _new_object(session, project, entry)
+        for scope, write in _WRITERS.items():
+            changing = history.change(session, item, scope, "adopt", f"adopted {entry.name}", who=who)
+            with changing if known else nullcontext():  # an undo takes no object away that was only found again
+                write(session, item, entry, files)
+        session.flush()
+        keys.note_object(session, item, project.segmenter, clicks_of(session, item.id), history.override_data(session, item))
+        if entry.deleted:
+            with history.change(session, item, "prompts", "delete", f"deleted {entry.name}", who=who):
+                item.deleted = True
+                session.add(item)
+        items[entry.id] = item
+    keys.note_project(session, project)
+    return items
+
+
+def _write_prompts(session: Session, item: SceneObject, entry: DescribedObject, _files: ProjectFiles) -> None:
+    item.name, item.category, item.colour, item.deleted = entry.name, entry.category, entry.colour, False
+    session.add(item)
+    session.exec(delete(Point).where(col(Point.object_id) == item.id))
+    session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in entry.points)
+
+
+def _write_review(session: Session, item: SceneObject, entry: DescribedObject, files: ProjectFiles) -> None:
+    history.set_override(session, item, placed(entry.override, files.root, "candidate"))
+    session.exec(delete(Verdict).where(col(Verdict.object_id) == item.id))
+    session.add_all(Verdict(**{**_fields(Verdict, verdict), "object_id": item.id}) for verdict in entry.verdicts)
+
+
+_WRITERS: dict[history.Scope, Callable[[Session, SceneObject, DescribedObject, ProjectFiles], None]] = {
+    "prompts": _write_prompts,
+    "review": _write_review,
+}
+
+
+def _new_object(session: Session, project: Project, entry: DescribedObject) -> SceneObject:
+    """An object, under its old number where that is free: masks are kept by it."""
+    free = entry.id is not None and session.get(SceneObject, entry.id) is None
+    item = SceneObject(project_id=project.id, name=entry.name, category=entry.category, colour=entry.colour, deleted=True)
+    item.id = entry.id if free else None
+    session.add(item)
+    session.flush()
+    return item
+
+
+def _adopt_comments(session: Session, project: Project, description: Description, items: dict[int | None, SceneObject]) -> None:
+    stored = {(row.who, row.at) for row in session.exec(select(Comment).where(Comment.project_id == project.id))}
+    for entry in description.comments:
+        if (entry.get("who"), entry.get("at")) not in stored:
+            item = items.get(entry.get("object_id"))
+            session.add(
+                Comment(**{**_fields(Comment, entry), "project_id": project.id, "object_id": item.id if item else None})
+            )
+
+
+def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, description: Description) -> None:
+    """Rows for the finished bundles that are there and have none."""
+    stored = set(session.exec(select(Bundle.version).where(Bundle.project_id == project.id)))
+    told = {entry.get("path"): entry for entry in description.bundles}
+    for kept in files.bundles.glob("v*.zip"):
+        number = kept.stem[1:]
+        if number.isdecimal() and int(number) not in stored:
+            row = bundle_row(project, kept, int(number))
+            row.sqlmodel_update({key: told[kept.name][key] for key in ("created", "inputs") if key in told.get(kept.name, {})})
+            session.add(row)
+
+
+def _read_again(session: Session, project: Project, files: ProjectFiles, who: str) -> None:
+    """The recording's facts as they were read, else a job that reads it, else why the project shows none."""
+    if files.facts.is_file() and files.frames.is_file():
+        adopt_capture(project, files)
+    elif project.source_path and Path(project.source_path).exists():
+        project.status, project.error = "importing", None
+        session.add(Job(project_id=project.id, kind="import", state="queued", who=who, created=time.time(), message="waiting"))
+    else:
+        project.status = "failed"
+        project.error = {"kind": "capture", "message": "its recording is not there", "hint": "import it anew"}
+
+
+def _of_an_older_version(files: ProjectFiles) -> Description:
+    """What can be told of a folder without a project.json: the recording's facts, and the clicks of its last run."""
+    found, sources = _json(files.facts), sorted(files.source.glob("*"))
+    if not found and not sources:
+        raise InputError(f"{files.root}: neither project.json nor a recording in it", hint="take out of it what you need")
+    source = str(found.get("source") or (sources[0] if sources else ""))
+    overrides = _json(files.work / "overrides.json").get("objects", {})
+    prompts = _json(files.work / "prompts.json") or _json(files.finished_prompts)
+    named = _ID.match(files.root.name)
+    return Description(
+        id=named.group() if named else secrets.token_hex(6),
+        changed=files.root.stat().st_mtime,
+        project={"name": Path(source).stem or "Recovered", "source_name": Path(source).name, "source_path": source},
+        objects=[
+            DescribedObject(
+                id=None,
+                name=prompt.name,
+                category=prompt.category,
+                colour=colour,
+                points=[DescribedPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in prompt.points],
+                override=stored_entry(overrides.get(prompt.name, {})),
+            )
+            for colour, prompt in enumerate(parse_prompts(prompts).objects if prompts else ())
+        ],
+    )
+
+
+def _json(path: Path) -> dict[str, Any]:
+    """A JSON table that our own workers wrote; empty where there is none."""
+    try:
+        found = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _fields(table: type[SQLModel], row: dict[str, Any]) -> dict[str, Any]:
+    """What of a described row this version's table has."""
+    return {name: value for name, value in row.items() if name in table.model_fields}

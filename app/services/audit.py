@@ -1,0 +1,45 @@
+"""The record of who was let in, who was refused, and who changed whose account; admins read it on the page People."""
+
+import contextlib
+import time
+
+from sqlalchemy import Engine
+from sqlmodel import Session, col, delete, func, select
+
+from app import schemas
+from app.db.engine import reading, writing
+from app.db.tables import Account, AuditEntry
+from r2c2r_core.errors import R2C2RError
+
+COMMAND_LINE = "the command line"  # of the machine that serves
+MOST_REFUSALS = 5000  # kept: whoever guesses for a month fills no disk
+REFUSED: schemas.AuditAction = "refused"
+
+
+def note(session: Session, action: schemas.AuditAction, *, account: str, who: str, client: str = "", detail: str = "") -> None:
+    """One line of the record, in the transaction of what it is about; `account` is whose, `who` did it."""
+    session.add(AuditEntry(at=time.time(), action=action, account=account, who=who, client=client, detail=detail))
+
+
+def note_refusal(engine: Engine, name: str, client: str, detail: str) -> None:
+    """A sign-in that was refused; a name that no account has is not stored, for people type passwords there."""
+    with contextlib.suppress(R2C2RError), writing(engine) as session:  # a full disk lets nobody in, and refuses as before
+        known = session.exec(select(Account.name).where(Account.name == name.lower())).first() or ""
+        note(session, REFUSED, account=known, who="", client=client, detail=detail)
+        session.flush()
+        newest = select(AuditEntry.id).where(AuditEntry.action == REFUSED).order_by(col(AuditEntry.id).desc())
+        oldest_kept = session.exec(newest.offset(MOST_REFUSALS - 1).limit(1)).first()
+        if oldest_kept is not None:
+            older = (col(AuditEntry.action) == REFUSED, col(AuditEntry.id) < oldest_kept)
+            session.exec(delete(AuditEntry).where(*older))
+
+
+def entries(engine: Engine, before: int | None, limit: int) -> schemas.AuditPage:
+    """The newest lines before one."""
+    with reading(engine) as session:
+        query = select(AuditEntry).order_by(col(AuditEntry.id).desc()).limit(limit)
+        if before is not None:
+            query = query.where(col(AuditEntry.id) < before)
+        rows = session.exec(query).all()
+        total = session.exec(select(func.count()).select_from(AuditEntry)).one()
+    return schemas.AuditPage(entries=[schemas.AuditEntry.model_validate(row.model_dump()) for row in rows], total=total)

@@ -1,0 +1,118 @@
+"""Each project's folder says what it is: `project.json` is written anew after what a person changed was committed.
+
+A thread of its own writes, at most every PAUSE_S and for at most a SHARE of the time: clicks come faster than that, and a large
+project's file takes longer to write than a small one's. What a crash leaves behind is made good at the next start.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+from sqlalchemy import Engine
+from sqlmodel import select
+
+from app.db.description import changed, describe, read_description, written
+from app.db.engine import reading
+from app.db.tables import Project
+from app.files import ProjectFiles, free_name, project_files
+from app.settings import Settings
+from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.workspace import write_atomically
+
+_log = logging.getLogger(__name__)
+
+PAUSE_S = 2.0
+SHARE = 0.05
+
+
+class Descriptions:
+    """Keeps the files up to date. `note` may be called from any thread and does not wait."""
+
+    def __init__(self, engine: Engine, settings: Settings) -> None:
+        self._engine, self._settings = engine, settings
+        self._waiting: set[str] = set()
+        self._changed = threading.Condition()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="descriptions", daemon=True)
+        engine.update_execution_options(projects_changed=self.note)
+
+    def start(self) -> None:
+        """Describe what was changed since it was last described, then what changes from now on."""
+        self._thread.start()
+
+    def note(self, projects: Iterable[str]) -> None:
+        """These were changed, and the change is committed."""
+        with self._changed:
+            self._waiting.update(projects)
+            self._changed.notify()
+
+    def stop(self) -> None:
+        """Write what waits, and end."""
+        self._stopping.set()
+        self.note(())
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        self._each(self._catch_up, self._all())
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._stopping.is_set())
+                found, self._waiting = self._waiting, set()
+            began = time.monotonic()
+            self._each(self._write, found)
+            if not found:  # nothing waits any more, and it stops
+                return
+            self._stopping.wait(max(PAUSE_S, (time.monotonic() - began) / SHARE))
+
+    def _each(self, do: Callable[[str], None], projects: Iterable[str]) -> None:
+        for project_id in projects:
+            try:
+                do(project_id)
+            except (R2C2RError, OSError):  # a full disk; the next change or start tries again
+                _log.exception("project.json of %s", project_id)
+
+    def _all(self) -> list[str]:
+        try:
+            with reading(self._engine) as session:
+                return list(session.exec(select(Project.id)))
+        except R2C2RError:
+            _log.exception("project.json")
+            return []
+
+    def _catch_up(self, project_id: str) -> None:
+        """Write the file where it is older than the rows; a newer one tells of a restored database, and is set aside."""
+        files = project_files(self._settings.data_dir, project_id)
+        with reading(self._engine) as session:
+            row = session.get(Project, project_id)
+            now = changed(session, row) if row else 0.0
+        then = _described(files)
+        if then is not None and then > now:
+            kept = free_name(self._settings.unknown, f"{project_id}-newer")
+            kept.mkdir(parents=True)
+            files.description.replace(kept / files.description.name)
+            _log.warning(
+                "%s: its project.json is newer than the database; moved to %s, where an admin can adopt it", project_id, kept
+            )
+        if then is None or then != now:
+            self._write(project_id)
+
+    def _write(self, project_id: str) -> None:
+        """Describe the project as it is now, where it has a folder."""
+        with reading(self._engine) as session:
+            row = session.get(Project, project_id)
+            if row is None:
+                return
+            files = project_files(self._settings.data_dir, project_id, row.work_path)
+            description = describe(session, row, files)
+        if files.root.is_dir():
+            write_atomically(files.description, written(description))
+
+
+def _described(files: ProjectFiles) -> float | None:
+    """When what project.json says was last changed; None where it says nothing that can be read."""
+    try:
+        return read_description(files.description).changed
+    except (FileNotFoundError, InputError):
+        return None

@@ -1,0 +1,61 @@
+"""Members of a project: who they are, and naming them."""
+
+import time
+
+from sqlmodel import Session, col, delete, select
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading, writing
+from app.db.tables import Account, Event, Project, ProjectMember
+from app.errors import Forbidden
+from app.services import access, projects
+from app.services.context import Context
+from r2c2r_core.errors import InputError
+
+
+def members(context: Context, project_id: str) -> schemas.ProjectMembers:
+    """Who may see the project."""
+    with reading(context.engine) as session:
+        row = queries.project_row(session, project_id)
+        owner, may_change = access.owner(session, row), _may_change(context, session, row)
+        everybody = session.exec(select(Account.name).order_by(col(Account.name))).all() if may_change else []
+        return schemas.ProjectMembers(
+            members_only=row.members_only,
+            owner=owner,
+            members=sorted(access.names(session, row) - {owner}),
+            may_change=may_change,
+            accounts=[name for name in everybody if name != owner],
+        )
+
+
+def set_members(context: Context, project_id: str, body: schemas.MembersIn) -> schemas.ProjectMembers:
+    """Open the project to everybody, or to these alone; by its owner or an admin."""
+    with writing(context.engine) as session:
+        row = queries.project_row(session, project_id)
+        if not _may_change(context, session, row):
+            raise Forbidden("only the project's owner or an admin names its members", hint="ask one of them")
+        accounts = session.exec(select(Account).where(col(Account.name).in_({name.lower() for name in body.members}))).all()
+        unknown = {name.lower() for name in body.members} - {account.name for account in accounts}
+        if unknown:
+            raise InputError(f"there is no account {sorted(unknown)[0]}", hint="choose names of the page People")
+        session.exec(delete(ProjectMember).where(col(ProjectMember.project_id) == project_id))
+        session.add_all(ProjectMember(project_id=project_id, account_id=account.id or 0) for account in accounts)
+        names = ", ".join(sorted(account.name for account in accounts))
+        text = f"only its owner and {names or 'admins'} see it" if body.members_only else "everybody sees it"
+        event = Event(project_id=project_id, scope="project", action="members", text=text, who=context.who, at=time.time())
+        row.members_only, row.updated = body.members_only, event.at
+        session.add_all([row, event])
+    context.access.look_again()
+    context.viewer.close(project_id, lambda session: not _sees(context, session, project_id))
+    projects.tell(context, project_id)
+    return members(context, project_id)
+
+
+def _sees(context: Context, session_id: str, project_id: str) -> bool:
+    person = context.people.look_up(session_id)
+    return person is not None and context.access.sees(person, project_id)
+
+
+def _may_change(context: Context, session: Session, row: Project) -> bool:
+    return context.person.may("admin") or (context.person.account and access.owner(session, row) == context.who)

@@ -1,0 +1,62 @@
+"""What one person may take of the server at a time. Admins may take more: they could raise the quotas as well."""
+
+from sqlalchemy import func
+from sqlmodel import Session, col, select
+
+from app.db.queries import ACTIVE
+from app.db.tables import Account, Job, Project, Upload
+from app.errors import Conflict, TooMany
+from app.services.context import Context
+
+SAMPLE = "sample"  # what the column source_name holds of a synthetic kitchen
+RAISE = "an admin can raise it: r2c2r serve --quota"
+
+
+def check_job(context: Context, session: Session) -> None:
+    """Raise TooMany when as many of the person's jobs wait or run as may."""
+    most = context.settings.quotas.jobs
+    if _free(context):
+        return
+    mine = select(func.count()).select_from(Job).where(Job.who == context.who, col(Job.state).in_(ACTIVE))
+    found = session.exec(mine).one()
+    if found >= most:
+        raise TooMany(
+            f"{found} of your jobs wait or run, at most {most} may", hint=f"wait for one, or cancel one; {RAISE} jobs=N"
+        )
+
+
+def check_upload(context: Context, session: Session, size: int) -> None:
+    """Raise TooMany when so many uploads, or bytes of them, are under way already."""
+    quotas = context.settings.quotas
+    if _free(context):
+        return
+    mine = select(func.count(), func.coalesce(func.sum(Upload.size), 0)).where(Upload.who == context.who)
+    found, announced = session.exec(mine).one()
+    stop = "finish or cancel one of your uploads"
+    if found >= quotas.uploads:
+        raise TooMany(
+            f"{found} of your uploads are under way, at most {quotas.uploads} may be", hint=f"{stop}; {RAISE} uploads=N"
+        )
+    if announced + size > quotas.upload_gb * 2**30:
+        said = f"your uploads would be {(announced + size) / 2**30:.1f} GB, at most {quotas.upload_gb} may be under way"
+        raise TooMany(said, hint=f"{stop}; {RAISE} upload_gb=N")
+
+
+def check_project(context: Context, session: Session, *, sample: bool = False) -> None:
+    """Raise Conflict when the person has as many projects, or samples, as may be."""
+    quotas = context.settings.quotas
+    if _free(context):
+        return
+    mine = select(func.count()).where(col(Project.owner_id).in_(select(Account.id).where(Account.name == context.who)))
+    _refuse_beyond("projects", quotas.projects, session.exec(mine).one())
+    if sample:
+        _refuse_beyond("samples", quotas.samples, session.exec(mine.where(Project.source_name == SAMPLE)).one())
+
+
+def _refuse_beyond(name: str, most: int, found: int) -> None:
+    if found >= most:
+        raise Conflict(f"you have {found} {name}, at most {most} may be", hint=f"ask an admin to delete one; {RAISE} {name}=N")
+
+
+def _free(context: Context) -> bool:
+    return context.person.may("admin")

@@ -1,0 +1,107 @@
+"""What was set aside, for an admin: what is in it, adopting it, leaving it."""
+
+import shutil
+from pathlib import Path
+
+from app import schemas
+from app.db.engine import reading, writing
+from app.db.tables import Project
+from app.errors import Conflict, NotFound
+from app.files import ProjectFiles, delete_folder, folder_bytes, project_files
+from app.schemas.description import Description
+from app.services import adopting, projects
+from app.services.context import Context
+from r2c2r_core.errors import InputError
+
+LEFT = "left"  # a mark in the folder
+
+
+def everything(context: Context) -> list[schemas.UnknownFolder]:
+    """All that was set aside, by name."""
+    return [_shape(context, path) for path in sorted(context.settings.unknown.glob("*"))]
+
+
+def adopt(context: Context, entry: str) -> schemas.Project:
+    """Make it a project again, or give the project that is there what it says beyond the database."""
+    folder = _found(context, entry)
+    if not folder.is_dir():
+        raise InputError(f"{entry} is no project's folder", hint="import it by its path if it is a recording")
+    description = adopting.described(folder)
+    files = project_files(context.settings.data_dir, description.id)
+    only_said = _only_said(folder)
+    if not only_said and files.root.exists():
+        raise Conflict(f"{files.root} is there already", hint="move one of the two away first")
+    if not only_said:
+        files.root.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(folder, files.root)
+    try:
+        with writing(context.engine) as session:
+            adopting.adopt(session, context.settings.data_dir, description, context.who)
+    except BaseException:
+        if not only_said:
+            shutil.move(files.root, folder)
+        raise
+    if only_said:
+        delete_folder(folder)  # all it said is in the database
+    (files.root / LEFT).unlink(missing_ok=True)
+    project = projects.get_project(context, description.id)
+    if project.job is not None:  # its recording is read again
+        context.runner.queued(project.job.id)
+    projects.tell(context, project.id)
+    return project
+
+
+def leave(context: Context, entry: str) -> schemas.UnknownFolder:
+    """Decide that it stays where it is."""
+    folder = _found(context, entry)
+    if folder.is_dir():
+        (folder / LEFT).touch()
+    return _shape(context, folder)
+
+
+def _found(context: Context, entry: str) -> Path:
+    for path in context.settings.unknown.glob("*"):
+        if path.name == entry:
+            return path
+    raise NotFound(f"nothing called {entry!r} was set aside", hint="look at the list again")
+
+
+def _only_said(folder: Path) -> bool:
+    """Whether it holds a project.json and nothing else of the project."""
+    return {path.name for path in folder.iterdir()} - {LEFT} == {"project.json"}
+
+
+def _shape(context: Context, path: Path) -> schemas.UnknownFolder:
+    files, why_not = ProjectFiles(path, path / "work"), ""
+    description: Description | None = None
+    try:
+        if not path.is_dir():
+            raise InputError("bytes of an upload that the database does not know")
+        description = adopting.described(path)
+        why_not = _why_not(context, path, description)
+    except InputError as error:
+        why_not = str(error)
+    live = [entry for entry in description.objects if not entry.deleted] if description else []
+    return schemas.UnknownFolder(
+        entry=path.name,
+        kind="other" if description is None else "newer" if _only_said(path) else "project",
+        name=str(description.project["name"]) if description else path.name,
+        path=str(path),
+        size_bytes=folder_bytes(path) if path.is_dir() else path.stat().st_size,
+        changed=description.changed if description else None,
+        objects=len(live),
+        clicks=sum(len(entry.points) for entry in live),
+        bundles=len(list(files.bundles.glob("v*.zip"))),
+        recording=any(files.source.glob("*")),
+        why_not=why_not,
+        left=(path / LEFT).exists(),
+    )
+
+
+def _why_not(context: Context, path: Path, description: Description) -> str:
+    with reading(context.engine) as session:
+        known = session.get(Project, description.id) is not None
+    root = project_files(context.settings.data_dir, description.id).root
+    if _only_said(path):
+        return "" if known else "its project is not there; adopt the project's folder first"
+    return f"{root} is there already; move one of the two away" if root.exists() else ""
