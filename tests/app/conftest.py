@@ -12,11 +12,12 @@ from typing import Any
 
 import pytest
 from fastapi import FastAPI
-from sqlalchemy import Engine, event
+from sqlalchemy import URL, Connection, Engine, event
 from starlette.testclient import TestClient
 
 from app.jobs.plans import Commands
 from app.main import create_app
+from app.services import launch_keys
 from app.services.context import Context
 from app.settings import Settings
 from app.viewer.client import Viewer
@@ -24,6 +25,7 @@ from app.viewer.client import Viewer
 FAKES = Path(__file__).parent / "fakes"
 ORIGIN = "http://127.0.0.1:8000"
 SOCKETS = "ws://127.0.0.1:8000"
+COOKIE = "r2c2r_session_8000"
 
 
 def fake(name: str, *options: str) -> tuple[str, ...]:
@@ -52,6 +54,10 @@ class Running:
     def context(self) -> Context:
         context: Context = self.app.state.context
         return context
+
+    def printed(self) -> str:
+        """Another printed address, without its host."""
+        return f"/?token={launch_keys.new(self.context.engine)}"
 
     def get(self, path: str, status: int = 200, **options: Any) -> Any:
         return self._checked(self.client.get(path, **options), status)
@@ -107,23 +113,21 @@ def running(
     settings = Settings(data_dir=data_dir, **{**given, **options})
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
-        blocked = blocked_by_the_database(app.state.context.engine)
         client.get(f"/?token={settings.launch_token}")
         yield Running(app, client, settings)
+        blocked = [stack for database, stack in ASKED_ON_THE_LOOP if database == app.state.context.engine.url]
         assert blocked == [], "everybody waited for the database"
 
 
-def blocked_by_the_database(engine: Engine) -> list[str]:
-    """What asked the database on the thread of the event loop, where everybody waits for the answer."""
-    found: list[str] = []
+ASKED_ON_THE_LOOP: list[tuple[URL, str]] = []
+"""The database, and what asked it on the thread of an event loop, where everybody waits for the answer."""
 
-    def note(_: object) -> None:
-        with suppress(RuntimeError):  # no loop runs on this thread, as it should be
-            asyncio.get_running_loop()
-            found.append("".join(traceback.format_stack(limit=12)))
 
-    event.listen(engine, "begin", note)
-    return found
+@event.listens_for(Engine, "begin")  # of the class: an engine that threads use already takes no further listener
+def _note_where_asked(connection: Connection) -> None:
+    with suppress(RuntimeError):  # no loop runs on this thread, as it should be
+        asyncio.get_running_loop()
+        ASKED_ON_THE_LOOP.append((connection.engine.url, "".join(traceback.format_stack(limit=12))))
 
 
 @pytest.fixture

@@ -139,7 +139,7 @@ def placement(name: str) -> Placement:
 
 
 def scene(name: str) -> ArticulatedScene:
-    box = Box(name="front", size_m=np.array([0.5, 0.02, 0.2]), link_from_box=Rigid3())
+    box = Box(name="front", role="front", size_m=np.array([0.5, 0.02, 0.2]), link_from_box=Rigid3())
     inertial = Inertial(mass_kg=1.0, com_link=np.zeros(3), inertia=np.eye(3))
     links = tuple(
         Link(

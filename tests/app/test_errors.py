@@ -108,11 +108,22 @@ def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pyte
 
 
 @pytest.mark.parametrize(
-    ("said", "status", "kind"), [("database is locked", 503, "unavailable"), ("database or disk is full", 507, "no-space")]
+    ("said", "code", "status", "kind"),
+    [
+        ("database is locked", sqlite3.SQLITE_BUSY, 503, "unavailable"),
+        ("database or disk is full", sqlite3.SQLITE_FULL, 507, "no-space"),
+        ("database disk image is malformed", sqlite3.SQLITE_CORRUPT, 503, "database"),
+        ("disk I/O error", sqlite3.SQLITE_IOERR_READ, 503, "database"),
+    ],
 )
-def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(web: Running, said: str, status: int, kind: str) -> None:
+def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(
+    web: Running, said: str, code: int, status: int, kind: str
+) -> None:
+    found = sqlite3.OperationalError(said)
+    found.sqlite_errorcode = code
+
     def refuse(_: object) -> None:
-        raise OperationalError("BEGIN", None, sqlite3.OperationalError(said))
+        raise OperationalError("BEGIN", None, found)
 
     engine, marked = web.context.engine, {"Idempotency-Key": "k"}
     event.listen(engine, "begin", refuse)

@@ -1,24 +1,49 @@
 import asyncio
+import json
+from typing import Any
 
-from app.hub import QUEUE_LIMIT, Hub, Listener
+import pytest
+
+from app import hub as hubs
+from app.hub import Hub, Listener
 
 
-def test_a_listener_gets_what_it_missed_while_it_is_remembered() -> None:
+@pytest.fixture(autouse=True)
+def presence_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hubs, "PRESENCE_S", 0.0)
+
+
+def test_a_listener_gets_what_it_missed_while_it_is_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene() -> None:
-        hub = Hub(keep=3)
-        first, _ = hub.join("p", None, None)
+        hub = Hub()
+        first = hub.join("p", None, None)
         for number in range(5):
             hub.publish("object", "p", number=number)
         await asyncio.sleep(0)
-        assert [first.queue.get_nowait()["seq"] for _ in range(5)] == [1, 2, 3, 4, 5]
-        second, must_fetch = hub.join("p", 2, hub.epoch)
-        assert ([second.queue.get_nowait()["seq"] for _ in range(3)], must_fetch) == ([3, 4, 5], False)
-        _, must_fetch = hub.join("p", 1, hub.epoch)
-        assert must_fetch  # message 2 is forgotten
-        _, must_fetch = hub.join("p", 5, "another epoch")
-        assert must_fetch
-        _, must_fetch = hub.join("p", 0, "")
-        assert not must_fetch
+        (size,) = {len(text) for text in list(first.queue._queue)[1:]}  # type: ignore[attr-defined]
+        assert [each["seq"] for each in told(first, "object")] == [1, 2, 3, 4, 5]
+        monkeypatch.setattr(hubs, "KEPT_BYTES", 3 * size + 1)
+        hub.publish("object", "p", number=5)
+        second = hub.join("p", 3, hub.epoch)
+        assert [(each["seq"], each.get("reset")) for each in told(second, "hello", "object")] == [
+            (6, False), (4, None), (5, None), (6, None),
+        ]  # fmt: skip
+        assert resets(hub, 2)  # message 3 is forgotten
+        assert resets(hub, 5, "another epoch")
+        assert not resets(hub, 0, "")
+
+    asyncio.run(scene())
+
+
+def test_what_is_remembered_is_bounded_by_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hubs, "KEPT_BYTES", 10_000)
+
+    async def scene() -> None:
+        hub = Hub()
+        for size in (10, 9_000, 5_000, 20_000, 10, 3_000):
+            hub.publish("mask", "p", bits="x" * size)
+            assert sum(len(message.text) for message in hub._recent) <= 10_000
+        assert [len(json.loads(message.text)["bits"]) for message in hub._recent] == [10, 3_000]
 
     asyncio.run(scene())
 
@@ -26,11 +51,11 @@ def test_a_listener_gets_what_it_missed_while_it_is_remembered() -> None:
 def test_a_tab_hears_of_its_own_project_and_of_every_job() -> None:
     async def scene() -> None:
         hub = Hub()
-        listener, _ = hub.join("mine", None, None)
+        listener = hub.join("mine", None, None)
         for kind, project in (("mask", "other"), ("mask", "mine"), ("job", "other"), ("projects", None)):
             hub.publish(kind, project)
         await asyncio.sleep(0)
-        assert [listener.queue.get_nowait()["type"] for _ in range(listener.queue.qsize())] == ["mask", "job", "projects"]
+        assert [each["type"] for each in told(listener)] == ["hello", "mask", "job", "projects"]
         hub.leave(listener)
         hub.publish("job", "mine")
         await asyncio.sleep(0)
@@ -39,16 +64,49 @@ def test_a_tab_hears_of_its_own_project_and_of_every_job() -> None:
     asyncio.run(scene())
 
 
-def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew() -> None:
+def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hubs, "WAITING_BYTES", 1_000)
+
     async def scene() -> None:
         hub = Hub()
-        listener, _ = hub.join(None, None, None)
-        for _ in range(QUEUE_LIMIT + 1):
-            hub.publish("job", None)
+        listener = hub.join(None, None, None)
+        for _ in range(3):
+            hub.publish("job", None, text="x" * 300)
         await asyncio.sleep(0)
-        message = listener.queue.get_nowait()
-        assert (message["type"], message["reset"], message["seq"]) == ("hello", True, QUEUE_LIMIT + 1)
-        assert listener.queue.empty()
+        (message,) = told(listener)
+        assert (message["type"], message["reset"], message["seq"]) == ("hello", True, 3)
+        hub.publish("job", None, text="x" * 300)
+        await asyncio.sleep(0)
+        assert json.loads(await listener.next())["seq"] == 4
+
+    asyncio.run(scene())
+
+
+def test_what_was_taken_makes_room_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hubs, "WAITING_BYTES", 1_000)
+
+    async def scene() -> None:
+        hub = Hub()
+        listener = hub.join(None, None, None)
+        await listener.next()
+        for number in range(20):
+            hub.publish("job", None, text="x" * 300)
+            assert json.loads(await listener.next())["seq"] == number + 1
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("text", ["\ud800", "é\U0001f600\x00", "\u2028</script>"])
+def test_no_text_is_beyond_the_wire(text: str) -> None:
+    async def scene() -> None:
+        hub = Hub()
+        listener = hub.join("p", None, None)
+        hub.publish("comments", "p", text=text)
+        hub.tell(listener, "refused", message=text)
+        await asyncio.sleep(0)
+        raw = [listener.queue.get_nowait() for _ in range(3)]
+        assert all(each.encode("ascii") for each in raw)
+        assert [json.loads(raw[1])["text"], json.loads(raw[2])["message"]] == [text, text]
 
     asyncio.run(scene())
 
@@ -56,27 +114,47 @@ def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew() -> None:
 def test_everybody_at_a_project_knows_who_else_is_there_and_on_what() -> None:
     async def scene() -> None:
         hub = Hub()
-        ann, _ = hub.join("kitchen", None, None, "ann")
-        bob, _ = hub.join(None, None, None, "bob")
+        ann = hub.join("kitchen", None, None, "ann")
+        bob = hub.join(None, None, None, "bob")
         hub.move(bob, "kitchen", "annotate", 7)
-        await asyncio.sleep(0)
         both = {("ann", "", None), ("bob", "annotate", 7)}
-        assert _told(ann) == both
-        assert _told(bob) == both
+        assert await here(ann) == both
+        assert await here(bob) == both
         hub.leave(bob)
-        await asyncio.sleep(0)
-        assert _told(ann) == {("ann", "", None)}
+        assert await here(ann) == {("ann", "", None)}
         hub.publish("object", "kitchen")
-        again, _ = hub.join("kitchen", 0, hub.epoch, "eve")
-        await asyncio.sleep(0)
-        kinds = [again.queue.get_nowait()["type"] for _ in range(again.queue.qsize())]
-        assert kinds == ["object", "presence"]  # of presence only what is now
+        again = hub.join("kitchen", 0, hub.epoch, "eve")
+        await here(ann)
+        assert [each["type"] for each in told(again)] == ["hello", "object", "presence"]  # of presence only what is now
 
     asyncio.run(scene())
 
 
-def _told(listener: Listener) -> set[tuple[str, str, int | None]]:
-    """Who is here by the last message."""
-    messages = [listener.queue.get_nowait() for _ in range(listener.queue.qsize())]
-    assert messages[-1]["type"] == "presence"
-    return {(each["who"], each["page"], each["object"]) for each in messages[-1]["people"]}
+def test_many_tabs_that_come_at_once_are_told_once_who_is_here() -> None:
+    async def scene() -> None:
+        hub = Hub()
+        tabs = [hub.join("kitchen", None, None, f"p{number}") for number in range(300)]
+        for tab in tabs:
+            hub.move(tab, "kitchen", "annotate", 1)
+        assert len(await here(tabs[0])) == 300
+        assert {tab.queue.qsize() for tab in tabs[1:]} == {2}  # hello, presence
+
+    asyncio.run(scene())
+
+
+def told(listener: Listener, *types: str) -> list[dict[str, Any]]:
+    """The messages that wait for a tab, of these types or all."""
+    found = [json.loads(listener.queue.get_nowait()) for _ in range(listener.queue.qsize())]
+    return [each for each in found if not types or each["type"] in types]
+
+
+def resets(hub: Hub, since: int, epoch: str | None = None) -> bool:
+    return bool(told(hub.join("p", since, hub.epoch if epoch is None else epoch), "hello")[0]["reset"])
+
+
+async def here(listener: Listener) -> set[tuple[str, str, int | None]]:
+    """Who is here by the next message that says so."""
+    while True:
+        message = json.loads(await listener.next())
+        if message["type"] == "presence":
+            return {(each["who"], each["page"], each["object"]) for each in message["people"]}

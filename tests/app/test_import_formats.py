@@ -22,9 +22,10 @@ def test_the_import_job_reads_a_zip_of_any_format(kind: str, tmp_path: Path) -> 
     zipped = zip_folder(WRITERS[kind](tmp_path / "made", ROOM), tmp_path / "scan.zip", top="from my phone/scan/")
     work, folder = tmp_path / "work", tmp_path / "project"
     work.mkdir()
-    (work / "prompts.json").write_text(json.dumps({"version": 1, "objects": []}))
-    (work / "request.json").write_text(json.dumps({"source": str(zipped)}))
-    ingest(work, folder, SILENT)
+    (tmp_path / "prompts.json").write_text(json.dumps({"version": 1, "objects": []}))
+    request = tmp_path / "request.json"
+    request.write_text(json.dumps({"source": str(zipped)}))
+    ingest(work, folder, request, SILENT)
     facts = json.loads((folder / "facts.json").read_text())["facts"]
     assert (facts["frame_count"], facts["width"], facts["height"]) == (4, *ROOM.rgb_size)
     assert len(json.loads((folder / "frames.json").read_text())) == 4

@@ -31,6 +31,11 @@ def run(web: Running, project: str) -> int:
     return int(web.post(f"/api/projects/{project}/run", {}, 202)["id"])
 
 
+def request_of(web: Running, project: str, job: int) -> Path:
+    """The folder of what the job was given."""
+    return web.settings.data_dir / "projects" / project / "requests" / str(job)
+
+
 def test_a_run_goes_through_every_stage_in_a_process_each_and_keeps_its_bundle(web: Running) -> None:
     project = web.sample()
     job = web.job(run(web, project), "done")
@@ -56,16 +61,26 @@ def test_a_change_makes_the_result_stale_and_the_next_run_a_new_version(web: Run
     assert [(b["version"], b["current"]) for b in web.get(f"/api/projects/{project}/bundles")] == [(2, True), (1, False)]
 
 
+def test_a_bundle_that_a_restored_database_does_not_know_is_not_written_over(web: Running) -> None:
+    project = web.sample()
+    unknown = web.settings.data_dir / "projects" / project / "bundles" / "v1.zip"
+    unknown.parent.mkdir(parents=True)
+    unknown.write_bytes(b"made after the database was copied")
+    web.job(run(web, project), "done")
+    assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [2]
+    assert unknown.read_bytes() == b"made after the database was copied"
+
+
 def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
-    work = web.settings.data_dir / "projects" / project / "work"
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     web.patch(f"/api/projects/{project}/objects/{number}/override", {"hinge": "left", "joint_upper": 1.0, "joint_lower": 0.0})
     web.until(lambda: web.get(f"/api/jobs?project={project}")[0]["state"] == "done")
-    overrides = json.loads((work / "overrides.json").read_text())
+    given = request_of(web, project, web.get(f"/api/jobs?project={project}")[0]["id"])
+    overrides = json.loads((given / "overrides.json").read_text())
     assert overrides["objects"] == {"drawer_1": {"hinge": "left", "joint_limits": [0.0, 1.0]}}
-    assert [o["name"] for o in json.loads((work / "prompts.json").read_text())["objects"]] == ["drawer_1", "mug_1"]
+    assert [o["name"] for o in json.loads((given / "prompts.json").read_text())["objects"]] == ["drawer_1", "mug_1"]
 
 
 def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(web: Running) -> None:
@@ -147,6 +162,43 @@ def test_one_heavy_job_at_a_time_and_the_others_know_their_place(web: Running) -
     assert web.post(f"/api/jobs/{jobs[1]}/cancel")["state"] == "cancelled"
     web.post(f"/api/jobs/{jobs[0]}/cancel")
     assert web.job(jobs[2], "done")["state"] == "done"
+
+
+def test_a_project_has_one_job_at_a_time_and_what_it_was_given_stays(start: Callable[..., Any]) -> None:
+    with start(heavy_jobs=2) as web:
+        project, other = web.sample(), web.sample()
+        folder = behave(web, project, segment="hang")
+        first = run(web, project)
+        web.until(lambda: (folder / "hanging").exists())
+        given = (request_of(web, project, first) / "prompts.json").read_bytes()
+        number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+        web.patch(f"/api/projects/{project}/objects/{number}", {"category": "oven"})
+        second = run(web, project)
+        assert second != first
+        web.job(run(web, other), "done")  # the second seat takes another project's
+        assert web.get(f"/api/jobs/{second}")["state"] == "queued"
+        assert (request_of(web, project, first) / "prompts.json").read_bytes() == given
+        (folder / "behave.json").unlink()
+        web.post(f"/api/jobs/{first}/cancel")
+        web.job(second, "done")
+        assert "oven" in (request_of(web, project, second) / "prompts.json").read_text()
+        assert [b["current"] for b in web.get(f"/api/projects/{project}/bundles")] == [True]
+
+
+def test_a_run_that_is_taken_up_again_keeps_its_clicks(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        folder = behave(web, project, generate="hang")
+        job = run(web, project)
+        web.until(lambda: (folder / "hanging").exists())
+        given = (request_of(web, project, job) / "prompts.json").read_bytes()
+        number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+        web.patch(f"/api/projects/{project}/objects/{number}", {"category": "oven"})
+    (folder / "behave.json").unlink()
+    with start() as web:
+        web.job(job, "done")
+        assert (request_of(web, project, job) / "prompts.json").read_bytes() == given
+        assert web.get(f"/api/projects/{project}")["result"] == "stale"
 
 
 def test_asking_twice_for_the_same_run_is_asking_once(web: Running) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from starlette.websockets import WebSocketDisconnect
 
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
@@ -53,7 +54,7 @@ def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: C
             until(socket, type="object")
     with start() as web:  # kept on disk
         (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == made["id"]]
-        assert ([f["frame"] for f in lane["frames"]], lane["complete"], lane["source"]) == ([0, 3, 7], True, "live")
+        assert (lane["frames"], lane["complete"], lane["source"]) == ([0, 3, 7], True, "live")
         (shown,) = [m for m in web.get(f"/api/projects/{project}/masks/7") if m["object"] == made["id"]]
         assert shown["mask"] == masks[2]["mask"]
 
@@ -199,6 +200,53 @@ def test_jobs_reach_every_tab_and_masks_only_those_that_look(web: Running) -> No
         web.until(lambda: web.get(f"/api/jobs?project={first}")[0]["state"] == "done")
         web.patch(f"/api/projects/{first}/objects/{made['id']}", {"colour": 3})
         until(socket, type="object")
+
+
+BAD = (
+    '{"type": "watch", "page": "' + "\\ud800" + '"}',
+    '{"type": "watch", "page": "anywhere"}',
+    '{"type": "watch", "project": "../x"}',
+    '{"type": "watch", "project": {"a": 1}}',
+    '{"type": "watch", "object": 9223372036854775808}',
+    '{"type": "watch", "object": -1}',
+    '{"type": "watch", "object": 1e400}',
+    '{"type": "shout"}',
+    '{"type": "watch", "more": 1}',
+    "not json",
+    '["not", "a", "table"]',
+    "[" * 900,
+    "x" * 100_000,
+    "",
+)
+
+
+def test_a_bad_message_is_answered_to_its_sender_and_to_nobody_else(web: Running) -> None:
+    project = web.sample()
+    with listening(web, project) as other, listening(web, project) as socket:
+        for message in BAD:
+            socket.send_text(message)
+            _, answer = until(socket, type="refused")
+            assert len(answer["message"]) < 200
+            assert '"type": "watch"' in answer["hint"]
+        socket.send_bytes(b"\xff\x00")
+        until(socket, type="refused")
+        number = web.get(f"/api/projects/{project}/objects")[0]["id"]
+        web.patch(f"/api/projects/{project}/objects/{number}", {"colour": 5})
+        until(socket, type="object")
+        seen, _ = until(other, type="object")
+        assert {message["type"] for message in seen} <= {"hello", "presence"}
+
+
+def test_the_tabs_of_a_person_are_bounded(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.routes.live.MOST_TABS", 2)
+    with listening(web, None) as first, listening(web, None) as second:
+        first.receive_json(), second.receive_json()
+        with listening(web, None) as third, pytest.raises(WebSocketDisconnect) as closed:
+            third.receive_json()
+        assert (closed.value.code, "close some" in closed.value.reason) == (4429, True)
+    web.until(lambda: web.context.hub.tabs_of("tester") == 0)
+    with listening(web, None) as again:
+        assert again.receive_json()["type"] == "hello"
 
 
 def _object(web: Running, project: str, number: int) -> Any:

@@ -1,3 +1,4 @@
+from r2c2r_core.export.writers.table import FORMATS
 from tests.app.conftest import Running
 from tests.app.test_jobs import run
 
@@ -86,6 +87,8 @@ def test_chosen_formats_are_a_download_of_their_own_that_can_go_on(web: Running)
     assert part.headers["etag"] != web.client.get(f"/media/{project}/bundles/1.zip").headers["etag"]
     tail = web.client.get(address, headers={"range": "bytes=20-", "if-range": part.headers["etag"]})
     assert (tail.status_code, tail.content) == (206, part.content[20:])
-    assert web.client.get(f"/media/{project}/bundles/1.zip?formats=exe").status_code == 422
+    assert "glb, mjcf, urdf, usd" in web.get(f"/media/{project}/bundles/1.zip?formats=exe", 422)["hint"]
+    offered = [(entry["name"], entry["file"]) for entry in web.get("/api/system")["formats"]]
+    assert offered == [(entry.name, entry.file) for entry in FORMATS]  # the core's table is the only one
     assert web.get(f"/api/projects/{project}/bundles/1/changes?since=1") == []
     web.get(f"/api/projects/{project}/bundles/1/changes?since=7", 404)

@@ -12,7 +12,7 @@ from sqlmodel import select
 from app.db import once
 from app.db.engine import reading, writing
 from app.db.once import Sending
-from app.db.tables import Comment, Event, Job, Override, Point, Project, SceneObject, SentChange, Verdict
+from app.db.tables import Comment, Event, Job, Override, Point, Project, ProjectMember, SceneObject, SentChange, Verdict
 from app.errors import Conflict
 from app.routes.once import COVERED
 from app.services import prompts, sending
@@ -203,6 +203,7 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     yield "uploadCandidate", "POST", f"{on}/candidates?filename=mine.glb&rerun=false", b"glTF"
     yield "addComment", "POST", f"{at}/comments", {"text": "look"}
     yield "changeComment", "PATCH", f"{at}/comments/1", {"resolved": True}
+    yield "setMembers", "PUT", f"{at}/members", {"members_only": True}
     yield "openViewer", "POST", f"{at}/viewer", None
     yield "showInViewer", "POST", f"{at}/viewer/show", {"mode": "cloud"}
     yield "setJoints", "POST", f"{at}/viewer/joints", {"values": {"door": 0.5}}
@@ -233,7 +234,7 @@ def stored(web: Running) -> Any:
     """What people gave, and what was queued: all that a change may change, once no import is about to add something."""
     busy = ("queued", "running")
     web.until(lambda: not [job for job in web.get("/api/jobs") if job["kind"] != "run" and job["state"] in busy])
-    tables = (Project.id, Job.id, SceneObject, Point, Override, Verdict, Comment, Event)
+    tables = (Project.id, Project.members_only, ProjectMember, Job.id, SceneObject, Point, Override, Verdict, Comment, Event)
     with reading(web.context.engine) as session:
         rows = [sorted(repr(row) for row in session.exec(select(table))) for table in tables]
     return rows, sorted(path.name for path in web.settings.data_dir.glob("projects/*/uploads/*/*"))
@@ -266,6 +267,7 @@ def _cut_off(web: Running, path: str, body: bytes, key: str) -> None:
     told = {"host": "127.0.0.1:8000", "cookie": cookies, "x-requested-with": "t", "idempotency-key": key}
     headers = [(name.encode(), value.encode()) for name, value in {**told, "content-type": "application/json"}.items()]
     scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "headers": headers}
+    scope["server"] = ("127.0.0.1", 8000)  # the session's cookie is named after the port
     asked: Iterator[dict[str, Any]] = iter([{"type": "http.request", "body": body}])
 
     async def receive() -> dict[str, Any]:

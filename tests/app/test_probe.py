@@ -1,14 +1,21 @@
-"""The real look at a mesh, in its own process: what a run would refuse is refused at once, in the sender's words."""
+"""The real look at a file, in its own process: what a run would refuse is refused at once, in the sender's words."""
 
 import json
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from app.process import python_module
+from app.jobs.plans import Commands
+from app.process import Worker
+from tests.core.ingest.tiny import TinyRoom
+from tests.core.ingest.tiny_formats import write_stray
+
+PROBE = Commands().probe
 
 
 @pytest.mark.parametrize(
@@ -24,9 +31,39 @@ def test_a_mesh_is_refused_when_no_candidate_can_be_made_of_it(tmp_path: Path, c
     size = [1.0, 0.6, 0.4 if content == "box" else 0.0]
     made = trimesh.creation.box(size).export(file_type="glb")
     file.write_bytes(np.random.default_rng(0).bytes(900) if content == "noise" else bytes(made))
-    asked = [*python_module("app.jobs.probe"), "mesh", str(file), "kettle.glb"]
+    asked = [*PROBE, "mesh", str(file), "kettle.glb"]
     said = subprocess.run(asked, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False)
     last = json.loads(said.stdout.splitlines()[-1])
     assert last.get("error", {"message": ""})["message"].startswith(words)
     assert ("done" in last) == (words == "")
     assert str(tmp_path) not in said.stdout
+
+
+@pytest.mark.parametrize("forged", [True, False], ids=["forged", "whole"])
+def test_a_video_that_names_one_in_the_servers_folder_is_refused(tmp_path: Path, forged: bool) -> None:
+    folder = write_stray(tmp_path / "scan", TinyRoom(count=3))
+    shutil.copy(folder / "rgb.mp4", tmp_path / "secret.mp4")
+    if forged:
+        (folder / "rgb.mp4").write_bytes(b"ffconcat version 1.0\nfile secret.mp4\n")
+    sent = Path(shutil.make_archive(str(tmp_path / "a1b2"), "zip", tmp_path, "scan"))
+    said = subprocess.run(
+        [*PROBE, "recording", str(sent), "scan.zip"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    last = json.loads(said.stdout.splitlines()[-1])
+    assert ("done" in last) == (not forged), last
+    assert not forged or "an MP4 was expected" in last["error"]["message"]
+
+
+def test_whatever_decodes_uploads_is_started_alone() -> None:
+    commands = Commands()
+    assert [command[1:3] for command in (commands.probe, commands.ingest)] == [("-m", "r2c2r_core.alone")] * 2
+
+
+def test_what_a_killed_worker_leaves_in_its_temporary_folder_goes(tmp_path: Path) -> None:
+    leaves = "import json, tempfile, time; print(json.dumps({'at': tempfile.mkdtemp()}), flush=True); time.sleep(600)"
+    worker = Worker((sys.executable, "-c", leaves), tmp_path / "log")
+    line = worker.next_line(timeout=60)
+    assert line is not None
+    assert Path(line["at"]).is_dir()
+    worker.close()
+    assert not Path(line["at"]).parent.exists()

@@ -120,9 +120,20 @@ def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) ->
 
 def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
     project = web.sample()
-    made = web.post(f"/api/projects/{project}/objects", {"category": "  tea   pot "}, 201)
-    assert (made["name"], made["category"]) == ("tea_pot_1", "tea pot")
-    assert any("tea pot" in notice for notice in made["notices"])
+    made = web.post(f"/api/projects/{project}/objects", {"category": "  tea   towel "}, 201)
+    assert (made["name"], made["category"]) == ("tea_towel_1", "tea towel")
+    assert any("tea towel" in notice for notice in made["notices"])
+
+
+def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: Running) -> None:
+    offered = {entry["name"]: (entry["label"], entry["joint"]) for entry in web.get("/api/system")["categories"]}
+    for name in ("drawer", "bottle", "mug", "chair"):
+        assert offered[name][0] == name
+    assert offered["sink"] == ("sink cabinet", "revolute")
+    assert offered["chest_of_drawers"] == ("drawer stack", "prismatic")
+    project = web.sample()
+    for name in ("bottle", "sink", "Chest of Drawers"):
+        assert web.post(f"/api/projects/{project}/objects", {"category": name}, 201)["notices"] == []
 
 
 def test_prompts_file_goes_out_and_in(web: Running) -> None:
@@ -135,7 +146,7 @@ def test_prompts_file_goes_out_and_in(web: Running) -> None:
     objects = {o["name"]: o for o in web.get(f"/api/projects/{project}/objects")}
     assert (len(objects["drawer_1"]["points"]), len(objects)) == (2, 3)
     twice = {"version": 1, "objects": [file["objects"][0], file["objects"][0]]}
-    assert web.post(f"/api/projects/{project}/prompts.json", twice, 422)["kind"] == "prompt"
+    assert web.post(f"/api/projects/{project}/prompts.json", twice, 422)["kind"] == "invalid"
 
 
 def test_history_says_who_did_what_and_what_was_undone(web: Running) -> None:

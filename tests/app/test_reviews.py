@@ -25,7 +25,8 @@ Reviewed = tuple[Running, str, int]
 
 
 def overrides(web: Running, project: str) -> Any:
-    path = web.settings.data_dir / "projects" / project / "work" / "overrides.json"
+    job = web.get(f"/api/jobs?project={project}")[0]["id"]
+    path = web.settings.data_dir / "projects" / project / "requests" / str(job) / "overrides.json"
     return json.loads(path.read_text())["objects"].get("drawer_1", {})
 
 
@@ -135,15 +136,24 @@ def test_corrections_are_checked_kept_and_cleared(reviewed: Reviewed) -> None:
     web.patch(address, {"dimensions_m": None, "rerun": False})
     assert (web.get(address)["hinge"], web.get(address)["dimensions_m"]) == ("left", None)
     for wrong in (
-        {"dimensions_m": [0.5, -0.6, 0.2]},
         {"joint_lower": 1.0, "joint_upper": 0.5},
-        {"pose": [[1.0, 0.0], [0.0, 1.0]]},
         {"candidate": "c9"},
         {"candidate": "/etc/passwd"},
         {"candidate": "pyproject.toml"},
-        {"joint_lower": 0.2},
     ):
         assert web.patch(address, wrong, 422)["kind"] == "override", wrong
+    for wrong in (
+        {"dimensions_m": [0.5, -0.6, 0.2]},
+        {"dimensions_m": [1e9, 1e9, 1e9]},
+        {"joint_upper": 1e9},
+        {"joints": {"left_door": [2.0, 1.0]}},
+        {"pose": [[1.0, 0.0], [0.0, 1.0]]},
+        {"pose": [[1.0, 0.0, 0.0, 1e12], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]},
+        {"regenerate": 10**9},
+    ):
+        assert web.patch(address, wrong, 422)["kind"] == "invalid", wrong
+    web.patch(address, {"joint_lower": 0.2, "joints": {"left_door": [None, 1.2]}, "rerun": False})
+    assert (web.get(address)["joint_lower"], web.get(address)["joints"]) == (0.2, {"left_door": [None, 1.2]})
     outside = f"{web.settings.data_dir}/projects/{project}/uploads/../frames.json"
     assert web.patch(address, {"candidate": outside}, 403)["kind"] == "forbidden"
     assert web.patch(address, {"hinge": "diagonal"}, 422)["kind"] == "invalid"
@@ -161,14 +171,14 @@ def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
     )
     (joint,) = item["joints"]
     assert (joint["name"], joint["upper"], joint["sources"]["limits"]) == ("drawer_1_slide", 0.4, "default")
-    assert scene["stages"] == [{"name": "segment", "backend": "fake", "seconds": 2.0}]
+    assert scene["stages"] == [{"name": "segment", "backend": "fake", "seconds": None}]
     assert web.client.get(scene["glb"]).status_code == 200
 
 
 def test_masks_of_the_last_run_are_shown_while_its_clicks_are(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == number]
-    assert ([f["frame"] for f in lane["frames"]], lane["source"]) == ([3, 7], "run")
+    assert (lane["frames"], lane["source"]) == ([3, 7], "run")
     (shown,) = web.get(f"/api/projects/{project}/masks/7")
     assert (shown["confidence"], shown["mask"]["box_width"]) == (0.4, 40)
     click = {"frame": 3, "x": 1.0, "y": 1.0, "label": 0}
@@ -185,6 +195,7 @@ def test_a_finished_workspace_becomes_a_project_once(start: Callable[..., Any], 
     points = [{"frame": 3, "x": 80.0, "y": 60.0, "label": 1}]
     prompts.write_text(json.dumps({"version": 1, "objects": [{"name": "drawer_1", "category": "drawer", "points": points}]}))
     given = {"name": "Sample kitchen", "source": tmp_path / "scan.r3d", "prompts": prompts, "workdir": work}
+    (tmp_path / "data").mkdir()
     project = register_finished(tmp_path / "data", **given)
     assert register_finished(tmp_path / "data", **given) == project
     with start() as web:

@@ -1,13 +1,18 @@
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from sqlmodel import select
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from app.security import COOKIE
-from tests.app.conftest import ORIGIN, SOCKETS, Running
+from app.db.engine import reading
+from app.db.tables import SignIn
+from app.errors import NoSpace
+from tests.app.conftest import COOKIE, ORIGIN, SOCKETS, Running
 
 
 def fresh(web: Running, **options: Any) -> TestClient:
@@ -40,15 +45,78 @@ def test_without_a_session_nothing_is_shown(web: Running) -> None:
 
 def test_the_printed_token_becomes_a_cookie_and_leaves_the_address(web: Running) -> None:
     other = fresh(web)
-    answer = other.get(f"/p/abc/annotate?token={web.settings.launch_token}", follow_redirects=False)
+    address = f"/p/abc/annotate{web.printed()[1:]}"
+    answer = other.get(address, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, "/p/abc/annotate")
     cookie = answer.headers["set-cookie"].lower()
+    assert cookie.startswith("r2c2r_session_8000=")
     assert "httponly" in cookie
     assert "samesite=lax" in cookie
     assert other.get("/api/projects").status_code == 200
+    again = other.get(address, follow_redirects=False)  # no matter to the browser that used it
+    assert (again.status_code, again.headers["location"]) == (303, "/p/abc/annotate")
+    assert "set-cookie" not in again.headers
 
 
-@pytest.mark.parametrize("token", ["wrong", "x" * 10_000, "é"])
+def test_a_printed_address_signs_one_browser_in_and_says_what_to_do_to_others(start: Callable[..., Any]) -> None:
+    with start() as web:
+        address, late = web.printed(), web.printed()
+        with ThreadPoolExecutor(8) as crowd:
+            opened = list(crowd.map(lambda _: fresh(web).get(address, follow_redirects=False).status_code, range(8)))
+        assert sorted(opened) == [303] + [401] * 7
+        page = fresh(web).get(address)
+        assert "r2c2r key" in page.text
+        assert "<form>" in page.text
+    with start() as web:
+        assert fresh(web).get(late).status_code == 401  # of the server before
+
+
+def test_two_servers_of_a_host_do_not_share_a_cookie(web: Running) -> None:
+    there = fresh(web, base_url="http://127.0.0.1:9000", headers={"X-Requested-With": "tests"})
+    there.cookies = web.client.cookies  # a browser sends them to every port
+    assert there.get("/api/projects").status_code == 401
+    there.get(web.printed())
+    assert {cookie.name for cookie in there.cookies.jar} == {"r2c2r_session_8000", "r2c2r_session_9000"}
+    assert there.post("/api/logout").status_code == 204
+    assert web.client.get("/api/projects").status_code == 200
+
+
+def test_behind_tls_browsers_stay_with_it_and_no_page_asks_for_devices(web: Running) -> None:
+    plain, tls = web.client.get("/api/health").headers, fresh(web, base_url="https://127.0.0.1:8000").get("/api/health").headers
+    assert "strict-transport-security" not in plain
+    assert tls["strict-transport-security"] == "max-age=31536000"
+    for headers in (plain, tls):
+        assert "camera=(), microphone=()" in headers["permissions-policy"]
+
+
+def test_signing_out_ends_the_session_also_on_a_full_disk(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = fresh(web, headers={"X-Requested-With": "tests"})
+    other.get(web.printed())
+    cookie = other.cookies[COOKIE]
+    with monkeypatch.context() as patch:
+        patch.setattr("app.services.people.writing", full_disk)
+        assert other.post("/api/logout").status_code == 204
+        other.cookies.set(COOKIE, cookie)
+        assert other.get("/api/projects").status_code == 401
+    stored = {row.digest for row in sessions(web)}
+    web.context.people.forget_ended()
+    gone = stored - {row.digest for row in sessions(web)}
+    assert len(gone) == 1  # the row too, once there is room
+    assert other.get("/api/projects").status_code == 401
+
+
+@contextmanager
+def full_disk(_: Any) -> Iterator[Any]:
+    raise NoSpace("the disk is full", hint="free some space")
+    yield
+
+
+def sessions(web: Running) -> list[SignIn]:
+    with reading(web.context.engine) as session:
+        return list(session.exec(select(SignIn)))
+
+
+@pytest.mark.parametrize("token", ["wrong", "x" * 4_000, "é"])
 def test_a_wrong_token_opens_nothing(web: Running, token: str) -> None:
     answer = fresh(web).get("/", params={"token": token}, follow_redirects=False)
     assert answer.status_code == 401

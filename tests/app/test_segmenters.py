@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from app.db.engine import writing
+from app.db.tables import Upload
 from tests.app.conftest import Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
@@ -65,6 +67,20 @@ def test_the_chosen_one_draws_all_objects_and_each_says_who_drew_it(web: Running
     choose(web, project, "geometric")
     assert drawn_by() == "geometric"  # kept: nothing is computed for it again
     assert [entry["action"] for entry in web.get(f"/api/projects/{project}/history")][:2] == ["segmenter", "segmenter"]
+
+
+def test_a_live_process_is_ended_while_others_can_write(web: Running, sam2: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = web.sample()
+    ended = []
+
+    def close(of: str) -> None:
+        with writing(web.context.engine) as session:  # would wait for a transaction that is open around it
+            session.add(Upload(id=of, file_name="a", size=1, who="x", created=0.0))
+        ended.append(of)
+
+    monkeypatch.setattr(web.context.live, "close", close)
+    assert choose(web, project, "sam2")["segmenter"] == "sam2"
+    assert ended == [project]
 
 
 def test_a_run_takes_the_projects_segmenter_unless_told_otherwise(web: Running, sam2: Path) -> None:

@@ -3,14 +3,20 @@ import json
 import socket
 import subprocess
 import sys
+import urllib.error
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from app.db.engine import open_engine
 from app.serve import serve
+from app.services import accounts, audit
 from r2c2r_core.cli import main
-from r2c2r_core.errors import EnvironmentProblem
+from r2c2r_core.errors import EnvironmentProblem, InputError
 from tests.app.conftest import Running
 
 
@@ -40,11 +46,15 @@ def test_accounts_are_made_and_changed_from_the_command_line(
         return code, captured.out + captured.err
 
     assert user("add", "Ann", "--role", "admin", said="three plain words\n") == (0, "")
+    assert "only admin" in user("role", "ann", "reviewer")[1]
+    assert user("add", "Zoe", "--role", "admin", said="three plain words\n") == (0, "")
     assert user("role", "ann", "reviewer") == (0, "")
     assert "ann   reviewer" in user("list")[1]
     for words, said, part in (
         (("add", "ann"), "three plain words", "already"),
         (("add", "bob"), "short", "5 characters"),
+        (("add", "bob"), "bob1234567", "own name"),
+        (("remove", "zoe"), "", "only admin"),
         (("add", "bob", "--role", "king"), "three plain words", "no role"),
         (("add", "../bob"), "three plain words", "no name"),
         (("remove", "eve"), "", "no account eve"),
@@ -78,9 +88,79 @@ def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> N
         server.stdout.close()  # type: ignore[union-attr]
 
 
+def test_a_key_for_another_browser_is_printed_while_the_server_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def key() -> tuple[int, str]:
+        code = main(["key", "--data", str(tmp_path)])
+        captured = capsys.readouterr()
+        return code, (captured.out or captured.err).strip()
+
+    code, said = key()
+    assert (code > 0, "no r2c2r serves" in said, said.count("\n")) == (True, True, 0)
+    with served(tmp_path) as address:
+        Running.until(lambda: _answers(address))
+        assert [_status(address), _status(address)] == [200, 401]
+        code, printed = key()
+        assert (code, printed.split("token=")[0]) == (0, address.split("token=")[0])
+        assert [_status(printed), _status(printed)] == [200, 401]
+    accounts.add(engine := open_engine(tmp_path / "r2c2r.db"), "ann", "admin", "three plain words")
+    engine.dispose()
+    with served(tmp_path, names=["localhost"]) as address:
+        Running.until(lambda: _answers(address))
+        assert "sign in to this server by name" in key()[1]
+
+
+def test_who_asks_is_what_the_proxy_says_only_where_the_server_was_told_to_believe_it(tmp_path: Path) -> None:
+    for behind, seen in (([], "127.0.0.1"), (["127.0.0.1"], "203.0.113.7"), (["10.0.0.0/8"], "127.0.0.1")):
+        data = tmp_path / "-".join(["data", *behind]).replace("/", "_")
+        data.mkdir()
+        accounts.add(engine := open_engine(data / "r2c2r.db"), "ann", "admin", "three plain words")
+        with served(data, names=["localhost"], behind_proxy=behind) as address:
+            Running.until(lambda address=address: _answers(address))  # type: ignore[misc]
+            headers = {"X-Requested-With": "t", "X-Forwarded-For": "203.0.113.7", "Content-Type": "application/json"}
+            wrong = json.dumps({"name": "ann", "password": "x"}).encode()
+            request = urllib.request.Request(f"{address.rstrip('/')}/api/login", wrong, headers)
+            with pytest.raises(urllib.error.HTTPError, match="401"):
+                urllib.request.urlopen(request, timeout=60)
+        (refused,) = [entry for entry in audit.entries(engine, None, 50).entries if entry.action == "refused"]
+        assert refused.client == seen
+        engine.dispose()
+
+
+@pytest.mark.parametrize("address", ["proxy.example", "*", "10.0.0.1/8", ""])
+def test_a_proxy_is_named_by_its_address(tmp_path: Path, address: str) -> None:
+    with pytest.raises(InputError, match="--behind-proxy"):
+        serve(host="127.0.0.1", port=0, data_dir=tmp_path, behind_proxy=[address])
+
+
+@contextmanager
+def served(data: Path, **options: Any) -> Iterator[str]:
+    """A server of its own process; the address it prints."""
+    call = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(data)!r}), **{options!r})"
+    code = f"from pathlib import Path; from app.serve import serve; {call}"
+    words = [sys.executable, "-c", code]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    assert server.stdout is not None
+    try:
+        yield server.stdout.readline().split(" ", 1)[1].strip()
+    finally:
+        server.terminate()
+        server.wait(timeout=60)
+        server.stdout.close()
+
+
+def _status(address: str) -> int:
+    """As a browser that was never there."""
+    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+    try:
+        with browser.open(address, timeout=60) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
 def _answers(address: str) -> bool:
     try:
-        with urllib.request.urlopen(f"{address.split('/?')[0]}/api/health", timeout=60) as answer:
+        with urllib.request.urlopen(f"{address.split('/?')[0].rstrip('/')}/api/health", timeout=60) as answer:
             return bool(json.load(answer)["state"] == "ok")
     except OSError:
         return False

@@ -6,7 +6,7 @@ import pytest
 from sqlmodel import select
 
 from app import schemas
-from app.db import queries
+from app.db import keys, queries
 from app.db.engine import writing
 from app.db.tables import Bundle
 from app.services import jobs
@@ -156,7 +156,7 @@ def test_a_run_uses_the_backends_of_the_project_and_another_one_makes_the_result
     with writing(web.context.engine) as session:  # as if the other one were installed
         row = queries.project_row(session, project)
         row.generator = "remote"
-        session.add(row)
+        keys.note_project(session, row)
     assert web.get(f"/api/projects/{project}")["result"] == "stale"
     with writing(web.context.engine) as session:
         queued = jobs.queue_run(web.context, session, queries.project_row(session, project), schemas.RunRequest())

@@ -2,15 +2,19 @@
 
 import os
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import pytest
 from sqlmodel import select
 from starlette.testclient import TestClient
 
 from app.db.engine import writing
-from app.db.tables import Upload
+from app.db.tables import Project, Upload
+from app.errors import Unavailable
 from app.services import accounts, leftovers, uploads
+from app.services.at_work import AtWork
 from tests.app.conftest import ORIGIN, Running
 from tests.app.test_imports import R3D, archive, break_off, left_behind
 from tests.app.test_states import step
@@ -118,6 +122,24 @@ def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
         assert web.client.head(f"/api/uploads/{upload}").status_code == 404
 
 
+def test_what_is_done_to_an_upload_is_not_undone_by_another_request_and_every_server_minds_its_own() -> None:
+    mine, others = AtWork(), AtWork()
+    for first, second, waits in (
+        ("sent", "sent", True),
+        ("sent", "finished", True),
+        ("sent", "deleted", False),  # who gives up need not wait for the last piece
+        ("finished", "deleted", True),
+        ("deleted", "finished", True),
+    ):
+        with mine.on("a", first):
+            with others.on("a", second), mine.on("b", second):
+                pass
+            with pytest.raises(Unavailable) if waits else nullcontext(), mine.on("a", second):
+                pass
+    with mine.on("a", "finished"):
+        pass  # nothing is left behind
+
+
 def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
     old, new = begin(web), begin(web)
     os.utime(web.settings.uploads / f"{old}.part", (1, 1))
@@ -126,21 +148,40 @@ def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
     assert [path.name for path in Path(web.settings.uploads).iterdir()] == [f"{new}.part"]
 
 
-def test_what_a_crash_left_is_deleted_once_it_is_old(web: Running) -> None:
-    upload, project = begin(web), web.sample()
-    projects = web.settings.data_dir / "projects"
-    left = [web.settings.uploads / "stray.part", web.settings.uploads / "mesh.glb", projects / "deleted"]
-    for path in left[:2]:
-        path.touch()
-    (projects / "deleted" / "source").mkdir(parents=True)
+def test_what_no_row_knows_is_set_aside_and_only_what_is_marked_half_made_goes(
+    web: Running, caplog: pytest.LogCaptureFixture
+) -> None:
+    upload, project, finishing = begin(web), web.sample(), interrupted(web)
+    data, projects = web.settings.data_dir, web.settings.data_dir / "projects"
+    recording = projects / "0123456789ab" / "source" / "scan.r3d"
+    half = [web.settings.uploads / "receiving-1f.glb", projects / "given-up"]
+    for path in (recording, half[1] / "half-made", half[0], web.settings.uploads / "stray.part"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"bytes")
     leftovers.tidy(web.context)
-    assert all(path.exists() for path in left)  # something may begin just now
-    for path in (*left, web.settings.uploads / f"{upload}.part", projects / project):
+    assert recording.exists()  # something may begin just now
+    assert all(path.exists() for path in half)
+    for path in (*projects.iterdir(), *web.settings.uploads.iterdir()):
         os.utime(path, (1, 1))
     leftovers.tidy(web.context)
-    assert not any(path.exists() for path in left)
-    assert [found["id"] for found in web.get("/api/uploads")] == [upload]
+    assert not any(path.exists() for path in half)
+    assert {path.name for path in projects.iterdir()} == {project, finishing}
+    assert (data / "unknown" / "0123456789ab" / "source" / "scan.r3d").read_bytes() == b"bytes"
+    assert (data / "unknown" / "stray.part").read_bytes() == b"bytes"
+    assert "0123456789ab" in caplog.text
+    assert {found["id"] for found in web.get("/api/uploads")} == {upload, finishing}
     assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
+
+
+def test_an_upload_of_a_restored_database_takes_no_project_with_it(web: Running) -> None:
+    upload = interrupted(web)
+    finish(web, upload)
+    with writing(web.context.engine) as session:  # as it was before it was finished
+        session.delete(session.get(Project, upload))
+        session.add(Upload(id=upload, file_name="Kitchen.r3d", size=len(R3D), who="tester", created=1.0))
+    uploads.forget_stopped(web.context)
+    leftovers.tidy(web.context)
+    assert (web.settings.data_dir / "projects" / upload / "source" / "Kitchen.r3d").read_bytes() == R3D
 
 
 def interrupted(web: Running, content: bytes = R3D) -> str:
@@ -149,6 +190,7 @@ def interrupted(web: Running, content: bytes = R3D) -> str:
     send(web.client, upload, 0, content)
     source = web.settings.data_dir / "projects" / upload / "source"
     source.mkdir(parents=True)
+    (source.parent / "half-made").touch()
     (web.settings.uploads / f"{upload}.part").rename(source / "Kitchen.r3d")
     return upload
 

@@ -65,7 +65,7 @@ def test_signing_out_closes_the_3d_view(seen: Running) -> None:
 def test_a_token_serves_the_session_it_was_made_for_only(seen: Running) -> None:
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"]
     other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
-    other.get(f"/?token={seen.settings.launch_token}")
+    other.get(seen.printed())
     assert other.get(url).status_code == 403
     opening = other.websocket_connect(SOCKETS + url.rstrip("/"), headers={"origin": ORIGIN})
     with pytest.raises(WebSocketDisconnect) as refused, opening:
@@ -153,7 +153,7 @@ def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
 def test_what_one_person_shows_another_does_not_see(seen: Running) -> None:
     project = seen.sample()
     other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
-    other.get(f"/?token={seen.settings.launch_token}")
+    other.get(seen.printed())
     mine, theirs = (client.post(f"/api/projects/{project}/viewer").json()["url"] for client in (seen.client, other))
     assert mine != theirs
     show = f"/api/projects/{project}/viewer/show"

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from app.serve import new_address
+
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 
 PATIENCE_MS = 180_000  # a busy machine that draws 3D in software; nothing waits longer than what it waits for takes
@@ -56,6 +58,14 @@ def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[
         yield found
 
 
+_folders: dict[str, Path] = {}  # of running servers, by their addresses
+
+
+def printed_again(address: str) -> str:
+    """Another printed address of the same server: each opens one browser."""
+    return new_address(_folders[address.split("?")[0]])
+
+
 @contextmanager
 def served(data: Path) -> Iterator[str]:
     """The app on a free port over a data folder; the address it prints."""
@@ -64,8 +74,9 @@ def served(data: Path) -> Iterator[str]:
     server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     line = server.stdout.readline()
-    found = re.search(r"http://\S+", line)
+    found = re.search(r"(http://\S+?/)\S*", line)
     assert found, line
+    _folders[found.group(1)] = data
     yield found.group()
     server.terminate()
     server.wait(timeout=60)
@@ -88,7 +99,7 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     opened = context.new_page()
     thrown: list[str] = []
     opened.on("pageerror", lambda error: thrown.append(str(error)))
-    opened.goto(address)
+    opened.goto(printed_again(address))
     yield opened
     context.close()
     assert thrown == []

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.serve import register_finished
 from tests.app.nouns import finish
-from tests.browser.conftest import PATIENCE_MS, served
+from tests.browser.conftest import PATIENCE_MS, printed_again, served
 
 REPORT = {
     "certificate": {"passed": True, "findings": [{"rule": "r", "severity": "warning", "where": "drawer_1", "message": "m"}]}
@@ -50,7 +50,7 @@ def signed_in(browser: Browser, address: str, **looks: Any) -> Iterator[Page]:
     context = browser.new_context(**looks)
     context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
-    page.goto(address)
+    page.goto(printed_again(address))
     yield page
     context.close()
 
@@ -82,7 +82,7 @@ def test_what_our_pages_load_first_is_small(browser: Browser, finished: tuple[st
     page = browser.new_page()
     sizes: dict[str, int] = {}
     page.on("response", lambda answer: sizes.update({answer.url: len(answer.body())}) if "/static/" in answer.url else None)
-    page.goto(address)
+    page.goto(printed_again(address))
     page.get_by_role("link", name="kitchen").wait_for()
     assert 0 < sum(sizes.values()) < FIRST_LOAD_BYTES, sizes
     page.close()

@@ -1,10 +1,16 @@
 """Accounts, from the admin's page to the one they are about."""
 
+import contextlib
+import re
+import shutil
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, expect
 
+from app.files import project_files
+from tests.browser.conftest import printed_again, served
 from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
@@ -20,6 +26,9 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser,
     ann = signed_in(contexts[0], server, "ann")
     ann.get_by_role("link", name="People").click()
     ann.get_by_label("Name").fill("carl")
+    ann.get_by_label("Password, from 10 characters", exact=True).fill("carl123456")
+    ann.get_by_role("button", name="Add").click()
+    expect(ann.locator(".toast", has_text="own name with little beside it")).to_be_visible()
     ann.get_by_label("Password, from 10 characters", exact=True).fill("a password of carl")
     ann.get_by_role("button", name="Add").click()
     expect(ann.locator(".toast", has_text="carl may sign in now")).to_be_visible()
@@ -34,13 +43,118 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser,
     ann.get_by_label("Role of carl").select_option("reviewer")
     expect(ann.locator(".toast", has_text="carl is reviewer now")).to_be_visible()
     expect(me).to_have_attribute("title", "reviewer: accounts and your password")  # by itself
+    ann.reload()
+    record = ann.locator("r2c2r-audit-record")
+    expect(record.get_by_role("row", name="role annotator → reviewer carl ann")).to_be_visible()
+    expect(record.get_by_role("row", name="signed in by password carl carl")).to_be_visible()
     picture(ann, "21-people")
 
     ann.once("dialog", lambda dialog: dialog.accept())
     ann.get_by_role("button", name="Remove carl").click()
-    expect(ann.get_by_role("row", name="carl")).to_have_count(0)
+    expect(ann.get_by_label("Role of carl")).to_have_count(0)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()  # his open page is shown out
     carl.goto(server.address)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()
     for context in contexts:
         context.close()
+
+
+def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are_said(
+    browser: Browser, tmp_path: Path, server: Server
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    with served(tmp_path) as address:
+        page.goto(address)
+        expect(page.get_by_role("heading", name="Projects")).to_be_visible()
+        stranger = browser.new_context()
+        late = stranger.new_page()
+        late.goto(address)
+        expect(late.get_by_text("a printed address opens one browser")).to_be_visible()
+        assert "token" not in late.url
+        picture(late, "22-address-used")
+        late.goto(printed_again(address))
+        expect(late.get_by_role("heading", name="Projects")).to_be_visible()
+        stranger.close()
+    page.goto(f"{server.address}/login")
+    page.get_by_label("Name").fill("ann")
+    page.get_by_label("Password").fill("not hers at all")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("alert")).to_contain_text("the name or the password is wrong")
+    expect(page.get_by_role("button", name="Sign in")).to_be_enabled()
+    context.close()
+
+
+def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, server: Server) -> None:
+    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
+    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    ann.get_by_role("button", name="Sample kitchen", exact=True).click()
+    card = bea.locator(".cards > li").get_by_role("link")
+    expect(card).to_have_count(1)
+
+    panel = ann.get_by_role("region", name="Who sees this project")
+    nobody = panel.get_by_text("Nobody is named yet")
+    for _ in range(20):  # a key meets nothing while the page takes in what another message told it
+        panel.get_by_label("Everybody who may sign in").press("ArrowDown")
+        with contextlib.suppress(AssertionError):
+            expect(nobody).to_be_visible(timeout=3000)
+            break
+    expect(nobody).to_be_visible()
+    expect(panel.get_by_label("Only these people")).to_be_focused()
+    expect(card).to_have_count(0)  # by itself
+
+    name = panel.get_by_label("Name")
+    name.fill("zoe")
+    name.press("Enter")
+    expect(ann.locator(".toast", has_text="there is no account zoe")).to_be_visible()
+    name.fill("bea")
+    name.press("Enter")
+    expect(panel.get_by_role("listitem")).to_have_text(re.compile("bea"))
+    expect(name).to_be_focused()
+    expect(name).to_have_value("")
+    picture(ann, "23-members")
+
+    card.click()  # it is there again
+    told = bea.get_by_role("region", name="Who sees this project")
+    expect(told).to_contain_text("Only ann, bea and admins see it")
+    expect(told.get_by_role("radio")).to_have_count(0)
+    bea.goto(server.address)
+    expect(card).to_have_count(1)
+
+    panel.get_by_role("button", name="Remove bea").press("Enter")
+    expect(name).to_be_focused()
+    expect(card).to_have_count(0)
+    panel.get_by_label("Everybody who may sign in").check()
+    expect(card).to_have_count(1)
+    for context in contexts:
+        context.close()
+
+
+def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    ann = signed_in(context, server, "ann")
+    ann.get_by_role("button", name="Sample kitchen", exact=True).click()
+    ann.get_by_role("link", name="Run on 2 objects").wait_for()
+    project = ann.url.rsplit("/", 1)[1]
+    files = project_files(server.data, project)
+    while not files.description.exists():
+        ann.wait_for_timeout(50)
+    shutil.copytree(files.root, server.data / "unknown" / project)
+    address = f"{server.address}/api/projects/{project}"
+    assert ann.request.delete(address, headers={"X-Requested-With": "tests", "Origin": server.address}).ok
+
+    ann.goto(server.address)
+    aside = ann.get_by_role("region", name="Set aside")
+    expect(aside).to_contain_text(str(server.data / "unknown" / project))
+    picture(ann, "24-set-aside")
+    aside.get_by_role("button", name="Leave it there").click()
+    expect(ann.locator(".toast", has_text="stays where it is")).to_be_visible()
+    aside.get_by_text("1 folder left where they are").click()
+    card = ann.locator(f".cards a[href='/p/{project}']")
+    expect(card).to_have_count(0)
+    aside.get_by_role("button", name="Adopt Sample kitchen").click()
+    expect(card).to_have_count(1)
+    expect(aside).to_be_hidden()
+    card.click()
+    ann.get_by_role("link", name="Run on 2 objects").wait_for()
+    context.close()

@@ -1,11 +1,15 @@
 """The command line as a person meets it: exit codes, one-line errors."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from r2c2r_core import cli
+from r2c2r_core.cli import main
 
 
 def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
@@ -43,6 +47,13 @@ def test_wrong_usage_is_two() -> None:
 def test_a_missing_recording_is_named(tmp_path: Path, prompts: Path) -> None:
     _, said = r2c2r("run", tmp_path / "no.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", code=2)
     assert "no.r3d" in one_line(said)
+
+
+def test_unknown_fixtures_are_refused_before_anything_is_read(tmp_path: Path, prompts: Path) -> None:
+    scan = tmp_path / "scan.r3d"
+    scan.write_bytes(b"not read")
+    _, said = r2c2r("run", scan, "--prompts", prompts, "-o", tmp_path / "b.zip", "--fixtures", "flatpack", code=2)
+    assert one_line(said).strip() == "r2c2r: unknown fixtures 'flatpack'; choose one of: boards, scene-synthesizer"
 
 
 def test_a_foreign_zip_is_named(tmp_path: Path, prompts: Path) -> None:
@@ -86,6 +97,93 @@ def test_doctor_names_every_backend_and_licence(tmp_path: Path) -> None:
     said, _ = r2c2r("doctor", "--data", tmp_path, "--json", tmp_path / "d.json", code=0)
     for name in ("geometric", "sam2", "edgetam", "sam3"):
         assert f"segmenter {name}" in said
+    assert "uploads are decoded with" in said
     assert "SAM License" in said
     assert "licence" in said.lower() or "Apache" in said
     assert json.loads((tmp_path / "d.json").read_text())["version"] == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("serve", "--port", "-1"),
+        ("serve", "--port", "99999"),
+        ("demo", "--port", "9" * 5000),
+        ("sample", "x", "--seed", "-1"),
+        ("sample", "x", "--frames", "1000000000"),
+        ("sample", "x", "--size", "99999x99999"),
+        ("run", "x", "--prompts", "p", "-o", "b.zip", "--seed", "1e9"),
+    ],
+)
+def test_a_number_out_of_range_is_wrong_usage(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    assert "expected" in one_line(capsys.readouterr().err.splitlines()[-1])
+
+
+def test_a_fault_of_ours_is_one_line_and_its_traceback_on_demand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("two\nlines")
+
+    monkeypatch.setattr("r2c2r_core.export.stage.check_bundle", broken)
+    assert main(["check", str(tmp_path)]) == 1
+    said = one_line(capsys.readouterr().err)
+    assert "a fault of r2c2r (ZeroDivisionError: two lines); run again with --debug" in said
+    assert main(["--debug", "check", str(tmp_path)]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_name_too_long_is_not_a_full_disk(tmp_path: Path, prompts: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(tmp_path / ("n" * 300))]) == 2
+    assert "too long; check the path" in one_line(capsys.readouterr().err)
+    bundle = tmp_path / ("n" * 252 + ".zip")
+    (tmp_path / "scan.r3d").write_bytes(b"")
+    assert main(["run", str(tmp_path / "scan.r3d"), "--prompts", str(prompts), "-o", str(bundle)]) != 0
+    assert "free some space" not in one_line(capsys.readouterr().err)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for command in ("info", "check", "dataset"):
+        assert main([command, str(tmp_path / "pipe"), *(["-o", "x"] if command == "dataset" else [])]) == 2
+        assert "a pipe; give a file or a folder" in one_line(capsys.readouterr().err)
+
+
+def test_sigterm_is_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> None:
+    waiting = (
+        "import argparse, sys, tempfile, time\n"
+        "from pathlib import Path\n"
+        "from r2c2r_core import cli\n"
+        "from r2c2r_core.commands import doctor\n"
+        "def wait(_):\n"
+        "    with tempfile.TemporaryDirectory(prefix='r2c2r-info-'):\n"
+        "        print('waiting', flush=True)\n"
+        "        time.sleep(600)\n"
+        "doctor.doctor = wait\n"
+        "sys.exit(cli.main(['doctor']))\n"
+    )
+    place = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen([sys.executable, "-c", waiting], env=place, stdout=-1, stderr=-1, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.readline() == "waiting\n"
+        assert [path.name[:11] for path in tmp_path.iterdir()] == ["r2c2r-info-"]
+        process.terminate()
+        said = process.stderr.read()
+        assert process.wait() == 143
+    assert said == "r2c2r: stopped; finished stages are kept, the same command goes on\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_while_commands_are_imported_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_commands", interrupted)
+    assert cli.main(["doctor"]) == 1
+    assert capsys.readouterr().err.count("\n") == 1

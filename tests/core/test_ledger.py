@@ -4,10 +4,12 @@ import errno
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from r2c2r_core.disk import explained_io
-from r2c2r_core.errors import EnvironmentProblem, ObjectNotSeen
+from r2c2r_core.errors import BackendUnavailable, Cancelled, EnvironmentProblem, ObjectNotSeen
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.ledger import Kept, Ledger, Reached
 from r2c2r_core.progress import SILENT, Progress
@@ -22,7 +24,7 @@ def run(root: Path, areas: dict[str, int]) -> Workspace:
     work = Workspace(root)
     ledger = Ledger(work, SILENT)
     items = {name: Kept(area, content_key(area)) for name, area in areas.items()}
-    ledger.each("segment", items, lambda name: (), lambda name, area, progress: noun(area))
+    ledger.each("segment", lambda area, progress: noun(area), items, items)
     return work
 
 
@@ -44,21 +46,45 @@ def test_a_damaged_file_is_computed_again(tmp_path: Path) -> None:
 
 
 def test_one_failing_object_leaves_the_others(tmp_path: Path) -> None:
-    def compute(name: str, area: int, progress: Progress) -> PackedMask:
+    def compute(name: str, progress: Progress) -> PackedMask:
         if name == "a":
             raise ObjectNotSeen("a: no frame shows it")
-        return noun(area)
+        return noun(1)
 
     ledger = Ledger(Workspace(tmp_path), SILENT)
-    items = {name: Kept(1, "k") for name in "ab"}
-    assert list(ledger.each("segment", items, lambda name: (), compute)) == ["b"]
+    assert list(ledger.each("segment", compute, "ab", {name: name for name in "ab"})) == ["b"]
     assert ledger.failures == {"a": "segment: a: no frame shows it"}
+
+
+@pytest.mark.parametrize("error", [np.linalg.LinAlgError("SVD did not converge"), ValueError("bad"), cv2.error("(-215) empty")])
+def test_an_object_whose_numbers_fail_leaves_the_others_and_its_traceback_is_logged(
+    error: Exception, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def compute(name: str, progress: Progress) -> PackedMask:
+        if name == "a":
+            raise error
+        return noun(1)
+
+    ledger = Ledger(Workspace(tmp_path), SILENT)
+    assert list(ledger.each("align", compute, "ab", {name: name for name in "ab"})) == ["b"]
+    assert ledger.failures["a"].startswith(f"align: a: {'error' if isinstance(error, cv2.error) else type(error).__name__}: ")
+    assert "\n" not in ledger.failures["a"]
+    assert caplog.records[0].exc_info is not None
+
+
+@pytest.mark.parametrize("error", [Cancelled("stopped"), BackendUnavailable("gone"), TypeError("a bug"), MemoryError()])
+def test_what_is_wrong_for_all_ends_the_run(error: Exception, tmp_path: Path) -> None:
+    def compute(progress: Progress) -> PackedMask:
+        raise error
+
+    with pytest.raises(type(error)):
+        Ledger(Workspace(tmp_path), SILENT).each("align", compute, "a")
 
 
 def test_stages_after_the_last_wanted_one_are_not_begun(tmp_path: Path) -> None:
     ledger = Ledger(Workspace(tmp_path), SILENT, until="segment")
     with pytest.raises(Reached):
-        ledger.one("generate", (), lambda progress: noun(1))
+        ledger.one("generate", lambda progress: noun(1))
 
 
 def test_two_runs_in_one_workspace_are_refused(tmp_path: Path) -> None:

@@ -33,16 +33,31 @@ def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("document", "says"),
     [
-        ([], "not an overrides document"),
-        ({"version": 7}, "version 1"),
+        ([], r"the document is \[\]"),
+        ({"version": 7}, "version is 7; expected 1"),
         ({"objects": {"door": {"hinge": "middle"}}}, "door.hinge is 'middle'"),
         ({"objects": {"door": {"colour": 1}}}, "unknown key 'colour'"),
         ({"objects": {"door": {"dimensions_m": [1, 2]}}}, "three numbers"),
         ({"objects": {"door": {"dimensions_m": [1, 2, -1]}}}, "positive"),
-        ({"objects": {"door": {"joint_limits": [2, 1]}}}, "lower, upper"),
+        ({"objects": {"door": {"joint_limits": [2, 1]}}}, r"lower, upper"),
         ({"objects": {"door": {"pose": [[1]]}}}, "4x4"),
         ({"objects": {"door": {"pose": [[0] * 4] * 4}}}, "rigidly"),
-        ({"objects": {"door": {"pose": [[float("nan")] * 4] * 4}}}, "4x4"),
+        ({"objects": {"door": {"pose": [[float("nan")] * 4] * 4}}}, "NaN"),
+        ({"objects": {"door": {"pose": [[1, 0, 0, 1e12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}}, "within 1000 m"),
+        ({"objects": {"door": {"dimensions_m": [1e9, 1e9, 1e9]}}}, r"door.dimensions_m\[0\] is 1000000000.0; .* at most 10"),
+        ({"objects": {"door": {"joint_limits": [0, 1e9]}}}, "lower, upper"),
+        ({"objects": {"door": {"joints": {"left_door": [2, 1]}}}}, "joints.left_door: 2 lies above 1"),
+        ({"objects": {"door": {"candidate": 5}}}, "door.candidate is 5; expected a candidate's id"),
+        ({"objects": {"door": {"candidate": ["c1"]}}}, "door.candidate is"),
+        ({"objects": {"door": {"rejected": 5}}}, "door.rejected is 5"),
+        ({"objects": {"door": {"rejected": [None]}}}, r"door.rejected\[0\] is null"),
+        ({"objects": {"door": {"regenerate": 10**15}}}, "door.regenerate is"),
+        ({"objects": {"door": {"front": [0, 0, 0]}}}, "door.front: a direction of no length"),
+        ({"objects": [5]}, "an entry of objects has no name"),
+        ({"objects": [{"name": {}}]}, "an entry of objects has no name"),
+        ({"objects": [{"name": "door"}, {"name": "door"}]}, "the same name"),
+        ({"scene": 5}, "scene is 5"),
+        ({"scene": {"walls": [[0, 0, 1]]}}, "a wall without a normal"),
         ({"objects": {"door": {"pose": "upside down"}}}, "4x4"),
         ({"objects": {"door": {"pose": [[1], [1, 2], 3, 4]}}}, "4x4"),
         ({"objects": {"door": {"front": ["a", 0, 0]}}}, "three numbers"),
@@ -58,3 +73,15 @@ def test_what_cannot_be_used_is_one_clear_line(tmp_path: Path, document: object,
         read_overrides(write(tmp_path, document))
     assert "\n" not in str(caught.value)
     assert str(tmp_path) in str(caught.value)
+
+
+def test_limits_may_name_their_joint_and_leave_one_end_open(tmp_path: Path) -> None:
+    entry = {"joint_limits": [0.2, None], "joints": {"left_door": [None, 1.2]}}
+    door = read_overrides(write(tmp_path, {"objects": {"door": entry}})).of("door")
+    assert (door.joint_lower, door.joint_upper) == (0.2, None)
+    assert door.joints == {"left_door": (None, 1.2)}
+
+
+def test_a_list_of_objects_is_read_as_in_prompts(tmp_path: Path) -> None:
+    overrides = read_overrides(write(tmp_path, {"objects": [{"name": "door", "hinge": "left"}]}))
+    assert overrides.of("door").hinge == "left"

@@ -1,21 +1,25 @@
 """What the pipeline does when a backend fails on one object."""
 
+import json
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from r2c2r_core.align.stage import AlignConfig
+from r2c2r_core.align.stage import AlignConfig, Placer
 from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.errors import BackendUnavailable
+from r2c2r_core.generate.candidates import select_candidate, weighed
 from r2c2r_core.generate.consensus import choose_candidate
 from r2c2r_core.generate.stage import GenerateConfig, generate_candidates
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.ledger import Kept, Ledger
 from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
 from r2c2r_core.model.mesh import TexturedMesh
-from r2c2r_core.pipeline import Request, Tools, make_candidates, restricted_licences, select_candidate, weighed
+from r2c2r_core.pipeline import Request, Tools, generate_objects, place_objects, restricted_licences
+from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT
 from r2c2r_core.workspace import Workspace
 from tests.core.generate import scenes
@@ -52,7 +56,7 @@ def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candida
     refusing_the_second.count = 0
     with answering(refusing_the_second) as (address, asked):
         ledger = Ledger(Workspace(tmp_path), SILENT)
-        found = make_candidates(request_for(address), ledger, capture, tracks)
+        found = generate_objects(request_for(address), ledger, Kept(capture, "c"), tracks)
         assert list(found) == ["good_1", "bad_1"]
         assert not ledger.failures
         assert found["good_1"].value.chosen.generator == "remote:trellis-nim"
@@ -65,7 +69,7 @@ def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candida
         # the failure is not kept: the next run asks the server for that object again, and only for that one
         asked.clear()
         refusing_the_second.count = 0
-        again = make_candidates(request_for(address), Ledger(Workspace(tmp_path), SILENT), capture, tracks)
+        again = generate_objects(request_for(address), Ledger(Workspace(tmp_path), SILENT), Kept(capture, "c"), tracks)
     assert len(asked) == 1
     assert again["bad_1"].value.chosen.generator == "remote:trellis-nim"
     assert again["bad_1"].key != found["bad_1"].key
@@ -78,7 +82,7 @@ def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
     overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "box.glb"))})
     with answering(lambda *request: said(500, {"detail": "broken"})) as (address, _):
         ledger = Ledger(Workspace(tmp_path / "work"), SILENT)
-        found = make_candidates(request_for(address, overrides), ledger, capture, {"bad_1": tracks["bad_1"]})
+        found = generate_objects(request_for(address, overrides), ledger, Kept(capture, "c"), {"bad_1": tracks["bad_1"]})
     (asset,) = found["bad_1"].value.candidates
     assert asset.generator == "upload"
     assert "remote made no mesh" in asset.warnings[0]
@@ -90,8 +94,10 @@ def test_an_upload_joins_the_candidates_that_are_there_without_making_them_anew(
     overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "mine.glb"))})
     one = {"bad_1": tracks["bad_1"]}
     with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
-        before = make_candidates(request_for(address), Ledger(Workspace(tmp_path / "work"), SILENT), capture, one)
-        after = make_candidates(request_for(address, overrides), Ledger(Workspace(tmp_path / "work"), SILENT), capture, one)
+        before, after = (
+            generate_objects(request_for(address, said), Ledger(Workspace(tmp_path / "work"), SILENT), Kept(capture, "c"), one)
+            for said in (None, overrides)
+        )
     assert len(asked) == 1
     assert [c.candidate_id for c in after["bad_1"].value.candidates] == ["c0", "upload0"]
     assert after["bad_1"].value.candidates[0].generator == "remote:trellis-nim"
@@ -107,7 +113,7 @@ def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
         for sides in ((0.4, 0.3, 0.2), (0.4, 0.3, 0.2), (0.4, 0.3, 0.1)):
             path.write_bytes(box_glb(sides))
             ledger = Ledger(Workspace(tmp_path / "work"), SILENT)
-            found = make_candidates(request_for(address, overrides), ledger, capture, {"bad_1": tracks["bad_1"]})
+            found = generate_objects(request_for(address, overrides), ledger, Kept(capture, "c"), {"bad_1": tracks["bad_1"]})
             keys.append(found["bad_1"].key)
     assert keys[0] == keys[1] != keys[2]
 
@@ -119,7 +125,7 @@ def test_further_candidates_join_those_that_are_there_and_repeat_none(two_bottle
 
     def run(overrides, work):
         request = replace(request_for("http://nowhere", overrides), tools=Tools())
-        return make_candidates(request, Ledger(Workspace(tmp_path / work), SILENT), capture, one)["bad_1"]
+        return generate_objects(request, Ledger(Workspace(tmp_path / work), SILENT), Kept(capture, "c"), one)["bad_1"]
 
     first = run(Overrides(objects={}), "kept")
     further, anew = run(asked_again, "kept"), run(asked_again, "empty")
@@ -149,7 +155,7 @@ def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
     )
     before = choose_candidate(pair)
     assert before.chosen_id == "c0"  # a tie
-    after = weighed(capture, track, before, request_for("http://nowhere"))
+    after = weighed(capture, track, before, Placer(matcher="sift", config=request_for("http://nowhere").config.align), "medoid")
     assert after.chosen_id == "c1"
     assert after.chosen.metrics["mask_iou"] > 0.7
     assert "mask IoU" in after.reason
@@ -160,11 +166,44 @@ def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles
     capture, tracks = two_bottles
     request = replace(request_for("http://h"), config=ReconstructConfig())
     with pytest.raises(BackendUnavailable, match="generator 'remote' has no address"):
-        make_candidates(request, Ledger(Workspace(tmp_path), SILENT), capture, tracks)
+        generate_objects(request, Ledger(Workspace(tmp_path), SILENT), Kept(capture, "c"), tracks)
 
 
 def test_a_licence_that_forbids_some_uses_is_said_where_it_is_chosen_and_never_the_default():
-    assert restricted_licences(Tools()) == []
-    (line,) = restricted_licences(Tools(matcher="superglue"))
+    plain = Request(source=Path("scan"), prompts=Prompts(objects=()))
+    assert restricted_licences(plain) == []
+    (line,) = restricted_licences(replace(plain, tools=Tools(matcher="superglue")))
     assert "matcher superglue" in line
     assert "non-commercial" in line
+    papers = replace(plain.config, synthesize=replace(plain.config.synthesize, fixtures="scene-synthesizer"))
+    (line,) = restricted_licences(replace(plain, config=papers))
+    assert "fixtures scene-synthesizer" in line
+    assert "triangle" in line
+
+
+def contents(path):
+    """What a noun file holds, the seconds it took aside."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    structure = json.loads(members.pop("noun.json"))
+    del structure["header"]["seconds"]
+    return structure, members
+
+
+def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    recording = Kept(capture, "c")
+    request = replace(request_for("http://nowhere"), tools=Tools())
+    for workers in (1, 2):
+        with Pool(workers) as pool:
+            run = Ledger(Workspace(tmp_path / str(workers)), SILENT, pool=pool)
+            found = generate_objects(request, run, recording, tracks)
+            choices = {name: kept.value for name, kept in found.items()}
+            placed = place_objects(request, run, recording, tracks, found, choices)
+            assert list(found) == list(placed) == list(tracks)
+            assert sorted(run.work.computed) == sorted(f"{stage}/{name}" for stage in ("generate", "align") for name in tracks)
+            assert (workers > 1) == bool(pool._idle)
+    stored = {path.relative_to(tmp_path / "1") for path in (tmp_path / "1").rglob("*.noun")}
+    assert len(stored) == 4
+    for path in stored:
+        assert contents(tmp_path / "1" / path) == contents(tmp_path / "2" / path)

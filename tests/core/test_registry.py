@@ -1,9 +1,14 @@
+import importlib
 from pathlib import Path
 
 import pytest
 
+from r2c2r_core.align.protocol import MATCHERS, Matcher
 from r2c2r_core.errors import BackendUnavailable, InputError
+from r2c2r_core.generate.protocol import MeshGenerator
+from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Backend, Registry, Weights, find_weights
+from r2c2r_core.segment.protocol import Segmenter
 from r2c2r_core.segment.stage import SEGMENTERS
 
 TABLE = Registry(
@@ -106,3 +111,19 @@ def test_every_learned_segmenter_says_its_licence_and_is_not_the_default() -> No
     assert licences["sam2"][0].startswith("Apache-2.0")
     assert licences["edgetam"][0].startswith("Apache-2.0")
     assert licences["sam3"] == ("SAM License (gated weights; commercial use allowed, military use not)", "restricted")
+
+
+@pytest.mark.parametrize(
+    ("protocol", "backend"),
+    [
+        (protocol, backend)
+        for protocol, table in ((Segmenter, SEGMENTERS), (MeshGenerator, GENERATORS), (Matcher, MATCHERS))
+        for backend in table.backends
+    ],
+    ids=lambda value: getattr(value, "name", None),
+)
+def test_every_backend_names_its_protocol_so_that_the_type_checker_compares_them(protocol: type, backend: Backend) -> None:
+    module, name = backend.target.split(":")
+    found = getattr(importlib.import_module(module), name)
+    assert protocol in found.__mro__
+    assert not found.__abstractmethods__

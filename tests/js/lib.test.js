@@ -17,6 +17,8 @@ import { forget, keep, keptBy, named } from "../../static/js/lib/kept.js";
 import { nextPage } from "../../static/js/lib/next-page.js";
 import { moved, shiftBetween } from "../../static/js/lib/moved.js";
 import { together } from "../../static/js/lib/together.js";
+import { Newest } from "../../static/js/lib/newest.js";
+import { patiently } from "../../static/js/lib/patience.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
 const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
@@ -310,4 +312,37 @@ test("keys are printed as they stand on a keyboard, and none twice", () => {
 
 test("a number is read on every colour of the palette", () => {
   assert.deepEqual(["#0072b2", "#f0e442", "#000000", "#e69f00"].map(inkOn), ["#ffffff", "#10131a", "#ffffff", "#10131a"]);
+});
+
+test("of two sets of bitmaps the newer one is held, whichever comes first, and every other one is closed", async () => {
+  const closed = [];
+  const bitmap = (name) => ({ name, close: () => closed.push(name) });
+  const newest = new Newest();
+  await newest.take([Promise.resolve(bitmap("first"))]);
+  let arrive = (_) => {};
+  const slow = new Promise((resolve) => (arrive = resolve));
+  const overtaken = newest.take([slow, Promise.resolve(bitmap("b"))]);
+  assert.equal(await newest.take([Promise.resolve(bitmap("c"))]), true);
+  arrive(bitmap("a"));
+  assert.equal(await overtaken, false);
+  assert.deepEqual([newest.held.map((one) => one.name), closed], [["c"], ["first", "a", "b"]]);
+  await assert.rejects(newest.take([Promise.resolve(bitmap("d")), Promise.reject(new Error("no room"))]), /no room/);
+  assert.deepEqual([newest.held.map((one) => one.name), closed.at(-1)], [["c"], "d"]);
+});
+
+test("what is refused as too much at once is asked again after the time that was named, and said once", async () => {
+  const heard = [];
+  const waits = { retryMs: ({ ms }) => ms ?? null, told: ({ ms }) => heard.push(`told ${ms}`), wait: async (ms) => heard.push(ms) };
+  const answers = [{ ms: 2000 }, { ms: 3000 }, "taken"];
+  const ask = async () => {
+    const answer = answers.shift();
+    if (typeof answer === "string") return answer;
+    throw answer;
+  };
+  assert.equal(await patiently(ask, waits), "taken");
+  assert.deepEqual(heard, ["told 2000", 2000, 3000]);
+  await assert.rejects(patiently(() => Promise.reject({ name: "no" }), waits), { name: "no" });
+  let asked = 0;
+  await assert.rejects(patiently(() => (asked++, Promise.reject({ ms: 1 })), waits), { ms: 1 });
+  assert.equal(asked, 20);
 });

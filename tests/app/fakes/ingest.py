@@ -1,4 +1,4 @@
-"""Reads any recording as three frames: `ingest.py WORKDIR PROJECTDIR`."""
+"""Reads any recording as three frames: `ingest.py WORKDIR PROJECTDIR --request FILE`."""
 
 import json
 import shutil
@@ -29,7 +29,7 @@ def frame(index: int) -> dict[str, object]:
 
 if __name__ == "__main__":
     workdir, project = Path(sys.argv[1]), Path(sys.argv[2])
-    request = json.loads((workdir / "request.json").read_text())
+    request = json.loads(Path(sys.argv[4]).read_text())
     if "broken" in request["source"]:  # which shows late
         write_recording(workdir, project, request["source"])
         error = {"kind": "CaptureError", "message": "no depth in it", "hint": "record again"}

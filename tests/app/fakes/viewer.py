@@ -1,6 +1,7 @@
-"""A viewer whose upstream echoes; opacity 0.123 kills it; a view that is not open says so."""
+"""A viewer whose upstream echoes; opacity 0.123 kills it, 0.321 keeps it busy for ever; a view that is not open says so."""
 
 import json
+import signal
 import sys
 import threading
 from http import HTTPStatus
@@ -41,6 +42,8 @@ for line in sys.stdin:
     command = json.loads(line)
     if command.get("opacity") == 0.123:
         sys.exit(1)
+    if command.get("opacity") == 0.321:
+        signal.pause()
     if command["cmd"] == "open":
         opened.add(command["view"])
     elif command["view"] not in opened:

@@ -1,4 +1,4 @@
-"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE`."""
+"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE --request FILE`."""
 
 import json
 import signal
@@ -20,10 +20,10 @@ def say(**message: object) -> None:
     sys.stdout.flush()
 
 
-def work_slowly(workdir: Path, stage: str) -> None:
+def work_slowly(workdir: Path, stage: str, given: Path) -> None:
     """Take a moment, unless the same was done before; what is stored tells two doings apart."""
     stored = workdir / "nouns" / stage / "stand-in.noun"
-    key = (workdir / "prompts.json").read_text() + (workdir / "overrides.json").read_text()
+    key = (given / "prompts.json").read_text() + (given / "overrides.json").read_text()
     if stored.is_file() and json.loads(stored.read_text())["key"] == key:
         return
     time.sleep(0.3)
@@ -34,12 +34,12 @@ def work_slowly(workdir: Path, stage: str) -> None:
 
 
 def main() -> int:
-    workdir, stage = Path(sys.argv[1]), sys.argv[3]
+    workdir, stage, request = Path(sys.argv[1]), sys.argv[3], Path(sys.argv[5])
     told = workdir.parent / "behave.json"
     behaviour = json.loads(told.read_text()).get(stage, "done") if told.exists() else "done"
     with (workdir.parent / "calls.txt").open("a") as handle:
         handle.write(f"{stage}\n")
-    json.loads((workdir / "request.json").read_text())
+    json.loads(request.read_text())
     say(stage=stage, fraction=0.5, text=f"half of {stage}")
     if behaviour == "fail":
         sys.stderr.write("a traceback that a person may want to read\n")
@@ -50,7 +50,7 @@ def main() -> int:
         sys.stderr.flush()
         signal.raise_signal(signal.SIGKILL)
     if behaviour == "slow":
-        work_slowly(workdir, stage)
+        work_slowly(workdir, stage, request.parent)
     if behaviour in ("hang", "deaf"):
         stopped: list[int] = []
         signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number) if behaviour == "hang" else None)
@@ -61,9 +61,11 @@ def main() -> int:
         return 130
     if stage == "export":
         with zipfile.ZipFile(workdir / "bundle.zip", "w") as archive:
-            archive.writestr("scene.glb", b"glTF" + json.dumps(json.loads((workdir / "prompts.json").read_text())).encode())
+            archive.writestr(
+                "scene.glb", b"glTF" + json.dumps(json.loads((request.parent / "prompts.json").read_text())).encode()
+            )
             archive.writestr("scene.urdf", URDF)
-            archive.writestr("manifest.json", json.dumps({"stages": [{"name": "segment", "backend": "fake", "seconds": 2.0}]}))
+            archive.writestr("manifest.json", json.dumps({"stages": [{"name": "segment", "backend": "fake"}]}))
             archive.writestr("preview.png", b"png")
             archive.writestr("report.html", "<h1>report</h1>")
             archive.writestr("review.html", "<script>1</script>")

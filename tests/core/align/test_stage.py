@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from r2c2r_core.align import stage as stage_module
 from r2c2r_core.align.stage import AlignConfig, place_mesh
 from r2c2r_core.errors import Cancelled, InputError, PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
@@ -46,6 +47,31 @@ def test_a_textured_box_returns_from_any_frame(bench: Any, seed: int) -> None:
     assert not placement.unsure
     assert placement.runner_up is not None
     assert placement.runner_up < 0.95
+
+
+def nudged(truth: Similarity3, shift_m: float, turn_deg: float) -> Similarity3:
+    """The pose, off by so much."""
+    turn = Rotation.from_rotvec(np.radians(turn_deg) * np.array([0.3, 0.2, 0.93])).as_matrix()
+    return Similarity3(1.01 * truth.scale, turn @ truth.rotation, truth.translation + shift_m * np.array([0.6, -0.5, 0.6]))
+
+
+def test_a_pose_that_its_generator_knows_is_refined_and_not_searched_for(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    thing, capture, track = bench.blank_cabinet()
+    asset, truth = bench.as_candidate(thing, 2)
+    monkeypatch.setattr(stage_module, "box_hypotheses", None)  # a call would end in a TypeError
+    monkeypatch.setattr(stage_module, "_loaded", None)
+    known = replace(asset, world_from_mesh=nudged(truth, 0.008, 0.8))
+    placement = place_mesh(capture, track, known, "sift", LIGHT)
+    assert_placed(placement, truth, asset)
+    assert placement.method == "generator's pose, refined"
+    assert placement.runner_up is None
+
+
+def test_what_stands_elsewhere_than_its_masks_is_not_placed(bench: Any) -> None:
+    thing, capture, track = bench.blank_cabinet()
+    asset, truth = bench.as_candidate(thing, 2)
+    with pytest.raises(PlacementFailed, match="covers the mask with IoU"):
+        place_mesh(capture, track, replace(asset, world_from_mesh=nudged(truth, 3.0, 0.0)), "sift", LIGHT)
 
 
 def test_a_blank_cabinet_is_placed_by_geometry_alone(bench: Any) -> None:

@@ -187,7 +187,7 @@ def test_unreadable_truth_names_the_file_and_what_is_wrong(tmp_path: Path) -> No
     truth = truth_of(0)
     bundle, truth_file = write(tmp_path, truth, bundle_of(truth))
     truth_file.write_text("{")
-    with pytest.raises(BundleError, match="not valid JSON"):
+    with pytest.raises(BundleError, match="not usable JSON"):
         evaluate_bundle(bundle, truth_file)
     truth_file.write_text(json.dumps({"objects": [{"name": "a", "category": "b", "dimensions_m": [1, 2]}]}))
     with pytest.raises(BundleError, match="three numbers"):

@@ -10,7 +10,7 @@ from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_meshes
-from r2c2r_core.export.writers.table import FORMATS
+from r2c2r_core.export.writers.table import write_formats
 from r2c2r_core.model.scene import ArticulatedScene
 from tests.core.export.kitchen import kitchen, reconstruction
 
@@ -30,8 +30,7 @@ def write_folder(scene: ArticulatedScene, folder: Path) -> Path:
     folder.mkdir(parents=True)
     plan = supported(plan_bundle(scene))
     write_meshes(plan, folder, 2048)
-    for entry in FORMATS:
-        entry.write(plan, folder / entry.file)
+    write_formats(plan, folder)
     (folder / "manifest.json").write_text(json.dumps(manifest_of(reconstruction(scene), plan, None)))
     (folder / "README.txt").write_text("read me")
     (folder / "preview.png").write_bytes(b"not looked at")

@@ -16,6 +16,7 @@ from r2c2r_core.model.reconstruction import Reconstruction, StageRun
 from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 
+CREATED = "2026-11-21T06:00:00+00:00"
 FRONT_M, WALL_M, SEAT_M = 0.018, 0.016, 0.003
 INFERRED = {"axis": "inferred", "origin": "inferred", "limits": "default"}
 
@@ -23,16 +24,16 @@ INFERRED = {"axis": "inferred", "origin": "inferred", "limits": "default"}
 def reconstruction(scene: ArticulatedScene | None = None) -> Reconstruction:
     """Everything the exporter needs, around `scene`."""
     scene = scene or kitchen()
-    names = [item.name for item in scene.objects]
+    clicked = [item for item in scene.objects if item.category != "counter"]  # nobody clicks what is made from the scan
     return Reconstruction(
         capture=capture(),
-        prompts=Prompts(objects=tuple(_prompt(item) for item in scene.objects)),
+        prompts=Prompts(objects=tuple(_prompt(item) for item in clicked)),
         overrides=Overrides(objects={}),
-        tracks=tuple(_track(item) for item in scene.objects),
-        candidates=tuple(_candidates(name) for name in names),
-        placements=tuple(_placement(item) for item in scene.objects),
+        tracks=tuple(_track(item) for item in clicked),
+        candidates=tuple(_candidates(item.name) for item in clicked),
+        placements=tuple(_placement(item) for item in clicked),
         scene=scene,
-        stages=(StageRun(name="segment", backend="geometric", config={"voxel_m": 0.01}, seconds=1.25),),
+        stages=(StageRun(name="segment", backend="geometric", config={"voxel_m": 0.01}),),
         failures={"mug_1": "mug_1: no frame shows the object"},
     )
 
@@ -62,8 +63,13 @@ def cabinet(name: str, *, x: float = 0.0, gap_m: float = SEAT_M, yaw: float = 0.
         name=f"{name}_door",
         object_from_link=Rigid3(np.eye(3), hinge),
         boxes=(
-            Box(name="front", size_m=door_size, link_from_box=_at([size[0] / 2, FRONT_M / 2, 0.0])),
-            Box(name="handle", size_m=np.array([0.014, 0.03, 0.16]), link_from_box=_at([size[0] - 0.05, -0.015, 0.18])),
+            Box(name="front", role="front", size_m=door_size, link_from_box=_at([size[0] / 2, FRONT_M / 2, 0.0])),
+            Box(
+                name="handle",
+                role="handle",
+                size_m=np.array([0.014, 0.03, 0.16]),
+                link_from_box=_at([size[0] - 0.05, -0.015, 0.18]),
+            ),
         ),
         pieces=(),
         visual=panel_mesh(door_size, np.array([size[0] / 2, FRONT_M / 2, 0.0]), seed=1),
@@ -102,9 +108,10 @@ def double_door(name: str, *, x: float = 0.0) -> SceneObject:
                 name=f"{name}_{side}",
                 object_from_link=Rigid3(np.eye(3), hinge),
                 boxes=(
-                    Box(name="front", size_m=leaf, link_from_box=Rigid3(np.eye(3), centre)),
+                    Box(name="front", role="front", size_m=leaf, link_from_box=Rigid3(np.eye(3), centre)),
                     Box(
                         name="handle",
+                        role="handle",
                         size_m=np.array([0.014, 0.03, 0.16]),
                         link_from_box=_at([sign * (leaf[0] - 0.05), -0.015, 0.15]),
                     ),
@@ -146,10 +153,11 @@ def drawer(name: str, *, x: float = 0.0) -> SceneObject:
         name=f"{name}_drawer",
         object_from_link=Rigid3(),
         boxes=(
-            Box(name="front", size_m=front, link_from_box=Rigid3(np.eye(3), at_front)),
-            Box(name="tray", size_m=floor_size, link_from_box=Rigid3(np.eye(3), at_floor)),
+            Box(name="front", role="front", size_m=front, link_from_box=Rigid3(np.eye(3), at_front)),
+            Box(name="tray", role="inner", size_m=floor_size, link_from_box=Rigid3(np.eye(3), at_floor)),
             Box(
                 name="handle",
+                role="handle",
                 size_m=np.array([0.18, 0.03, 0.012]),
                 link_from_box=_at([0.0, -size[1] / 2 - 0.015, 0.08]),
             ),
@@ -184,7 +192,7 @@ def counter(name: str) -> SceneObject:
     slab = Link(
         name=f"{name}_slab",
         object_from_link=Rigid3(),
-        boxes=(Box(name="slab", size_m=size, link_from_box=Rigid3()),),
+        boxes=(Box(name="slab", role="carcass", size_m=size, link_from_box=Rigid3()),),
         pieces=(),
         visual=None,
         colour=(0.35, 0.33, 0.32),
@@ -227,7 +235,7 @@ def carcass(name: str, size: np.ndarray, gap_m: float) -> Link:
     return Link(
         name=f"{name}_base",
         object_from_link=Rigid3(),
-        boxes=tuple(Box(name=n, size_m=np.array(s), link_from_box=_at(c)) for n, (s, c) in panels.items()),
+        boxes=tuple(Box(name=n, role="carcass", size_m=np.array(s), link_from_box=_at(c)) for n, (s, c) in panels.items()),
         pieces=(),
         visual=None,
         colour=(0.9, 0.88, 0.84),

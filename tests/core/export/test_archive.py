@@ -1,3 +1,4 @@
+import os
 import stat
 import struct
 import zipfile
@@ -137,3 +138,10 @@ def _signatures(content: bytes, signature: bytes) -> list[int]:
         found.append(start)
         start = content.find(signature, start + 1)
     return found
+
+
+def test_a_pipe_in_a_folder_is_not_waited_for(good_folder: Path) -> None:
+    material = next(good_folder.rglob("*.obj"))
+    material.unlink()
+    os.mkfifo(material)
+    assert "a pipe" in refused(good_folder)

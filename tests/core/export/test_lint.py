@@ -280,6 +280,7 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         xml("scene.xml", lambda r: named(r, "body", "bottle_1_body").find("inertial").set("mass", "9")),
         set(),
     ),
+    ("format", "a cut web scene", write("scene.glb", "glTF"), set()),
     ("usd-parse", "a binary layer", write("scene.usda", "PXR-USDC"), set()),
     ("usd-path", "a texture elsewhere", text("scene.usda", "@./meshes/", "@../meshes/"), set()),
     ("usd-path", "a layer by its address", text("scene.usda", "upAxis", "subLayers = [@@@/etc/x.usda@@@]\n    upAxis"), set()),

@@ -59,7 +59,7 @@ def test_a_drawer_that_runs_into_a_cabinet_is_found_with_its_depth(tmp_path: Pat
     front_y = -0.56 / 2 - 0.03  # the handle's outer face, closed
     post = counter("post")
     size = np.array([0.1, 0.1, 0.4])
-    link = replace(post.links[0], boxes=(Box(name="post", size_m=size, link_from_box=Rigid3()),))
+    link = replace(post.links[0], boxes=(Box(name="post", role="carcass", size_m=size, link_from_box=Rigid3()),))
     inertia = replace(link.inertial, inertia=np.diag([1.0, 1.0, 1.0]), mass_kg=20.0, com_link=np.zeros(3))
     at = np.array([0.0, front_y - item.joints[0].upper - 0.05 + depth_m, 0.7])
     post = replace(post, dimensions_m=size, links=(replace(link, inertial=inertia),), world_from_object=Rigid3(np.eye(3), at))
@@ -174,7 +174,10 @@ def test_what_stands_beside_a_door_is_no_part_of_the_space_it_opens(tmp_path: Pa
     """A block behind the right door of a pair: the left door's space stays free, the right one's does not."""
     item = double_door("d")
     filling = Box(
-        name="filling", size_m=np.array([0.4, 0.45, 0.6]), link_from_box=Rigid3(np.eye(3), np.array([0.22, 0.03, 0.0]))
+        name="filling",
+        role="inner",
+        size_m=np.array([0.4, 0.45, 0.6]),
+        link_from_box=Rigid3(np.eye(3), np.array([0.22, 0.03, 0.0])),
     )
     base = replace(item.links[0], boxes=(*item.links[0].boxes, filling))
     left, right = simulated(tmp_path, replace(item, links=(base, *item.links[1:]))).joints
@@ -185,7 +188,7 @@ def test_what_stands_beside_a_door_is_no_part_of_the_space_it_opens(tmp_path: Pa
 def test_a_door_before_a_solid_block_is_an_error(tmp_path: Path) -> None:
     item = cabinet("c")
     size = item.dimensions_m - np.array([0.05, 0.05, 0.05])
-    filling = Box(name="filling", size_m=size, link_from_box=Rigid3(np.eye(3), np.array([0.0, 0.03, 0.0])))
+    filling = Box(name="filling", role="inner", size_m=size, link_from_box=Rigid3(np.eye(3), np.array([0.0, 0.03, 0.0])))
     base = replace(item.links[0], boxes=(*item.links[0].boxes, filling))
     result = simulated(tmp_path, replace(item, links=(base, *item.links[1:])))
     assert "cavity" in {f.rule for f in result.findings}

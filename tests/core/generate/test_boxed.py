@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import GenerationFailed
-from r2c2r_core.generate import boxed, priors
+from r2c2r_core.generate import boxed
 from r2c2r_core.generate.completion import Completion
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
+from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
+from r2c2r_core.kitchen.names import category_of
 from tests.core.generate.scenes import appliance_shape, front_shape
 
 
@@ -89,14 +91,15 @@ def test_a_card_tells_the_depth_that_its_mesh_has(front_scene, seed):
             assert told.startswith(f"{shape.vertices_local[:, 1].max():.2f} m deep")
     sold = [shape.vertices_local[:, 1].max() for shape, _, told in cards if "sold" in told]
     assert sold
-    assert all(min(abs(depth - listed) for listed in priors._DEPTHS_SOLD_M) < 1e-6 for depth in sold)
+    assert all(min(abs(depth - listed) for listed in DEPTHS_SOLD_M) < 1e-6 for depth in sold)
 
 
 @pytest.mark.parametrize(("usual_m", "told"), [(0.28, "points"), (0.345, "usually")])
 def test_an_appliance_is_never_shallower_than_its_points_reach_and_says_why(appliance_scene, monkeypatch, usual_m, told):
     """Seen 34 cm deep: a kind that is usually less deep is no reason for that."""
     monkeypatch.setattr(boxed, "_side_seen", lambda box, views: False)
-    monkeypatch.setitem(priors.CATEGORY_DEPTH_M, "microwave", usual_m)
+    shallow = replace(category_of("microwave"), depth=replace(category_of("microwave").depth, usual=usual_m))
+    monkeypatch.setattr(boxed, "category_of", lambda text: shallow)
     evidence = gather_evidence(*appliance_scene, 10)
     everything = whole_pool(evidence)
     first = boxed.appliance_hypotheses(evidence, everything)[0]

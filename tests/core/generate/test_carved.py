@@ -10,6 +10,7 @@ from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.hulls import carved_family
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.generate.votes import collect_votes, grid_votes
+from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.geometry.transforms import Rigid3
 from tests.core.generate.scenes import best_thing, carton_scene
@@ -76,6 +77,19 @@ def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene)
     np.testing.assert_allclose(
         np.minimum(blocks.free_m, truncation)[~free], np.minimum(every.free_m, truncation)[~free], atol=1e-6
     )
+
+
+def test_votes_of_more_frames_than_a_byte_counts_are_all_counted(bottle_scene):
+    evidence = gather_evidence(*bottle_scene, 6)
+    view = evidence.pool[0]
+    row, column = np.argwhere(view.mask & True)[np.count_nonzero(view.mask) // 2]
+    scale = view.depth_camera.width / view.rgb_camera.width
+    depth_px = int((row + 0.5) * scale), int((column + 0.5) * scale)
+    uv = np.array([[column + 0.5, row + 0.5]])
+    point = view.world_from_camera.apply(unproject(uv, view.depth_m[depth_px][None].astype(float), view.rgb_camera))
+    many = replace(whole_pool(evidence), views=(view,) * 300, carve_votes=2)
+    assert collect_votes(point, replace(many, views=(view,)), 0.03).surfaces[0] == 1
+    assert collect_votes(point, many, 0.03).surfaces[0] == 300
 
 
 def test_a_shell_answers_for_what_it_leaves_empty():

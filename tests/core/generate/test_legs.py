@@ -8,10 +8,11 @@ import pytest
 from r2c2r_core.generate.carved import carve
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.hulls import carved_family
-from r2c2r_core.generate.legs import find_support, stands_on_legs
+from r2c2r_core.generate.legs import find_support
 from r2c2r_core.generate.standing import stands
 from r2c2r_core.generate.variation import whole_pool
 from r2c2r_core.geometry.meshes import box_mesh, is_manifold, is_watertight, unite, volume
+from r2c2r_core.kitchen.names import category_of
 from tests.core.generate import scenes
 
 LEGS = {(x, y) for x in (-0.1875, 0.1875) for y in (-0.1875, 0.1875)}  # middles, in the frame of the chair's box
@@ -75,7 +76,7 @@ def test_closed_furniture_stands_on_no_legs(scene):
     """Round a corner, a closed side seen at a slant is as slender as a post; between the corners it is not."""
     evidence = gather_evidence(*scene(), 10)
     everything = whole_pool(evidence)
-    assert stands_on_legs(evidence.track.category)
+    assert category_of(evidence.track.category).on_legs
     assert find_support(carve(evidence, everything), everything.views) is None
 
 
@@ -112,14 +113,14 @@ def test_a_chair_says_how_many_of_its_legs_are_inferred(chair_scene, half_seen):
     "name", ["chair", "kitchen_table", "dining-table", "bar stools", "barstool", "armchair", "benches", "Desks", "chair_2"]
 )
 def test_the_last_word_of_a_name_says_what_stands_on_legs(name):
-    assert stands_on_legs(name)
+    assert category_of(name).on_legs
 
 
 @pytest.mark.parametrize(
     "name", ["bottle", "tablet", "cabinet", "table_lamp", "desk-lamp", "table cloth", "chair_cushion", "vegetable", ""]
 )
 def test_the_last_word_of_a_name_says_what_does_not_stand_on_legs(name):
-    assert not stands_on_legs(name)
+    assert not category_of(name).on_legs
 
 
 def test_a_slab_on_one_leg_at_its_corner_falls_over():

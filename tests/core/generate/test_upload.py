@@ -147,3 +147,9 @@ def test_an_upload_joins_the_candidates(bottle_scene, tmp_path):
 def test_a_real_generated_mesh_and_a_real_scan_are_read():
     for path in (MESHES / "sam3d-bench/0.glb", MESHES / "ycb-025_mug/textured.obj"):
         assert_usable(read(path))
+
+
+def test_vertices_of_two_numbers_are_refused(tmp_path):
+    (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
+    with pytest.raises(OverrideError, match=r"flat\.obj"):
+        read(tmp_path / "flat.obj")

@@ -5,9 +5,10 @@ import pytest
 
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.symmetry import Revolution
-from r2c2r_core.generate.vessel import VesselHandle, is_open_vessel, vessel_mesh
+from r2c2r_core.generate.vessel import VesselHandle, vessel_mesh
 from r2c2r_core.geometry.hollows import find_hollow
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
+from r2c2r_core.kitchen.names import category_of
 from tests.core.generate.scenes import best_thing, mug_scene
 
 
@@ -41,8 +42,8 @@ def test_vessels_are_closed_manifold_and_outward(handle):
 
 
 def test_names_say_what_opens_upwards():
-    assert all(is_open_vessel(name) for name in ("mug", "coffee_mug", "bowls", "plant pot"))
-    assert not any(is_open_vessel(name) for name in ("bottle", "cupboard", "teapot", "panel", "potato", "jar"))
+    assert all(category_of(name).open_vessel for name in ("mug", "coffee_mug", "bowls", "plant pot"))
+    assert not any(category_of(name).open_vessel for name in ("bottle", "cupboard", "teapot", "panel", "potato", "jar"))
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 2.0])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from r2c2r_core.segment.categories import hint_for
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.cut import Cell, cut_panels
 from r2c2r_core.segment.lines import Evidence
 from r2c2r_core.segment.units import drawer_cell, unit_cell
@@ -48,9 +48,7 @@ def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     upright = evidence(252, 300, [(0, 0, 288), (36, 96, 240), (204, 96, 240), (240, 0, 288)])
     level = evidence(300, 252, [(0, 0, 240), (96, 36, 204), (240, 36, 204), (288, 0, 240)])
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), vertical=upright, horizontal=level)
-    size = hint_for("oven").size
-    assert size is not None
-    assert unit_cell(run, 120.0, 150.0, size) == frame
+    assert unit_cell(run, 120.0, 150.0, category_of("oven")) == frame
 
 
 def test_a_drawer_is_parted_from_its_stack_by_a_seam_that_shows_only_beside_the_handles() -> None:

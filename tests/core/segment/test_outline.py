@@ -6,6 +6,7 @@ import pytest
 
 from r2c2r_core.geometry.camera import Intrinsics, project
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.segment.outline import Body, Photo, best_depth, best_top, outlined_body
 
 CAMERA = Intrinsics(fx=700.0, fy=700.0, cx=320.0, cy=240.0, width=640, height=480)
@@ -42,7 +43,7 @@ def photo(eye, body_grey, *, side_grey=50, tiles=True, hidden=False):
     noise = np.random.default_rng(0).normal(0.0, 3.0, rgb.shape)
     rgb = np.clip(rgb + noise, 0, 255).astype(np.uint8)
     depth = np.full((120, 160), 0.3 if hidden else 0.0, np.float32)
-    return Photo(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), CAMERA, depth, pose)
+    return Photo(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), CAMERA, depth, pose, DepthNoise())
 
 
 def test_top_and_back_are_found_to_millimetres_from_a_guess_centimetres_off():

@@ -7,9 +7,11 @@ from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.finders import _on_thing
 from r2c2r_core.segment.geometric import GeometricSession
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.stage import open_session
+from r2c2r_core.segment.things import ThingConfig
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import FRONT_Y, Pixels, click_on, prompt
 
@@ -55,6 +57,23 @@ def test_a_second_click_on_what_has_no_depth_does_not_lose_the_object(
     seen = Scene.pick
     monkeypatch.setattr(Scene, "pick", lambda self, frame, x, y: None if frame == 70 else seen(self, frame, x, y))
     assert mask_iou(once, session.mask_at(prompt("carton", "box", first, second), 60)) > 0.9
+
+
+def test_a_point_is_judged_by_the_ray_of_its_own_click(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An appliance's first clicks may hit nothing; where it is cut as a thing, the others still belong to their points."""
+    blind, first, second = (click_on(boxes[0], (1.06, -0.36, 1.0), frame) for frame in (50, 60, 70))
+    pick, behind = Scene.pick, {70: np.array([1.06, -0.6, 1.4])}  # the third click shows what is behind the thing
+    monkeypatch.setattr(
+        Scene, "pick", lambda self, frame, x, y: None if frame == 50 else behind.get(frame, pick(self, frame, x, y))
+    )
+    rays = []
+    monkeypatch.setattr(Scene, "ray", lambda self, frame, x, y: rays.append(frame) or (np.zeros(3), np.array([0.0, 1.0, 0.0])))
+    _, hits, _ = session._clicked(prompt("oven_1", "microwave", blind, first, second))
+    _on_thing(session, hits, ThingConfig(radius_m=0.05))
+    assert hits.clicks == (first, second)
+    assert rays == [70]
 
 
 def test_an_object_that_no_frame_sees_is_an_error(

@@ -1,0 +1,161 @@
+"""Carrying the data folder away and back, and whether its database and its files agree."""
+
+import json
+import shutil
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.backups import backup
+from app.data_check import check_data
+from app.files import only_server
+from r2c2r_core.cli import main
+from tests.app.conftest import Running
+
+Start = Callable[..., Any]
+
+
+@pytest.fixture
+def kept(start: Start, tmp_path: Path) -> tuple[Path, str]:
+    """A data folder at rest with a project that has a bundle; its id."""
+    with start() as web:
+        project = web.sample()
+        web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
+    data = tmp_path / "data"
+    (data / "projects" / project / "source" / "scan.r3d").touch()  # the stand-in for the sample's job writes no recording
+    for path in (data, *data.glob("r2c2r.db*")):
+        path.chmod(0o700 if path.is_dir() else 0o600)
+    return data, project
+
+
+def findings(data: Path) -> set[tuple[str, str]]:
+    return {(found.what, Path(found.where).name) for found in check_data(data)}
+
+
+def test_a_backup_taken_while_the_server_writes_is_whole(start: Start, tmp_path: Path) -> None:
+    with start() as web:
+        project = web.sample()
+        drawer = web.get(f"/api/projects/{project}/objects")[0]["id"]
+        address = f"/api/projects/{project}/objects/{drawer}/points?infer=false"
+        web.post(address, {"frame": 3, "x": 1.5, "y": 2.5, "label": 0})
+        moved = backup(web.settings.data_dir, tmp_path / "copy")
+        web.post(address, {"frame": 3, "x": 9.5, "y": 2.5, "label": 0})
+    assert moved.projects == 1
+    assert (tmp_path / "copy" / "projects" / project / "facts.json").is_file()
+    connection = sqlite3.connect(tmp_path / "copy" / "r2c2r.db")
+    assert connection.execute("SELECT x FROM prompt_points WHERE label = 0").fetchall() == [(1.5,)]
+    connection.close()
+    assert [path.name for path in (tmp_path / "copy").iterdir() if path.is_file()] == ["r2c2r.db"]  # no -wal to forget
+
+
+def test_what_was_lost_comes_back_and_what_is_there_stays(
+    kept: tuple[Path, str], tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, project = kept
+    copy, bundle = tmp_path / "copy", data / "projects" / project / "bundles" / "v1.zip"
+    assert main(["backup", str(data), "-o", str(copy)]) == 0
+    assert "of 1 projects" in capsys.readouterr().out
+    assert main(["backup", str(data), "-o", str(copy)]) == 2  # never written over
+    bundle.unlink()
+    (data / "projects" / project / "facts.json").write_text("newer")
+    (data / "r2c2r.db").write_bytes(b"damaged" * 1000)
+    assert main(["restore", str(copy), str(data)]) == 0
+    assert bundle.is_file()
+    assert (data / "projects" / project / "facts.json").read_text() == "newer"
+    (replaced,) = (data / "backups").glob("replaced-*/r2c2r.db")
+    assert replaced.read_bytes() == b"damaged" * 1000
+    with start() as web:
+        assert [shown["id"] for shown in web.get("/api/projects")] == [project]
+
+
+def test_a_database_alone_is_backed_up_and_restored(kept: tuple[Path, str], tmp_path: Path) -> None:
+    data, _ = kept
+    assert main(["backup", str(data), "-o", str(tmp_path / "night.db")]) == 0
+    (data / "r2c2r.db").unlink()
+    assert main(["restore", str(tmp_path / "night.db"), str(data)]) == 0
+    assert findings(data) == set()
+
+
+def test_nothing_is_restored_under_a_running_server_or_from_what_is_no_backup(
+    kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, _ = kept
+    before = (data / "r2c2r.db").read_bytes()
+    assert main(["backup", str(data), "-o", str(tmp_path / "night.db")]) == 0
+    with only_server(data):
+        assert main(["restore", str(tmp_path / "night.db"), str(data)]) == 1
+    assert "serves this folder" in capsys.readouterr().err
+    (tmp_path / "garbage.db").write_bytes(b"no database" * 1000)
+    for source in ("garbage.db", "nothing.db", "data"):
+        assert main(["restore", str(tmp_path / source), str(data)]) > 0
+        assert capsys.readouterr().err.count("\n") == 1
+    assert (data / "r2c2r.db").read_bytes() == before
+
+
+def test_check_data_finds_what_is_missing_unknown_damaged_and_open(
+    kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, project = kept
+    assert main(["check-data", str(data)]) == 0
+    assert "all is well" in capsys.readouterr().out
+    folder = data / "projects" / project
+    shutil.copy(folder / "bundles" / "v1.zip", folder / "bundles" / "v7.zip")
+    (folder / "bundles" / "v1.zip").write_bytes(b"other")
+    (folder / "frames.json").unlink()
+    (folder / "source" / "scan.r3d").unlink()
+    (data / "projects" / "0123456789ab").mkdir()
+    (data / "unknown").mkdir()
+    for path in (data / "uploads" / "stray.part", data / "unknown" / "x"):
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    said = json.loads((folder / "project.json").read_text()) | {"changed": 1.0}
+    (folder / "project.json").write_text(json.dumps(said))
+    data.chmod(0o755)
+    assert main(["check-data", str(data), "--json", str(tmp_path / "found.json")]) == 1
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["version"] == 1
+    assert {(one["what"], Path(one["where"]).name) for one in found["findings"]} == {
+        ("unknown", "v7.zip"),
+        ("damaged", "v1.zip"),
+        ("missing", "frames.json"),
+        ("missing", "scan.r3d"),
+        ("unknown", "0123456789ab"),
+        ("unknown", "stray.part"),
+        ("unknown", "x"),
+        ("outdated", "project.json"),
+        ("open", "data"),
+    }
+    data.chmod(0o700)
+    shutil.rmtree(folder)  # the rows stay
+    assert ("missing", project) in findings(data)
+    (data / "r2c2r.db").write_bytes(b"damaged" * 1000)
+    assert main(["check-data", str(data)]) == 2
+    assert main(["check-data", str(tmp_path / "nowhere")]) == 2
+
+
+def test_rows_without_their_parents_are_told(kept: tuple[Path, str]) -> None:
+    data, _ = kept
+    connection = sqlite3.connect(data / "r2c2r.db")
+    connection.execute("INSERT INTO prompt_points (object_id, frame, x, y, label) VALUES (999, 0, 1, 1, 1)")
+    connection.commit()
+    connection.close()
+    assert ("damaged", "r2c2r.db") in findings(data)
+
+
+def test_the_doctor_tells_of_a_folder_that_others_may_use(tmp_path: Path) -> None:
+    from r2c2r_core.doctor import examine_machine
+
+    tmp_path.chmod(0o750)
+    (found,) = (one for one in examine_machine(tmp_path) if one.what == "data folder")
+    assert (found.state, "chmod go=" in found.detail) == ("problem", True)
+    tmp_path.chmod(0o700)
+    (found,) = (one for one in examine_machine(tmp_path) if one.what == "data folder")
+    assert found.state == "ok"
+
+
+def test_uploads_under_way_are_no_findings(web: Running) -> None:
+    web.post("/api/uploads", {"file_name": "Kitchen.r3d", "size": 10})
+    assert {what for what, _ in findings(web.settings.data_dir)} <= {"open"}

@@ -1,0 +1,30 @@
+"""What a finished job leaves."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.db.engine import open_engine, writing
+from app.db.tables import Job, Project
+from app.files import project_files
+from app.jobs import outcomes
+
+
+def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server killed meanwhile leaves the former ones: whoever has them open still reads all of them."""
+    monkeypatch.setattr(outcomes, "adopt_bundle", lambda *_: None)
+    files = project_files(tmp_path, "p")
+    (tmp_path / "rows").mkdir()
+    asked = files.request(1).with_name("prompts.json")
+    asked.parent.mkdir(parents=True)
+    asked.write_text('{"version": 1, "objects": []}')
+    files.finished_prompts.parent.mkdir(parents=True, exist_ok=True)
+    files.finished_prompts.write_text('{"version": 1, "objects": ["former"]}')
+    engine = open_engine(tmp_path / "rows" / "r.db")
+    with files.finished_prompts.open() as former, writing(engine) as session:
+        project = Project(id="p", name="p", status="ready", created=0.0, updated=0.0, source_name="s")
+        outcomes.run_done(session, Job(id=1, project_id="p", kind="run", state="done", created=0.0), project, files)
+        assert json.load(former)["objects"] == ["former"]
+    assert json.loads(files.finished_prompts.read_text())["objects"] == []
+    engine.dispose()

@@ -1,0 +1,67 @@
+"""Where things lie on the server is told to admins alone."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from argon2 import PasswordHasher
+from starlette.testclient import TestClient
+
+from app.errors import NoSpace
+from app.privacy import without_places
+from app.services import accounts, projects
+from tests.app.conftest import ORIGIN, Running, running
+
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture
+def web(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Running]:
+    quick = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1)
+    monkeypatch.setattr(accounts, "_hasher", lambda: quick)
+    with running(tmp_path / "data") as web:
+        accounts.add(web.context.engine, "rita", "reviewer", PASSWORD)
+        yield web
+
+
+@pytest.fixture
+def rita(web: Running) -> TestClient:
+    client = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "t"}, raise_server_exceptions=False)
+    assert client.post("/api/login", json={"name": "rita", "password": PASSWORD}).status_code == 204
+    return client
+
+
+def test_messages_name_the_file_and_to_admins_the_way_to_it(
+    web: Running, rita: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = str(web.settings.data_dir)
+
+    def full(*_: object) -> None:
+        raise NoSpace(f"no room for {place}/projects/ab/overrides.json", hint=f"look at {place}/projects")
+
+    monkeypatch.setattr(projects, "get_project", full)
+    told = rita.get("/api/projects/ab")
+    assert told.status_code == 507
+    assert place not in told.text
+    assert told.json()["message"] == "no room for …/projects/ab/overrides.json"
+    assert told.json()["hint"] == "look at …/projects"
+    assert place in web.client.get("/api/projects/ab").text
+
+
+def test_folders_that_recordings_come_from_are_the_admins(web: Running, rita: TestClient) -> None:
+    assert web.get("/api/system")["import_roots"] == [str(root) for root in web.settings.roots]
+    assert rita.get("/api/system").json()["import_roots"] == []
+
+
+def test_hidden_folders_are_not_listed_by_their_path_either(web: Running, tmp_path: Path) -> None:
+    (tmp_path / ".ssh" / "inner").mkdir(parents=True)
+    for folder in (".ssh", ".ssh/inner"):
+        assert web.client.get("/api/browse", params={"path": str(tmp_path / folder)}).status_code == 403
+        assert web.client.post("/api/projects/import", json={"path": str(tmp_path / folder)}).status_code == 403
+    assert web.client.get("/api/browse", params={"path": str(tmp_path)}).status_code == 200
+
+
+def test_only_the_way_is_left_out(web: Running) -> None:
+    text = f"{web.settings.data_dir}/projects/ab/clicks/overrides.json: a/b is no pose; see /api/openapi.json"
+    assert without_places(f"{web.settings.data_dir}-2/x", web.settings) != "…-2/x"
+    assert without_places(text, web.settings) == "…/projects/ab/clicks/overrides.json: a/b is no pose; see /api/openapi.json"

@@ -1,0 +1,206 @@
+"""What a question costs does not depend on how much there is: counted in queries and bytes, for those need no clock."""
+
+import json
+from typing import Any
+
+import pytest
+from sqlalchemy import event
+from sqlmodel import select
+
+from app.db import history
+from app.db.engine import writing
+from app.db.queries import project_row
+from app.db.tables import Bundle, Comment, Event, Job, Override, Point, Project, SceneObject, Verdict
+from app.file_cache import FileCache
+from app.files import project_files
+from app.jobs import mask_store
+from app.jobs.mask_store import mask_path
+from app.services import views
+from tests.app.conftest import Running
+from tests.app.nouns import finish
+from tests.app.test_jobs import run
+
+OBJECTS, CLICKS = 40, 12  # more of each than there were
+MOST_BYTES = 40_000  # on the wire, at that size: 300 kB at 200 objects and 5,000 clicks
+
+
+def questions(web: Running, project: str, item: int) -> list[str]:
+    """Every address of the API that can be asked about the project."""
+    values = {"project": project, "object": item, "frame": 3, "job": 1, "version": 1}
+    paths = web.app.openapi()["paths"]
+    asked = [path for path, methods in paths.items() if "get" in methods and path.startswith("/api/")]
+    return [path.format(**values) + ("?since=1" * path.endswith("changes")) for path in asked if "{upload}" not in path]
+
+
+def grow(web: Running, project: str) -> None:
+    """More objects, clicks, comments, verdicts, jobs and bundles in the project, and more projects."""
+    with writing(web.context.engine) as session:
+        row = project_row(session, project)
+        for k in range(OBJECTS):
+            item = SceneObject(project_id=project, name=f"more_{k}", category="drawer", colour=k, deleted=True)
+            session.add(item)
+            session.flush()
+            with history.change(session, item, "prompts", "create", "made", who="eve"):
+                item.deleted = False
+                clicks = [Point(object_id=item.id or 0, frame=3, x=float(n), y=60.5, label=1) for n in range(CLICKS)]
+                session.add_all(clicks)
+            session.add(Override(project_id=project, object_id=item.id, data={"hinge": "left"}))
+            session.add(Verdict(object_id=item.id or 0, candidate="c0", verdict="accepted", who="eve", at=1.0))
+            session.add(Comment(project_id=project, object_id=item.id, text="look", who="eve", at=1.0))
+            session.add(Job(project_id=project, kind="run", state="done", created=1.0))
+            session.add(Bundle(project_id=project, version=10 + k, path="v1.zip", sha256="ab" * 32, size=1, created=1.0))
+            path = mask_path(web.context.files(row).masks, item.id or 0, item.masks_key)
+            mask_store.write(path, [_entry(frame) for frame in range(0, 400, 2)], "geometric")
+        for k in range(OBJECTS):
+            other = row.model_dump(exclude={"id", "name"})
+            session.add(Project(id=f"other{k}", name=f"Kitchen {k}", **other))
+            session.flush()
+            session.add(Job(project_id=f"other{k}", kind="run", state="queued", created=1.0))
+            session.add(Bundle(project_id=f"other{k}", version=1, path="v1.zip", sha256="ab" * 32, size=1, created=1.0))
+
+
+def _entry(frame: int) -> mask_store.Entry:
+    box = {"width": 160, "height": 120, "left": frame % 100, "top": 1, "box_width": 0, "box_height": 0, "bits": ""}
+    return {"frame": frame, "confidence": (frame * 37 % 100) / 100, "area": 0.01, "mask": box}
+
+
+@pytest.fixture
+def finished(web: Running, monkeypatch: pytest.MonkeyPatch) -> tuple[Running, str, int]:
+    monkeypatch.setattr("app.services.people.REMEMBERED_S", 1e6)  # whose session it is, is asked once
+    web.context.people.look_again()
+    project = web.sample()
+    web.job(run(web, project), "done")
+    finish(web.settings.data_dir / "projects" / project / "work")
+    web.context.runner.stop()  # the queue of the other projects stays a queue
+    return web, project, web.get(f"/api/projects/{project}/objects")[0]["id"]
+
+
+def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_is_more(
+    finished: tuple[Running, str, int],
+) -> None:
+    web, project, item = finished
+    asked = questions(web, project, item)
+    queries: list[str] = []
+    event.listen(web.context.engine, "before_cursor_execute", lambda *said: queries.append(said[2]))
+
+    web.context.runner.stop()  # what is counted is asked for by a request
+    web.context.descriptions.stop()
+
+    def count(path: str) -> tuple[int, int]:
+        queries.clear()
+        with web.client.stream("GET", path) as answer:
+            size = len(b"".join(answer.iter_raw()))
+        assert answer.status_code < 500, path
+        return len(queries), size
+
+    before = {path: count(path)[0] for path in asked}
+    grow(web, project)
+    after = {path: min(count(path), count(path)) for path in asked}  # a tidy falls into one of them at most
+    assert len(asked) > 25
+    more = {path: (before[path], number) for path, (number, _) in after.items() if number > before[path] + QUEUE.get(path, 0)}
+    assert more == {}
+    assert {path: size for path, (_, size) in after.items() if size > MOST_BYTES} == {}
+
+
+QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # once something waits, its place among all that do is looked up
+
+
+MOST_OF_A_CLICK = 19  # statements, the transactions' begins aside; a row is written once
+
+
+def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
+    web, project, item = finished
+    queries: list[str] = []
+    event.listen(web.context.engine, "before_cursor_execute", lambda *said: queries.append(said[2]))
+
+    def click() -> int:
+        queries.clear()
+        point = {"frame": 3, "x": 1.5, "y": 1.5, "label": 0}
+        web.post(f"/api/projects/{project}/objects/{item}/points?infer=false", point, 201)
+        return len(queries)
+
+    click()
+    before = click()
+    grow(web, project)
+    assert click() == before <= MOST_OF_A_CLICK
+    with writing(web.context.engine) as session:
+        events = session.exec(select(Event).where(Event.object_id == item, Event.action == "add point")).all()
+        assert {(len(stored.before or {}), len(stored.after or {})) for stored in events} == {(0, 1)}
+
+
+def test_a_cache_of_files_holds_so_many_bytes_and_sees_that_a_file_changed(tmp_path: Any) -> None:
+    made: list[str] = []
+    cache: FileCache[str] = FileCache(25)
+
+    def look(name: str) -> str | None:
+        def make() -> str:
+            made.append(name)
+            return (tmp_path / name).read_text()
+
+        return cache.get(tmp_path / name, make, lambda text, _: len(text))
+
+    for name in "abc":
+        (tmp_path / name).write_text(name * 10)
+    assert [look(name) for name in "abab"] == ["a" * 10, "b" * 10, "a" * 10, "b" * 10]
+    assert (made, cache.bytes) == (["a", "b"], 20)
+    look("c")  # the third does not fit: what was unused longest goes
+    assert (look("b"), made, cache.bytes) == ("b" * 10, ["a", "b", "c"], 20)
+    (tmp_path / "b").write_text("new")
+    assert (look("b"), cache.bytes) == ("new", 13)
+    assert look("nowhere") is None
+
+
+def test_where_masks_lie_is_read_from_the_end_of_their_file_and_found_without_one_too(tmp_path: Any) -> None:
+    path = tmp_path / "masks" / "k.jsonl"
+    mask_store.begin(path)
+    for frame in (7, 3, 3):
+        mask_store.append(path, {**_entry(frame), "confidence": frame / 10})
+    begun = mask_store.read(path)
+    assert begun is not None
+    assert (begun.end, begun.seen()[:, 0].tolist(), begun.entry(5)) == (None, [3.0, 7.0], None)
+    mask_store.finish(path, "done", None)
+    done = mask_store.read(path)
+    assert done is not None
+    assert (done.end, done.index.tolist()) == ("done", begun.index.tolist())
+    assert (done.entry(7) or {})["confidence"] == 0.7
+    with path.open("a") as handle:
+        handle.write('{"frame": 9, "conf')  # a crash
+    cut = mask_store.read(path)
+    assert cut is not None
+    assert cut.seen().tolist() == done.seen().tolist()
+    mask_store.begin(path)  # computed anew meanwhile: the old places mean nothing
+    assert done.entry(7) is None
+
+
+def test_an_index_of_masks_is_read_as_it_was_written_before_it_was_packed(tmp_path: Any) -> None:
+    entry = {"frame": 4, "confidence": 0.5, "area": 0.1, "mask": {}}
+    mask_store.write(tmp_path / "packed", [entry], "geometric")
+    line, end = (tmp_path / "packed").read_text().splitlines()
+    index = [[4, 0.5, 0.1, 0, len(line) + 1]]
+    (tmp_path / "numbers").write_text(f"{line}\n{json.dumps({**json.loads(end), 'index': index})}")
+    packed, numbers = (mask_store.read(tmp_path / name) for name in ("packed", "numbers"))
+    assert packed is not None
+    assert numbers is not None
+    assert packed.index.tolist() == numbers.index.tolist() == index
+    assert packed.entry(4) == numbers.entry(4) == entry
+
+
+def test_nouns_are_kept_by_their_bytes_and_read_anew_when_their_file_changed(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files, reads = project_files(tmp_path, "p"), []
+    files.work.mkdir(parents=True)
+    finish(files.work)
+    monkeypatch.setattr(views, "_FACTS", FileCache(40))
+
+    def told(noun: Any) -> list[str]:
+        reads.append(noun.object_name)
+        return [noun.object_name] * 2  # 26 bytes as JSON
+
+    for _ in range(2):
+        views.facts(files, "generate", "drawer_1", told)
+    assert len(reads) == 1
+    views.facts(files, "align", "drawer_1", told)  # takes its place
+    views.facts(files, "generate", "drawer_1", told)
+    assert len(reads) == 3
+    assert views.facts(files, "generate", "nothing", told) is None

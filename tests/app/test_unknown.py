@@ -1,0 +1,237 @@
+"""A lost or restored database costs nobody their work: folders say what they are, are set aside, and are adopted."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import event
+from sqlmodel import col, select
+from starlette.testclient import TestClient
+
+from app.db.description import describe, read_description
+from app.db.engine import opened, reading, writing
+from app.db.tables import Job, Override, Project, Verdict
+from app.errors import DatabaseUnusable
+from app.files import project_files
+from app.services import accounts, leftovers
+from app.services.adopting import adopt_all
+from r2c2r_core.errors import InputError
+from tests.app.conftest import ORIGIN, Running
+
+Start = Callable[..., Any]
+
+
+def worked_on(web: Running) -> str:
+    """A project with a click, a correction, a verdict, a comment, a deleted object and a bundle."""
+    project = web.sample()
+    base = f"/api/projects/{project}"
+    drawer, mug = web.get(f"{base}/objects")
+    web.post(f"{base}/objects/{drawer['id']}/points?infer=false", {"frame": 3, "x": 11.5, "y": 12.5, "label": 0})
+    web.patch(f"{base}/objects/{drawer['id']}/override", {"hinge": "left", "joint_upper": 1.0, "joint_lower": 0.0})
+    web.job(web.post(f"{base}/run", {}, 202)["id"], "done")
+    with writing(web.context.engine) as session:
+        verdict = {"candidate": "c0", "verdict": "accepted", "reason": "fits", "who": "tester", "at": 5.0}
+        session.add(Verdict(object_id=drawer["id"], **verdict))
+    web.post(f"{base}/comments", {"text": "the left one", "object": mug["id"]})
+    web.patch(base, {"name": "Aunt Ida's kitchen"})
+    web.delete(f"{base}/objects/{mug['id']}")
+    return project
+
+
+def known(web: Running, project: str) -> Any:
+    """What people made of it, as the app shows it."""
+    base = f"/api/projects/{project}"
+    shown = web.get(base)
+    objects = [{key: row[key] for key in ("id", "name", "category", "colour", "points")} for row in web.get(f"{base}/objects")]
+    for point in (point for item in objects for point in item["points"]):
+        point.pop("id")
+    with reading(web.context.engine) as session:
+        verdicts = [row.model_dump(exclude={"id"}) for row in session.exec(select(Verdict))]
+        overrides = [row.model_dump(exclude={"id"}) for row in session.exec(select(Override).order_by(col(Override.object_id)))]
+    comments = [{key: row[key] for key in ("text", "who", "at", "resolved_at")} for row in web.get(f"{base}/comments")]
+    return {
+        **{key: shown[key] for key in ("name", "status", "created", "counts", "review_state", "segmenter", "result")},
+        "objects": objects,
+        "verdicts": verdicts,
+        "overrides": [row for row in overrides if row["data"]],
+        "comments": comments,
+        "bundles": web.get(f"{base}/bundles"),
+        "certificate": web.get(f"{base}/certificate")["passed"],
+        "frames": web.get(f"{base}/frames"),
+    }
+
+
+def lose(data: Path) -> None:
+    for path in data.glob("r2c2r.db*"):
+        path.unlink()
+
+
+def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with start() as web:
+        project = worked_on(web)
+        before = known(web, project)
+    lose(data)
+    with pytest.raises(DatabaseUnusable, match="1 project folder"), opened(data / "r2c2r.db"):
+        pass
+    with opened(data / "r2c2r.db", anew=True) as engine:
+        assert adopt_all(engine, data, "tester") == [f"{project}: adopted as Aunt Ida's kitchen"]
+        assert adopt_all(engine, data, "tester") == []
+    with start() as web:
+        assert known(web, project) == before
+        base = f"/api/projects/{project}"
+        web.post(f"{base}/undo", {"scope": "prompts"})  # the deleted mug comes back
+        assert [item["name"] for item in web.get(f"{base}/objects")] == ["drawer_1", "mug_1"]
+
+
+def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted(start: Start, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with start() as web:
+        old = web.sample()
+    shutil.copy(data / "r2c2r.db", tmp_path / "yesterday.db")
+    with start() as web:
+        project = worked_on(web)
+        drawer = web.get(f"/api/projects/{old}/objects")[0]["id"]
+        web.post(f"/api/projects/{old}/objects/{drawer}/points?infer=false", {"frame": 3, "x": 1.5, "y": 2.5, "label": 0})
+        before, clicks = known(web, project), web.get(f"/api/projects/{old}")["counts"]["points"]
+    lose(data)
+    shutil.copy(tmp_path / "yesterday.db", data / "r2c2r.db")
+    os.utime(data / "projects" / project, (1, 1))
+    with start() as web:
+        web.until(lambda: (data / "unknown" / f"{old}-newer" / "project.json").exists())
+        leftovers.tidy(web.context)
+        assert [shown["id"] for shown in web.get("/api/projects")] == [old]
+        whole, newer = sorted(web.get("/api/unknown"), key=lambda entry: entry["kind"], reverse=True)
+        assert (whole["kind"], whole["name"], whole["objects"], whole["bundles"]) == ("project", "Aunt Ida's kitchen", 1, 1)
+        assert (whole["recording"], whole["why_not"], whole["left"], newer["kind"]) == (True, "", False, "newer")
+        assert web.post(f"/api/unknown/{whole['entry']}/leave")["left"]
+        web.post("/api/unknown/..%2Fprojects/adopt", status=404)
+        assert web.post(f"/api/unknown/{whole['entry']}/adopt")["id"] == project
+        assert known(web, project) == before
+        assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks - 1
+        web.post(f"/api/unknown/{newer['entry']}/adopt")
+        assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks
+        web.post(f"/api/projects/{old}/undo", {"scope": "prompts", "object": drawer})  # and that can be undone
+        assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks - 1
+        assert web.get("/api/unknown") == []
+
+
+def test_only_an_admin_sees_what_was_set_aside(web: Running) -> None:
+    accounts.add(web.context.engine, "eve", "reviewer", "three plain words")
+    eve = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"})
+    eve.post("/api/login", json={"name": "eve", "password": "three plain words"})
+    assert eve.get("/api/unknown").status_code == 403
+    assert eve.post("/api/unknown/x/adopt").status_code == 403
+    assert eve.post("/api/unknown/x/leave").status_code == 403
+
+
+def test_what_is_no_project_is_shown_and_not_adopted(web: Running) -> None:
+    folder = web.settings.unknown
+    for name, content in (("a/project.json", b'{"version": 2}'), ("b/notes.txt", b"x"), ("c.part", b"bytes")):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    shown = {entry["entry"]: entry for entry in web.get("/api/unknown")}
+    assert {entry["kind"] for entry in shown.values()} == {"other"}
+    assert "version" in shown["a"]["why_not"]
+    assert "neither project.json nor a recording" in shown["b"]["why_not"]
+    for name in shown:
+        assert web.post(f"/api/unknown/{name}/adopt", status=422)["kind"] == "input"
+    assert (folder / "a" / "project.json").exists()
+
+
+def test_a_folder_of_an_older_version_is_adopted_with_the_clicks_of_its_last_run(start: Start, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with start() as web:
+        project = worked_on(web)
+    folder = data / "projects" / project
+    (folder / "project.json").unlink()
+    shutil.copy(folder / "finished-prompts.json", folder / "work" / "prompts.json")
+    corrections = {"version": 1, "objects": {"drawer_1": {"hinge": "left", "joint_limits": [0.0, 1.0]}}}
+    (folder / "work" / "overrides.json").write_text(json.dumps(corrections))
+    lose(data)
+    with opened(data / "r2c2r.db", anew=True) as engine:
+        (said,) = adopt_all(engine, data, "tester")
+    assert "adopted" in said
+    with start() as web:
+        (drawer, _) = web.get(f"/api/projects/{project}/objects")
+        assert (drawer["name"], len(drawer["points"])) == ("drawer_1", 2)
+        override = web.get(f"/api/projects/{project}/objects/{drawer['id']}/override")
+        assert (override["hinge"], override["joint_upper"]) == ("left", 1.0)
+        assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [1]
+
+
+def test_a_recording_that_was_never_read_is_read_after_it_is_adopted(start: Start, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with start() as web:
+        project = web.sample()
+    folder = data / "projects" / project
+    (folder / "facts.json").unlink()
+    (folder / "source").mkdir(exist_ok=True)
+    (folder / "source" / "scan.r3d").touch()
+    lose(data)
+    with opened(data / "r2c2r.db", anew=True) as engine:
+        adopt_all(engine, data, "tester")
+        with reading(engine) as session:
+            assert session.exec(select(Job.kind, Job.state)).all() == [("import", "queued")]
+
+
+def test_every_change_reaches_the_folder_and_the_file_is_read_back_as_it_was_written(web: Running) -> None:
+    project = web.sample()
+    files = project_files(web.settings.data_dir, project)
+    drawer = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    web.post(f"/api/projects/{project}/objects/{drawer}/points?infer=false", {"frame": 3, "x": 4.5, "y": 5.5, "label": 0})
+
+    def clicks() -> list[tuple[int, float]]:
+        said = read_description(files.description) if files.description.exists() else None
+        return [(point.frame, point.x) for item in said.objects for point in item.points] if said else []
+
+    web.until(lambda: (3, 4.5) in clicks())
+    with reading(web.context.engine) as session:
+        row = session.get(Project, project)
+        assert row is not None
+        assert describe(session, row, files) == read_description(files.description)
+    assert json.loads(files.description.read_text())["project"]["source_path"] == "source/scan.r3d"
+
+
+def test_a_change_that_is_not_committed_is_not_told(web: Running) -> None:
+    project, told = web.sample(), []
+    web.context.engine.update_execution_options(projects_changed=lambda ids: told.extend(ids))
+    with suppress(ZeroDivisionError), writing(web.context.engine) as session:
+        row = session.get(Project, project)
+        row.name = "never"  # type: ignore[union-attr]
+        session.flush()
+        raise ZeroDivisionError
+    assert told == []
+    web.patch(f"/api/projects/{project}", {"name": "new"})
+    assert told == [project]
+
+
+def test_describing_asks_the_database_the_same_number_of_times_whatever_the_project_holds(web: Running) -> None:
+    project = web.sample()
+    files, engine, asked = project_files(web.settings.data_dir, project), web.context.engine, []
+    event.listen(engine, "before_cursor_execute", lambda *args: asked.append(args[2]))
+
+    def queries() -> int:
+        with reading(engine) as session:
+            row = session.get(Project, project)
+            asked.clear()
+            describe(session, row, files)  # type: ignore[arg-type]
+        return len(asked)
+
+    few = queries()
+    for number in range(6):
+        web.post(f"/api/projects/{project}/objects", {"name": f"door_{number}", "category": "cabinet"})
+    assert queries() == few
+
+
+def test_a_description_that_is_none_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "project.json"
+    for content in ("", "[]", '{"version": 1}', "\ud800".encode("utf-8", "surrogatepass").decode("latin-1")):
+        path.write_text(content)
+        with pytest.raises(InputError, match=r"project\.json"):
+            read_description(path)

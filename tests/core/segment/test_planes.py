@@ -1,0 +1,101 @@
+"""Vertical planes of a surface that is known exactly."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.transforms import rotation_about_z
+from r2c2r_core.model.capture import SceneSurface
+from r2c2r_core.segment.planes import PlaneRegion, find_planes, region_along, region_at
+
+CELL_M = 0.02  # of a region's support
+CAMERAS = np.array([[0.0, -2.0, 1.4], [0.5, -1.8, 1.3]])
+
+
+def patch(corner: tuple[float, ...], along: tuple[float, ...], up: tuple[float, ...], step_m: float = 0.02) -> SceneSurface:
+    """A rectangle with edges `along` and `up`, facing along x up, in triangles of `step_m`."""
+    start, a, b = (np.array(v, dtype=np.float64) for v in (corner, along, up))
+    columns, rows = (max(1, round(float(np.linalg.norm(v)) / step_m)) for v in (a, b))
+    s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+    vertices = start + s.reshape(-1, 1) * a + t.reshape(-1, 1) * b
+    at = np.arange(len(vertices)).reshape(rows + 1, columns + 1)
+    p, q, r, w = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel(), at[1:, :-1].ravel()
+    return surface(vertices, np.concatenate([np.stack([p, q, r], 1), np.stack([p, r, w], 1)]))
+
+
+def surface(vertices: np.ndarray, faces: np.ndarray) -> SceneSurface:
+    return SceneSurface(vertices_world=vertices, faces=faces, colours=np.zeros((len(vertices), 3), np.uint8), voxel_m=CELL_M)
+
+
+def together(*parts: SceneSurface) -> SceneSurface:
+    starts = np.cumsum([0] + [len(p.vertices_world) for p in parts])
+    faces = np.concatenate([p.faces + n for p, n in zip(parts, starts, strict=False)])
+    return surface(np.concatenate([p.vertices_world for p in parts]), faces)
+
+
+def front(x: float = 0.0, y: float = 0.0, z: float = 0.3, width: float = 0.8, height: float = 0.6) -> SceneSurface:
+    """A rectangle facing -Y whose lower left corner is given."""
+    return patch((x, y, z), (width, 0, 0), (0, 0, height))
+
+
+def only(regions: tuple[PlaneRegion, ...]) -> PlaneRegion:
+    assert len(regions) == 1
+    return regions[0]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, 1.3, -2.0])
+def test_a_rectangle_is_found_where_it_is_however_the_room_is_turned(yaw: float) -> None:
+    turn = rotation_about_z(yaw)
+    shown = front()
+    region = only(find_planes(surface(shown.vertices_world @ turn.T, shown.faces), CAMERAS @ turn.T))
+    np.testing.assert_allclose(region.outward, turn @ [0, -1, 0], atol=1e-6)
+    np.testing.assert_allclose(region.world_from_plane.translation, turn @ [0.4, 0.0, 0.6], atol=CELL_M)
+    assert abs(float(region.world_from_plane.translation @ region.outward)) < 1e-6  # the plane itself is exact
+    assert [region.width_m, region.height_m] == pytest.approx([0.8, 0.6], abs=2 * CELL_M)
+    assert region.area_m2 == pytest.approx(0.48, rel=1e-6)
+
+
+def test_noise_of_the_surface_averages_out_in_the_plane() -> None:
+    shown = front()
+    noisy = shown.vertices_world + np.random.default_rng(3).normal(scale=[0, 0.003, 0], size=shown.vertices_world.shape)
+    region = only(find_planes(surface(noisy, shown.faces), CAMERAS))
+    assert np.degrees(np.arccos(region.outward @ [0, -1, 0])) < 0.2
+    assert abs(region.world_from_plane.translation[1]) < 1e-3
+
+
+def test_what_is_level_or_turned_away_from_every_camera_is_none() -> None:
+    level = patch((0, 0, 0.9), (0.8, 0, 0), (0, 0.6, 0))
+    assert find_planes(level, CAMERAS) == ()
+    assert find_planes(front(), CAMERAS * [1, -1, 1]) == ()
+
+
+def test_fronts_eight_centimetres_apart_are_two_and_the_larger_is_first() -> None:
+    regions = find_planes(together(front(width=0.5), front(x=0.7, y=0.08, width=0.9)), CAMERAS)
+    assert [round(float(r.world_from_plane.translation[1]), 3) for r in regions] == [0.08, 0.0]
+
+
+def test_a_gap_that_a_thing_in_front_leaves_is_bridged_and_a_wide_one_is_not() -> None:
+    def count(gap_m: float) -> int:
+        return len(find_planes(together(front(width=0.5), front(x=0.5 + gap_m, width=0.5)), CAMERAS))
+
+    assert count(0.07) == 1
+    assert count(0.30) == 2
+
+
+def test_a_point_belongs_to_the_part_that_was_seen_within_reach() -> None:
+    region = only(find_planes(front(), CAMERAS))
+    assert region.supports(region.points, 0.0).all()
+    beside = np.array([[0.85, 0.0, 0.6], [1.1, 0.0, 0.6], [0.4, 0.0, 1.5]])
+    assert region.supports(beside, 0.08).tolist() == [True, False, False]
+    assert region_at((region,), np.array([0.4, 0.03, 0.6])) is region
+    assert region_at((region,), np.array([0.4, 0.30, 0.6])) is None
+
+
+def test_a_ray_meets_the_nearest_region_where_it_crosses_its_plane() -> None:
+    near, far = front(width=0.5), front(x=-0.5, y=0.4, z=0.3, width=2.0)
+    regions = find_planes(together(near, far), CAMERAS)
+    for target in (np.array([0.25, 0.0, 0.6]), np.array([1.2, 0.4, 0.5])):
+        ray = target - CAMERAS[0]
+        found = region_along(regions, CAMERAS[0], ray / np.linalg.norm(ray), 5.0, 0.05)
+        assert found is not None
+        np.testing.assert_allclose(found[1], target, atol=1e-6)
+    assert region_along(regions, CAMERAS[0], np.array([0.0, -1.0, 0.0]), 5.0, 0.05) is None

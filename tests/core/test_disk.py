@@ -1,0 +1,31 @@
+"""Paths that no file can have."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.disk import is_below, resolved
+from r2c2r_core.errors import InputError
+
+
+@pytest.mark.parametrize("name", ["a\0b", "n" * 300, "loop/inside"])
+def test_a_path_that_no_file_can_have_is_said_in_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(InputError, match="check the path") as said:
+        resolved(tmp_path / name)
+    assert "\n" not in str(said.value)
+    assert "\0" not in str(said.value)
+
+
+def test_what_is_not_there_yet_has_a_path(tmp_path: Path) -> None:
+    assert resolved(tmp_path / "new" / ".." / "folder") == Path(os.path.realpath(tmp_path)) / "folder"
+
+
+def test_only_what_stays_in_a_folder_is_below_it(tmp_path: Path) -> None:
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "loop").symlink_to("loop")
+    (inside / "out").symlink_to(tmp_path)
+    found = {name: is_below(inside / name, inside) for name in ("mesh.obj", "../other", "loop", "out", "a\0b")}
+    assert found == {"mesh.obj": True, "../other": False, "loop": False, "out": False, "a\0b": False}

@@ -1,0 +1,16 @@
+"""Inputs that are almost right, to every command; `benchmarks/fuzz_inputs.py --minutes 60` tries many more."""
+
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
+
+
+def test_every_command_ends_in_one_line_whatever_it_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    from fuzz_inputs import fuzz
+
+    found = fuzz(seed=0, count=250)
+    assert found["faults"] == [], "to see one: python benchmarks/fuzz_inputs.py --only CASE"
+    assert (found["cases"], found["tracebacks"], found["hangs"], found["crashes"]) == (250, 0, 0, 0)

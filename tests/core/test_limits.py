@@ -1,0 +1,65 @@
+"""What a worker may use: a process that wants more says so in one line."""
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.jobs.steps import outcome
+from r2c2r_core.limits import free_memory
+
+WORKERS = (
+    "r2c2r_core.worker",
+    "app.jobs.live_segment",
+    "app.jobs.sample",
+    "app.viewer.worker",
+    "app.jobs.probe",
+    "app.jobs.ingest",
+)
+
+LIMITED = """
+import json, resource
+from r2c2r_core.limits import limit_this_process, memory_met
+limit_this_process()
+try:
+    bytearray(3 << 30)
+except MemoryError:
+    print(json.dumps([str(memory_met()), resource.getrlimit(resource.RLIMIT_CPU)[0]]))
+"""
+
+
+def test_memory_beyond_the_limit_is_one_line_with_the_next_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("R2C2R_WORKER_MEMORY_GB", "2")
+    monkeypatch.setenv("R2C2R_WORKER_HOURS", "1.5")
+    done = subprocess.run([sys.executable, "-c", LIMITED], capture_output=True, text=True, check=True)
+    said, cpu_s = json.loads(done.stdout)
+    assert said.startswith("it needs more memory than the 2.0 GB that it may use; ")
+    assert "R2C2R_WORKER_MEMORY_GB" in said
+    assert cpu_s == 5400
+
+
+@pytest.mark.parametrize("module", WORKERS)
+def test_every_worker_limits_itself(module: str) -> None:
+    source = (Path(__file__).parents[2] / f"{module.replace('.', '/')}.py").read_text()
+    assert "    limit_this_process(" in source
+
+
+@pytest.mark.parametrize("said", ["", "a lot", "-1", "nan", "inf", "0"])
+def test_a_limit_that_is_none_is_the_machines(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("R2C2R_WORKER_MEMORY_GB", said)
+    assert 0 < free_memory(0.5) < 1 << 50
+
+
+def test_all_the_processor_time_is_no_reason_to_try_again() -> None:
+    failure = outcome({}, -24, "align")
+    assert failure is not None
+    assert failure["kind"] == "EnvironmentProblem"
+    assert "processor time" in failure["message"]
+    assert "R2C2R_WORKER_HOURS" in failure["hint"]
+
+
+def test_nothing_here_limits_the_tests() -> None:
+    assert resource.getrlimit(resource.RLIMIT_DATA)[0] == resource.getrlimit(resource.RLIMIT_DATA)[1]

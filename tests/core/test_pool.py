@@ -1,0 +1,111 @@
+"""Tasks in worker processes: what they give, how they fail, and that none outlives its pool."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import psutil
+import pytest
+
+from r2c2r_core.errors import Cancelled, ObjectNotSeen
+from r2c2r_core.pool import Failed, Pool, Task, WorkerLost, usual_workers
+from r2c2r_core.progress import SILENT, Progress
+
+
+def double(value: int, progress: Progress) -> int:
+    progress.at(0.5, f"doubling {value}")
+    return 2 * value
+
+
+def refuse(name: str, progress: Progress) -> None:
+    raise ObjectNotSeen(f"{name}: seen in 0 of 9 frames", hint="click again")
+
+
+def break_down(progress: Progress) -> None:
+    raise np.linalg.LinAlgError("SVD did not converge")
+
+
+def fall(progress: Progress) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def work_on(progress: Progress) -> None:
+    """Until it is told to stop, for a minute at most."""
+    progress.at(0.0, str(os.getpid()))
+    for _ in range(600):
+        time.sleep(0.1)
+        progress.check()
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[Pool]:
+    with Pool(2) as two:
+        yield two
+
+
+def test_every_task_gives_its_own_answer_and_progress_goes_on_to_the_end(pool: Pool) -> None:
+    shares: list[float] = []
+    progress = Progress(lambda stage, share, text: shares.append(share))
+    answers = dict(pool.run({str(k): Task(double, (k,)) for k in range(5)}, progress))
+    assert answers == {str(k): 2 * k for k in range(5)}
+    assert shares
+    assert all(0 <= share <= 1 for share in shares)
+
+
+def test_a_task_that_fails_says_why_and_where_and_the_others_go_on(pool: Pool) -> None:
+    answers = dict(pool.run({"a": Task(refuse, ("a",)), "b": Task(break_down, ()), "c": Task(double, (3,))}))
+    assert answers["c"] == 6
+    assert isinstance(answers["a"].error, ObjectNotSeen)
+    assert str(answers["a"].error) == "a: seen in 0 of 9 frames; click again"
+    assert isinstance(answers["b"].error, np.linalg.LinAlgError)
+    assert "break_down" in answers["b"].where
+
+
+def test_a_process_that_is_killed_costs_its_task_only(pool: Pool) -> None:
+    answers = dict(pool.run({"a": Task(fall, ()), "b": Task(double, (1,)), "c": Task(double, (2,))}))
+    lost = answers.pop("a")
+    assert isinstance(lost, Failed)
+    assert isinstance(lost.error, WorkerLost)
+    assert "SIGKILL" in str(lost.error)
+    assert answers == {"b": 2, "c": 4}
+
+
+def test_a_person_who_cancels_is_heard_and_no_process_is_left() -> None:
+    pids: list[int] = []
+    progress = Progress(lambda stage, share, text: pids.append(int(text)), lambda: len(pids) == 2)
+    with pytest.raises(Cancelled), Pool(2) as pool:
+        list(pool.run({"a": Task(work_on, ()), "b": Task(work_on, ())}, progress))
+    assert len(pids) == 2
+    assert not any(psutil.pid_exists(pid) for pid in pids)
+
+
+def test_a_worker_ends_when_whoever_holds_it_is_gone() -> None:
+    class Gone(Exception):
+        """Stands for the end of the process that holds the pool."""
+
+    def heard(stage: str, share: float, text: str) -> None:
+        raise Gone
+
+    pool = Pool(1)
+    with pytest.raises(Gone):
+        list(pool.run({"a": Task(work_on, ())}, Progress(heard)))
+    (worker,) = pool._busy.values()
+    worker.channel.close()  # as the kernel does for a process that died
+    assert worker._process.wait(timeout=60) == 0
+
+
+def test_as_many_workers_as_cores_and_memory_allow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)))
+    free = psutil.virtual_memory()
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=4 << 30))
+    assert usual_workers() == 2
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=0))
+    assert usual_workers() == 1
+
+
+def test_a_pool_without_work_starts_nothing() -> None:
+    with Pool(2) as pool:
+        assert list(pool.run({}, SILENT)) == []
+        assert not pool._idle

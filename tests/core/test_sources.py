@@ -1,0 +1,15 @@
+"""The digest of a package's source."""
+
+from pathlib import Path
+
+from r2c2r_core.sources import source_files
+
+
+def test_whatever_a_stage_copies_into_a_bundle_counts_and_compiled_code_does_not(tmp_path: Path) -> None:
+    package = tmp_path / ".venv" / "export"
+    for name in ("stage.py", "review_page/page.js", "review_page/page.css", "__pycache__/stage.pyc", ".stage.py.swp"):
+        path = package / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    found = [str(path.relative_to(package)) for path in source_files(package)]
+    assert found == ["review_page/page.css", "review_page/page.js", "stage.py"]

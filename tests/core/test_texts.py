@@ -1,0 +1,45 @@
+"""What others wrote is shown, never obeyed: by a terminal, by a page."""
+
+import pytest
+
+from r2c2r_core.cli import main
+from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.report import report_html, report_of
+from r2c2r_core.model.report import Certificate, LoaderResult
+from r2c2r_core.terminal import certificate_text, table
+from r2c2r_core.texts import OBEYED, shown
+from tests.core.export.kitchen import kitchen, reconstruction
+
+EVIL = "\x1b]0;owned\x07\x9b31m\u202e\ud800"
+
+
+def certificate() -> Certificate:
+    loader = LoaderResult(loader="PyBullet", state="failed", detail=f"says {EVIL}")
+    return Certificate(
+        passed=True, findings=(), loaders=(loader,), joints=(), rest_penetration_m=0.0, drift_m=0.0, realtime_factor=1.0
+    )
+
+
+def test_a_character_that_would_be_obeyed_is_written_as_its_code() -> None:
+    assert shown("a\x1b[31m\tb\n") == "a\\u001b[31m\tb\n"
+    assert shown("Küche 日本 مطبخ 🙂") == "Küche 日本 مطبخ 🙂"
+
+
+def test_tables_and_certificates_hold_nothing_a_terminal_obeys() -> None:
+    assert not OBEYED.search(table(("name",), [(EVIL,), ("two\nlines",)]))
+    assert len(table(("name",), [("two\nlines",)]).splitlines()) == 3
+    assert not OBEYED.search(certificate_text(certificate()))
+
+
+def test_an_error_holds_nothing_a_terminal_obeys(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", f"no{EVIL[:-1]}.zip"]) == 2
+    assert not OBEYED.search(capsys.readouterr().err)
+
+
+def test_the_report_holds_nothing_a_page_or_terminal_obeys() -> None:
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
+    manifest["objects"][0] |= {"category": f"cabinet {EVIL}", "warnings": [EVIL]}
+    page = report_html(manifest, report_of(manifest, certificate(), {"mug_1": EVIL}), {})
+    assert not OBEYED.search(page)
+    assert "cabinet \\u001b]0;owned" in page

@@ -1,0 +1,101 @@
+"""A mesh cut into fronts and a hollow carcass by the roles of the primitive's boards, whatever their names."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.meshes import box_mesh, is_watertight, volume
+from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.model.scene import Box, SceneObject
+from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
+from r2c2r_core.warp.parts import cavity, cut_apart, front_region
+from r2c2r_core.warp.solids import with_plain_colours
+from tests.core.synthesize.kitchen_units import Unit, capture, placed_unit
+
+WALL_M, FRONT_M = 0.015, 0.018  # a cabinet's boards
+
+
+def unit(category: str, size: tuple[float, float, float] = (0.6, 0.58, 0.7)) -> SceneObject:
+    made = placed_unit(Unit("a", category, (0.0, 0.0, 0.5), size), np.random.default_rng(0))
+    return build_scene(capture(), *([m] for m in made), Overrides(objects={}), SynthesizeConfig()).objects[0]
+
+
+def renamed(item: SceneObject) -> SceneObject:
+    """The same unit whose boards have names of somebody else's."""
+    called = {"back": "rear", "left": "port", "front": "leaf", "top": "lid"}
+
+    def other(box: Box) -> Box:
+        return replace(box, name=called.get(box.name, f"piece_of_{box.name}"))
+
+    return replace(item, links=tuple(replace(link, boxes=tuple(other(b) for b in link.boxes)) for link in item.links))
+
+
+def cut(item: SceneObject) -> dict[str, TexturedMesh]:
+    """A closed box of the unit's size, cut as the unit is."""
+    vertices, faces = box_mesh(-item.dimensions_m / 2, item.dimensions_m / 2)
+    mesh = TexturedMesh(
+        vertices=vertices, faces=faces, uv=np.full((len(vertices), 2), 0.5), texture=np.full((8, 8, 3), 90, np.uint8)
+    )
+    return cut_apart(item, *with_plain_colours(mesh, (220, 220, 220), (90, 90, 90)))
+
+
+@pytest.mark.parametrize("category", ["cabinet", "drawer", "double_door_cabinet", "drawer_stack", "fridge_freezer"])
+def test_a_unit_whose_back_board_is_called_rear_is_cut_the_same(category: str) -> None:
+    item = unit(category)
+    named, other = cut(item), cut(renamed(item))
+    assert named.keys() == other.keys()
+    for link, mesh in named.items():
+        assert volume(other[link].vertices, other[link].faces) == pytest.approx(volume(mesh.vertices, mesh.faces), rel=1e-9)
+        np.testing.assert_allclose(np.ptp(other[link].vertices, axis=0), np.ptp(mesh.vertices, axis=0), atol=1e-9)
+
+
+def test_the_inside_lies_between_the_boards() -> None:
+    item = unit("cabinet")
+    x, y, z = item.dimensions_m / 2
+    low, high = cavity(item)
+    np.testing.assert_allclose(high, [x - WALL_M, y - WALL_M, z - WALL_M], atol=1e-9)
+    np.testing.assert_allclose(low[[0, 2]], [WALL_M - x, WALL_M - z], atol=1e-9)
+    assert low[1] == pytest.approx(-y + FRONT_M, abs=1e-9)  # right behind the door
+
+
+@pytest.mark.parametrize("axis_sign", [(0, -1), (0, 1), (1, 1), (2, -1), (2, 1)])
+def test_a_body_that_lacks_an_outer_board_has_no_inside_to_hollow(axis_sign: tuple[int, int]) -> None:
+    item = unit("cabinet")
+    axis, sign = axis_sign
+    base = item.links[0]
+    kept = [
+        box
+        for box in base.boxes
+        if int(np.argmin(box.size_m)) != axis or sign * box.link_from_box.translation[axis] < item.dimensions_m[axis] / 4
+    ]
+    assert len(kept) < len(base.boxes)
+    low, high = cavity(replace(item, links=(replace(base, boxes=tuple(kept)), *item.links[1:])))
+    assert (low > high).all()
+
+
+def test_a_solid_slab_has_no_inside() -> None:
+    low, high = cavity(unit("counter", (1.2, 0.6, 0.04)))
+    assert (low > high).any()
+
+
+def test_a_door_and_its_body_share_no_material_and_the_body_is_hollow() -> None:
+    item = unit("cabinet")
+    base, door = (cut(item)[link.name] for link in item.links)
+    assert door.vertices[:, 1].max() < base.vertices[:, 1].min() + 1e-9
+    whole = float(np.prod(item.dimensions_m))
+    assert is_watertight(door.vertices, door.faces)
+    assert volume(door.vertices, door.faces) == pytest.approx(0.6 * 0.7 * FRONT_M, rel=1e-6)
+    low, high = cavity(item)
+    boards = whole - float(np.prod(high - low))
+    assert 0 < volume(base.vertices, base.faces) < boards + 0.004  # and its shelf
+
+
+def test_fronts_reach_to_the_units_edge_and_stop_at_their_seam() -> None:
+    item = unit("double_door_cabinet")
+    left, right = (front_region(item, link) for link in item.links[1:])
+    assert left.low[0] < -1 < 1 < right.high[0]  # the mesh's own edge, wherever it ends
+    assert right.low[0] - left.high[0] == pytest.approx(0.003, abs=1e-9)
+    assert left.low[1] < -1  # the handle, however far it stands out
+    assert left.high[1] == pytest.approx(-item.dimensions_m[1] / 2 + FRONT_M, abs=1e-9)

@@ -1,0 +1,66 @@
+"""The documentation builds from the checkout, without the network and without a warning, and says what the code is."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.config import ReconstructConfig
+
+ROOT = Path(__file__).resolve().parent.parent
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason="pip install --group dev")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """As `make docs` builds it, where no proxy and no host answers."""
+    out = tmp_path_factory.mktemp("site")
+    unreachable = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(out)],
+        cwd=ROOT,
+        env={**os.environ, **unreachable, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stderr.strip() == ""
+    return out
+
+
+def settings_of(config: object, path: str = "") -> list[tuple[str, str]]:
+    """(section, setting) of every setting."""
+    found = []
+    for field in fields(config):  # type: ignore[arg-type]
+        value = getattr(config, field.name)
+        found += settings_of(value, f"{path}.{field.name}".strip(".")) if is_dataclass(value) else [(path, field.name)]
+    return found
+
+
+def test_every_setting_stands_in_the_documentation(site: Path) -> None:
+    sections = re.split(r"<h3 id=\"[^\"]*\">", (site / "settings.html").read_text())
+    by_name = {section.partition("<a ")[0]: section for section in sections[1:]}
+    missing = [(s, name) for s, name in settings_of(ReconstructConfig()) if f"<code>{name}</code>" not in by_name[s]]
+    assert missing == []
+
+
+def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> None:
+    start = (site / "index.html").read_text()
+    pages = [p for p in site.rglob("*.html") if p.name != "404.html"]
+    assert len(pages) >= len(list((ROOT / "docs").rglob("*.md")))
+    for page in pages:
+        assert f'href="{page.relative_to(site)}"' in start, page
+        loaded = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(https?://[^\"]+)\"", page.read_text())
+        assert loaded == [], page
+
+
+def test_the_reference_has_the_docstrings(site: Path) -> None:
+    reference = (site / "reference.html").read_text()
+    assert "Turn one RGB-D recording into an articulated scene" in reference
+    assert "world_from_mesh = world_from_camera @ camera_from_mesh" in reference

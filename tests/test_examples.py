@@ -1,0 +1,99 @@
+"""Every file of examples/ runs, on a sample so small that its pictures say little."""
+
+import runpy
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import uvicorn
+
+from app.main import create_app
+from app.settings import Settings
+from r2c2r_core.segment.prompts import read_prompts
+from r2c2r_core.synthetic.stage import SamplePaths, write_sample
+from tests.app.conftest import FAKE_COMMANDS
+from tests.core.export.conftest import write_folder
+from tests.core.export.kitchen import kitchen
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+Run = Callable[..., str]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """An example as its first line says, with arguments; what it printed."""
+
+    def ran(name: str, *arguments: object) -> str:
+        monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+        runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+        return capsys.readouterr().out
+
+    return ran
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> SamplePaths:
+    return write_sample(tmp_path_factory.mktemp("sample"), frames=10, size=(256, 192))
+
+
+def test_every_example_is_run_here() -> None:
+    source = Path(__file__).read_text()
+    assert [name for name in sorted(path.stem for path in EXAMPLES.glob("*.py")) if f'run("{name}"' not in source] == []
+
+
+def test_reading_a_capture(run: Run, sample: SamplePaths) -> None:
+    assert "10 frames" in run("read_a_capture", sample.scan)
+
+
+def test_clicking_and_cutting(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
+    click = read_prompts(sample.prompts).objects[0]
+    point = click.points[0]
+    said = run("click_and_cut", sample.scan, click.category, point.frame, point.x, point.y, tmp_path / "cut.png")
+    assert "frames" in said
+    assert (tmp_path / "cut.png").stat().st_size > 1000
+
+
+def test_the_candidates_of_one_object(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
+    drawer = next(found.name for found in read_prompts(sample.prompts).objects if found.category == "drawer")
+    said = run("candidates", sample.scan, sample.prompts, drawer, tmp_path)
+    assert "is chosen" in said
+    assert list(tmp_path.glob("*.ply"))
+
+
+def test_a_bundle_opens_in_mujoco(run: Run, tmp_path: Path) -> None:
+    said = run("bundle_in_mujoco", write_folder(kitchen(), tmp_path / "bundle"))
+    lines = said.strip().splitlines()
+    assert len(lines) >= 3
+    for line in lines:
+        reached, upper = line.rsplit(": ", 1)[1].split(" of ")
+        assert float(reached) > 0.95 * float(upper), line
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[str]:
+    """A server on a free port whose workers obey the tests; the address it would print."""
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        port = listening.getsockname()[1]
+        settings = Settings(data_dir=tmp_path, host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0)
+        app = create_app(settings, commands=FAKE_COMMANDS)
+        server = uvicorn.Server(uvicorn.Config(app, log_level="warning"))
+        thread = threading.Thread(target=server.run, args=([listening],))
+        thread.start()
+        while not server.started:
+            assert thread.is_alive()
+            time.sleep(0.01)  # uvicorn tells of its start by this flag alone
+        yield f"http://127.0.0.1:{port}/?token={settings.launch_token}"
+        server.should_exit = True
+        thread.join()
+
+
+def test_the_api_is_driven(run: Run, address: str) -> None:
+    said = run("drive_the_api", address)
+    assert "drawer_1" in said
+    assert "run done" in said
+    assert "version 1" in said

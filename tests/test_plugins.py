@@ -1,0 +1,202 @@
+"""Packages of other people, installed as their metadata and files on the path: used by the code of the command line."""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core import cli, plugins
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.errors import InputError
+from r2c2r_core.export.lint import lint
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.support import supported
+from r2c2r_core.export.writers.table import FORMATS, formats, write_formats
+from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.kitchen.names import category_of, named
+from r2c2r_core.registry import Registry
+from r2c2r_core.segment.stage import SEGMENTERS
+from r2c2r_core.sources import source_key
+from r2c2r_core.synthesize.fixtures.spec import Order
+from r2c2r_core.synthesize.fixtures.table import fixture_of
+from tests.core.export.conftest import write_folder
+from tests.core.export.kitchen import kitchen
+
+Install = Callable[..., Path]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Put a package of one module on the path, with its entry points; answers the module's file."""
+    monkeypatch.syspath_prepend(tmp_path)
+    loaded = set(sys.modules)
+
+    def installed(module: str, group: str, entry: str, code: str) -> Path:
+        file = tmp_path / f"{module}.py"
+        file.write_text(code)
+        metadata = tmp_path / f"{module}-1.2.dist-info"
+        metadata.mkdir(exist_ok=True)
+        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.2\n")
+        (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry}\n")
+        plugins.forget()
+        return file
+
+    plugins.forget()
+    yield installed
+    for name in set(sys.modules) - loaded:
+        if (tmp_path / f"{name}.py").exists():
+            del sys.modules[name]
+    monkeypatch.undo()
+    plugins.forget()
+
+
+READER = """
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.readers.protocol import Part, Reader
+
+def read(files):
+    raise CaptureError("the depths of a sonar are not understood yet", hint="come back later")
+
+READER = Reader(name="Sonar", parts=(Part("pings.sonar", r"pings\\.sonar"),), open=read)
+"""
+BACKEND = """
+from r2c2r_core.registry import Backend
+
+LINE = Backend(name="oracle", target="pathlib:PurePosixPath", summary="knows", licence="MIT")
+"""
+FIXTURE = """
+from dataclasses import replace
+
+from r2c2r_core.kitchen.categories import CATEGORIES
+from r2c2r_core.synthesize.fixtures import cabinet
+from r2c2r_core.synthesize.fixtures.spec import Fixture
+
+LARDER = replace(
+    next(kind for kind in CATEGORIES if kind.name == "cabinet"), name="wine_larder", aliases=("bodega",), fixture="larder:TALL"
+)
+TALL = Fixture(build=cabinet.build)
+"""
+FORMAT = """
+from pathlib import Path
+
+from r2c2r_core.export.writers.table import Format
+
+def write(plan, folder):
+    Path(folder / "scene.count" if folder.is_dir() else folder).write_text(str(len(plan.bodies)))
+
+def check(path):
+    if not path.read_text().isdigit():
+        yield f"holds {path.read_text()!r}, a number is expected"
+
+COUNT = Format(
+    name="count", file="scene.count", opened_by="counters", reads_meshes=False, write=write, loses=("all shapes",), check=check
+)
+"""
+
+
+def doctors_lines(capsys: pytest.CaptureFixture[str]) -> str:
+    cli.main(["doctor"])
+    return capsys.readouterr().out
+
+
+def test_a_recording_format_of_another_package_is_recognised(
+    install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scan = tmp_path / "scan"
+    scan.mkdir()
+    (scan / "pings.sonar").write_bytes(b"ping")
+    assert cli.main(["info", str(scan)]) == 2
+    assert "no known recording format" in capsys.readouterr().err
+    install("sonar", "r2c2r.readers", "sonar = sonar:READER", READER)
+    assert cli.main(["info", str(scan)]) == 2
+    assert "the depths of a sonar are not understood yet" in capsys.readouterr().err
+    assert "plug-in sonar" in doctors_lines(capsys)
+
+
+@pytest.mark.parametrize(
+    ("group", "table"), [("r2c2r.segmenters", SEGMENTERS), ("r2c2r.generators", GENERATORS), ("r2c2r.matchers", MATCHERS)]
+)
+def test_a_backend_of_another_package_can_be_chosen_by_name(
+    install: Install, group: str, table: Registry, capsys: pytest.CaptureFixture[str]
+) -> None:
+    default = table.default
+    with pytest.raises(InputError):
+        table.get("oracle")
+    install("delphi", group, "oracle = delphi:LINE", BACKEND)
+    assert type(table.load("oracle")).__name__ == "PurePosixPath"
+    assert table.default == default
+    assert f"{table.seam} oracle" in doctors_lines(capsys)
+
+
+def test_a_kind_of_furniture_of_another_package_is_named_and_built(install: Install) -> None:
+    assert named("wine larder").notice is not None
+    install("larder", "r2c2r.fixtures", "larder = larder:LARDER", FIXTURE)
+    for words in ("wine larder", "Wine Larders", "bodega"):
+        category = category_of(words)
+        assert category.name == "wine_larder"
+    fixture = fixture_of(category)
+    assert fixture is not None
+    order = Order(dimensions_m=np.array([0.6, 0.58, 1.9]), material=category.material, hinge="left", handle=None)
+    assert [part.name for part in fixture.build(order).parts] == ["base", "door"]
+
+
+def test_an_output_format_of_another_package_is_written_checked_and_described(install: Install, tmp_path: Path) -> None:
+    install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT)
+    assert formats()[-1].name == "count"
+    folder = write_folder(kitchen(), tmp_path / "bundle")
+    assert int((folder / "scene.count").read_text()) > 3
+    found = {finding.rule for finding in lint(folder)}
+    (folder / "scene.count").write_text("many")
+    assert {finding.where for finding in lint(folder) if finding.rule == "format"} == {"scene.count"}
+    (folder / "scene.count").unlink()  # made where that package was not: no finding
+    assert {finding.rule for finding in lint(folder)} == found
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("READER = 'a reader'", "a str is found, a Reader is expected"),
+        ("OTHER = 1", "AttributeError"),
+    ],
+)
+def test_a_broken_plug_in_is_a_line_of_the_doctor_and_ends_nothing(
+    install: Install, tmp_path: Path, code: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install("broken", "r2c2r.readers", "mine = broken:READER", code)
+    (line,) = [line for line in doctors_lines(capsys).splitlines() if "plug-in mine" in line]
+    assert "problem" in line
+    assert "broken 1.2" in line
+    assert said in line
+    with pytest.raises(Exception, match="no known recording format"):
+        open_recording(tmp_path)
+
+
+def test_nobody_takes_a_name_of_the_projects_own(install: Install) -> None:
+    code = BACKEND.replace('"oracle"', '"sift"')
+    install("impostor", "r2c2r.matchers", "sift = impostor:LINE", code)
+    assert MATCHERS.get("sift").target.startswith("r2c2r_core.")
+
+
+def test_code_of_a_plug_in_is_part_of_its_stages_keys_and_of_no_others(install: Install) -> None:
+    before = {room: source_key(room) for room in ("ingest", "align", "warp")}
+    file = install("sonar", "r2c2r.readers", "sonar = sonar:READER", READER)
+    added = source_key("ingest")
+    assert added != before["ingest"]
+    assert {room: source_key(room) for room in ("align", "warp")} == {room: before[room] for room in ("align", "warp")}
+    file.write_text(READER + "# louder\n")
+    plugins.forget()
+    assert source_key("ingest") not in (added, before["ingest"])
+
+
+def test_a_format_that_cannot_be_written_is_left_out(
+    install: Install, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT.replace("    Path(folder", "    1 / 0; Path(folder"))
+    write_formats(supported(plan_bundle(kitchen())), tmp_path)
+    assert {path.name for path in tmp_path.glob("scene.*")} == {entry.file for entry in FORMATS}
+    assert "scene.count is left out of the bundle: ZeroDivisionError: division by zero" in caplog.text
