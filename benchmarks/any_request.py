@@ -1,22 +1,28 @@
-"""Whatever is sent to whichever operation, alone or one after the other, with and without a session: never a server error.
+"""Whatever is sent to whichever operation by whomever, alone or one after the other: never a server error.
 
-    python benchmarks/any_request.py [--examples 100] [--seed 0] [--json benchmarks/app.json]
+    python benchmarks/any_request.py [--examples 100] [--roles annotator reviewer admin nobody] [--walks 16]
+                                     [--seed 0] [--json benchmarks/app.json]
 
-Schemathesis makes requests from the app's own OpenAPI document, such as it allows and such as it forbids; each is sent with a
-session and without one, most of them at things that exist (all of them, unless thorough). The queue stands still meanwhile:
-what is queued by thousands of requests is not what is looked at. Then it runs, and Schemathesis walks from answer to request:
-what one operation made, others are asked about.
+Schemathesis makes requests from the app's own OpenAPI document, such as it allows and such as it forbids; each role sends as
+many to each operation, most of them at things that exist, on a data folder of its own: a project with clicks, comments, nouns
+and two bundles as the exporter writes them. The queue stands still meanwhile: what is queued by thousands of requests is not
+what is looked at. Then it runs, and an admin walks from answer to request: what one operation made, others are asked about.
 """
 
 import argparse
-import itertools
 import json
+import shutil
 import sys
 import tempfile
 import time
+import zipfile
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import hypothesis
 import schemathesis
@@ -29,61 +35,149 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from kept import add_options, report
 
+from app.services import accounts, people
 from app.settings import Settings
 from app.viewer.client import Viewer
+from r2c2r_core.export.stage import ExportConfig, check_bundle, write_bundle
 from tests.app.conftest import ORIGIN, Running, fake, running
+from tests.app.finished import finished_kitchen
+from tests.core.export.kitchen import reconstruction
 
 SAID_IN_ONE_LINE = (503, 507)  # a helper is down, the disk is full
-ENDS_ITS_SESSION = ("signOut",)
+ROLES = ("annotator", "reviewer", "admin", "nobody")
+PASSWORD = "correct horse battery"
+ABOUT_SESSIONS = ("signIn", "signOut", "changePassword")  # sent last, and by no walk: the session is needed by the others
 DELETES = ("deleteProject",)  # not at the project that the others need
-NOWHERE = 4  # one request at what does not exist (where little of it is read) for so many at what does
+NOWHERE = 5  # of so many requests one is at what does not exist
 STEPS = 30  # of a walk
 
 
-def send_anything(folder: Path, *, examples: int, seed: int, thorough: bool = True) -> dict[str, Any]:
-    """Requests to every operation of an app of its own; what went wrong, and how many they were."""
-    began, data = time.monotonic(), folder / "data"
-    with running(data) as web:
-        project = web.sample()
-    with running(data, viewer=Viewer(Settings(data_dir=data), fake("viewer")), run_jobs=False) as web:
-        operations, statuses, failures = _send_to_each(web, project, examples, seed, thorough)
-    with running(data, viewer=Viewer(Settings(data_dir=data), fake("viewer"))) as web:
-        walked, wrong = _walk(web, walks=examples, seed=seed)
+def send_anything(folder: Path, project: str, *, examples: int, seed: int, roles: tuple[str, ...] = ROLES) -> dict[str, Any]:
+    """`examples` requests of each role to every operation: what went wrong, and how many they were."""
+    began = time.monotonic()
+    with ExitStack() as stack:
+        apps = {role: stack.enter_context(_started(folder, role, run_jobs=False)) for role in roles}
+        operations, answers = _send_to_each(apps, project, examples, seed)
     return {
         "operations": operations,
-        "requests": sum(statuses.values()),
-        "statuses": {str(status): many for status, many in sorted(statuses.items())},
-        "walks": examples,
-        "steps": sum(walked.values()),
-        "steps_statuses": {str(status): many for status, many in sorted(walked.items())},
-        "failures": failures + wrong,
+        "examples": examples,
+        "requests": sum(answer.statuses.total() for answer in answers.values()),
+        "roles": {role: answer.figures() for role, answer in answers.items()},
+        "failures": [f"{role}: {line}" for role, answer in answers.items() for line in answer.wrong],
         "seconds": round(time.monotonic() - began, 1),
     }
 
 
-def _send_to_each(web: Running, project: str, examples: int, seed: int, thorough: bool) -> tuple[int, Counter[int], list[str]]:
-    """How many operations there are, the statuses of the requests to them, and what went wrong."""
-    statuses, failures, operations = Counter[int](), [], 0
-    known = {"project": project, "object": 1, "job": 1, "frame": 3}
-    stranger = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False)
-    for found in schemathesis.openapi.from_dict(web.app.openapi()).get_all_operations():
-        operation = found.ok()
-        operations += 1
-        name = operation.definition.raw["operationId"]
-        parameters = {p.name for p in operation.path_parameters}
-        existing = {key: value for key, value in known.items() if key in parameters and name not in DELETES}
-        places = [(existing or None, examples)] + ([(None, max(examples // NOWHERE, 1))] if existing and thorough else [])
-        for mode, (place, count) in itertools.product(GenerationMode, places):
-            strategy = operation.as_strategy(generation_mode=mode, path_parameters=place)
-            for problem, status in _try((web.client, stranger), strategy, count, seed):
-                statuses[status] += 1
-                if problem:
-                    failures.append(f"{name}: {problem}")
-        if name in ENDS_ITS_SESSION:
-            web.client.get(f"/?token={web.settings.launch_token}")
-        _forget_others(web, project)
-        sys.stderr.write(f"{operations} {name}: {sum(statuses.values())} requests\n")
-    return operations, statuses, failures
+def walk_anywhere(folder: Path, *, walks: int, seed: int) -> dict[str, Any]:
+    """An admin's walks of STEPS requests each while the queue runs: what went wrong, and how many steps they were."""
+    began, answers = time.monotonic(), Answers()
+    with _started(folder, "walk", run_jobs=True) as (web, client):
+        cut_short = _walk(web, client, answers, walks=walks, seed=seed)
+    return {
+        "walks": 2 * walks,
+        "cut_short": cut_short,
+        "steps": answers.statuses.total(),
+        "statuses": _counted(answers.statuses),
+        "failures": answers.wrong,
+        "seconds": round(time.monotonic() - began, 1),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What one role was answered."""
+
+    statuses: Counter[int] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+
+    def note(self, case: Any, answer: Any) -> None:
+        """Count an answer; keep it if something is wrong with it."""
+        self.statuses[answer.status_code] += 1
+        if problem := complaint(case, answer):
+            self.wrong.append(f"{_name(case.operation)}: {problem}")
+
+    def figures(self) -> dict[str, Any]:
+        """For the report."""
+        return {"requests": self.statuses.total(), "statuses": _counted(self.statuses), "server_errors": len(self.wrong)}
+
+
+def make_template(folder: Path, bundle: Path | None = None) -> str:
+    """The data folder that every role gets a copy of; its project."""
+    if bundle is None:
+        bundle = folder / "kitchen.zip"
+        write_bundle(reconstruction(), bundle, ExportConfig())
+    again = Path(shutil.copyfile(bundle, folder / "again.zip"))
+    with zipfile.ZipFile(again, "a") as archive:  # another version by its bytes
+        archive.comment = b"again"
+    with running(folder / "template") as web:
+        project = finished_kitchen(web, check_bundle(bundle), bundle, again)
+        web.post(f"/api/projects/{project}/comments", {"text": "look", "object": 1}, 201)
+        for role in (*ROLES[:3], "somebody"):
+            accounts.add(web.context.engine, f"the-{role}", role if role in ROLES else "annotator", PASSWORD)
+    return project
+
+
+@contextmanager
+def _started(folder: Path, role: str, run_jobs: bool) -> Iterator[tuple[Running, TestClient]]:
+    """The app on a copy of the template, and a browser of somebody of that role."""
+    data = folder / role
+    shutil.copytree(folder / "template", data)
+    viewer = Viewer(Settings(data_dir=data), fake("viewer"))
+    with patch.object(people, "pause", _at_once), running(data, viewer=viewer, run_jobs=run_jobs) as web:
+        client = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False)
+        if role != "nobody":
+            name = "the-admin" if role == "walk" else f"the-{role}"
+            entered = client.post("/api/login", json={"name": name, "password": PASSWORD})
+            assert entered.status_code == 204, entered.text
+        yield web, client
+    shutil.rmtree(data)
+
+
+async def _at_once(_: float) -> None:
+    """Wrong passwords are answered without the wait that slows guessing down."""
+
+
+def _send_to_each(
+    apps: dict[str, tuple[Running, TestClient]], project: str, examples: int, seed: int
+) -> tuple[int, dict[str, Answers]]:
+    """How many operations there are, and what each role was answered: the same requests, made once."""
+    answers = {role: Answers() for role in apps}
+    known = {"project": project, "object": 1, "job": 1, "frame": 7, "version": 1, "comment": 1, "candidate": "c0"}
+    known |= {"name": "the-somebody", "side": "plan", "point": 1}
+    document = next(iter(apps.values()))[0].app.openapi()
+    found = [each.ok() for each in schemathesis.openapi.from_dict(document).get_all_operations()]
+    for number, operation in enumerate(sorted(found, key=lambda each: _name(each) in ABOUT_SESSIONS), 1):
+        cases = _cases(operation, known, examples, seed)
+        for role, (web, client) in apps.items():
+            for case in cases:
+                answer = send(client, case)
+                if answer is not None:
+                    answers[role].note(case, answer)
+            _forget_others(web, project)
+        found_wrong = sum(len(answer.wrong) for answer in answers.values())
+        sys.stderr.write(f"{number} {_name(operation)}: {len(cases)} requests, {found_wrong} server errors so far\n")
+    return len(found), answers
+
+
+def _name(operation: Any) -> str:
+    return str(operation.definition.raw["operationId"])
+
+
+def _cases(operation: Any, known: dict[str, Any], examples: int, seed: int) -> list[Any]:
+    """Requests to an operation: half of them forbidden by its schema, where that can be; most at things that exist."""
+    parameters = {p.name for p in operation.path_parameters}
+    here = {key: value for key, value in known.items() if key in parameters and _name(operation) not in DELETES} or None
+    cases: list[Any] = []
+    for mode, until in ((GenerationMode.NEGATIVE, examples // 2), (GenerationMode.POSITIVE, examples)):
+        elsewhere = until - len(cases) if here is None else (until - len(cases)) // NOWHERE
+        for place, count in ((None, elsewhere), (here, until - len(cases) - elsewhere)):
+            if count:
+                cases += _made(operation.as_strategy(generation_mode=mode, path_parameters=place), count, seed)
+    return cases
+
+
+def _counted(statuses: Counter[int]) -> dict[str, int]:
+    return {str(status): many for status, many in sorted(statuses.items())}
 
 
 def _forget_others(web: Running, project: str) -> None:
@@ -93,49 +187,48 @@ def _forget_others(web: Running, project: str) -> None:
             web.delete(f"/api/projects/{other['id']}")
 
 
-def _walk(web: Running, *, walks: int, seed: int) -> tuple[Counter[int], list[str]]:
-    """Walks of STEPS requests each, from what was answered to what may be asked about it: statuses, and what went wrong."""
-    statuses, failures = Counter[int](), []
-    machine = schemathesis.openapi.from_dict(web.app.openapi()).as_state_machine()
+def _walk(web: Running, client: TestClient, answers: Answers, *, walks: int, seed: int) -> int:
+    """Pairs of walks from what was answered to what may be asked about it; how many were cut short.
+
+    Where a walk may go depends on what the server holds by then, but the walks of one run of Hypothesis must be able to go
+    alike from the same beginning. So each run makes the least it can: one walk of the simplest choices, one of any.
+    """
+    machine = schemathesis.openapi.from_dict(web.app.openapi()).exclude(operation_id=list(ABOUT_SESSIONS)).as_state_machine()
 
     class Walk(machine):  # type: ignore[misc,valid-type]
         """One person who does anything."""
 
-        def setup(self) -> None:
-            web.client.get(f"/?token={web.settings.launch_token}")
-
         def call(self, case: Any, **_: Any) -> Response:
-            answer = send(web.client, case)
+            answer = send(client, case)
             hypothesis.assume(answer is not None)
-            statuses[answer.status_code] += 1
-            failures.extend(filter(None, [complaint(case, answer)]))
+            answers.note(case, answer)
             return Response.from_any(answer)
 
         def validate_response(self, *_: Any, **__: Any) -> None:
             """Nothing else is wrong."""
 
-    Walk.run(settings=hypothesis.settings(_settings(walks), stateful_step_count=STEPS, derandomize=seed == 0))
-    return statuses, failures
+    cut_short = 0
+    for number in range(walks):
+        try:
+            hypothesis.seed(seed + number)(Walk).run(settings=hypothesis.settings(_settings(2), stateful_step_count=STEPS))
+        except hypothesis.errors.FlakyStrategyDefinition:  # both set out alike, and were answered differently
+            cut_short += 1
+    return cut_short
 
 
-def _try(clients: tuple[TestClient, ...], strategy: Any, examples: int, seed: int) -> list[tuple[str, int]]:
-    """(what was wrong or nothing, status) of some requests of a strategy."""
-    found: list[tuple[str, int]] = []
+def _made(strategy: Any, count: int, seed: int) -> list[Any]:
+    """Some requests of a strategy; none where nothing about the operation can be wrong."""
+    found: list[Any] = []
 
     @hypothesis.seed(seed)
-    @hypothesis.settings(_settings(examples))
+    @hypothesis.settings(_settings(count))
     @hypothesis.given(strategy)
-    def send_it(case: Any) -> None:
-        for client in clients:
-            answer = send(client, case)
-            if answer is not None:
-                found.append((complaint(case, answer), answer.status_code))
+    def keep(case: Any) -> None:
+        found.append(case)
 
-    try:
-        send_it()
-    except hypothesis.errors.Unsatisfiable:  # nothing about this operation can be wrong
-        return found
-    return found
+    with suppress(hypothesis.errors.Unsatisfiable):
+        keep()
+    return found[:count]
 
 
 def _settings(examples: int) -> hypothesis.settings:
@@ -180,13 +273,18 @@ def _header(value: Any) -> str:
 def main() -> int:
     """Send, report; 1 when a server error came back."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--examples", type=int, default=100, help="of each operation, mode and place")
+    parser.add_argument("--examples", type=int, default=100, help="of each role and operation")
+    parser.add_argument("--roles", nargs="+", choices=ROLES, default=list(ROLES))
+    parser.add_argument("--walks", type=int, default=16, help="pairs of walks")
     parser.add_argument("--seed", type=int, default=0)
     add_options(parser)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="r2c2r-any-") as folder:
-        figures = send_anything(Path(folder), examples=options.examples, seed=options.seed)
-    return report("any_request", figures, options.json, failed=bool(figures["failures"]))
+    with tempfile.TemporaryDirectory(prefix="r2c2r-any-") as name:
+        project = make_template(folder := Path(name))
+        sent = send_anything(folder, project, examples=options.examples, seed=options.seed, roles=tuple(options.roles))
+        failed = report("any_request", sent, options.json, failed=bool(sent["failures"]))  # kept before the walks begin
+        walked = walk_anywhere(folder, walks=options.walks, seed=options.seed)
+        return report("any_request_walks", walked, options.json, failed=bool(failed or walked["failures"]))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ class FinishedStages:
 
     def __init__(self, journey: Journey) -> None:
         self._journey = journey
-        self.seen: dict[tuple[int, str, str], dict[str, str]] = {}
+        self.seen: dict[tuple[int, str], dict[str, str]] = {}
         self.changed: list[str] = []
         self._looked = 0.0
 
@@ -35,15 +35,10 @@ class FinishedStages:
                 for stage in job["stages"]:
                     if job["kind"] != "run" or stage["state"] != "done":
                         continue
-                    key, digests = (job["id"], stage["name"], _given(work)), _digests(work, stage["name"])
+                    key, digests = (job["id"], stage["name"]), _digests(work, stage["name"])
                     if digests and self.seen.setdefault(key, digests) != digests:
                         self.changed.append(f"job {job['id']}: what {stage['name']} had stored was changed")
                         self.seen[key] = digests
-
-
-def _given(work: Path) -> str:
-    """What the run was given: a run that is taken up again takes the clicks of then."""
-    return hashlib.sha256(b"".join((work / name).read_bytes() for name in ("prompts.json", "overrides.json"))).hexdigest()
 
 
 def _digests(work: Path, stage: str) -> dict[str, str]:

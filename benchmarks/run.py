@@ -71,7 +71,7 @@ def _bench(options: argparse.Namespace, workdir: Path) -> int:
 
 def bench_seed(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> dict[str, Any]:
     """All numbers of one seed by name, each with value, unit, better and tolerance."""
-    sample = _sample(seed, frames, size, workdir)
+    sample = made_sample(seed, frames, size, workdir)
     work = workdir / f"run-{seed}"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
@@ -105,7 +105,7 @@ def bench_seed(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> 
     return {name: scene[name] for name in ACCURACY if name in scene} | metrics
 
 
-def _sample(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> Path:
+def made_sample(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> Path:
     """The sample's folder, made unless the same generator made it before."""
     folder = workdir / f"sample-{seed}-{frames}-{size[0]}x{size[1]}-{_generator_digest()}"
     if not folder.exists():

@@ -25,10 +25,10 @@ from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX, read_mask
 from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.pipeline import Request, reconstruct
-from r2c2r_core.segment.categories import hint_for
 from r2c2r_core.segment.geometric import GeometricSession
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.stage import open_session
@@ -54,7 +54,7 @@ class Seen:
     @property
     def kind(self) -> str:
         """Its group."""
-        return hint_for(self.category).kind
+        return category_of(self.category).kind
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

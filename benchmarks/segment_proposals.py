@@ -81,7 +81,7 @@ def bench_seed(sample: Path, folder: Path, pictures: Path | None) -> dict[str, A
     work = Workspace(folder)
     capture = work.load_latest("ingest", "scene")
     if capture is None:
-        read = read_capture(sample / "scan.r3d", work.frames, IngestConfig())
+        read = read_capture(sample / "scan.r3d", work.store(sample.name), IngestConfig())
         work.save("ingest", "scene", read, {"key": "benchmark", "seconds": 0.0})
         capture = work.load_latest("ingest", "scene")
     session: Any = open_session(capture, work.cache)

@@ -249,7 +249,7 @@ def _capture(sample: Path, folder: Path) -> Capture:
     found: Capture | None = work.load_latest("ingest", "scene")
     if found is not None:
         return found
-    capture = read_capture(sample / "scan.r3d", work.frames, IngestConfig())
+    capture = read_capture(sample / "scan.r3d", work.store(sample.name), IngestConfig())
     work.save("ingest", "scene", capture, {"key": "benchmark", "seconds": 0.0})
     return capture
 

@@ -1,0 +1,123 @@
+"""Seconds by stage: how they grow with objects and with frames, from nothing to the bundle, and after one changed click.
+
+    python benchmarks/speed.py [--objects 5,14,40] [--frames 60,180,600] [--workers N] [--workdir DIR]
+
+Each case is a fresh workspace; each stage is a process of its own, as in the app, so its seconds include starting it and its
+workers. More objects than the sample has are its objects again under other names: they are segmented, generated and placed, and
+not arranged, for they would stand in each other. "whole" is `r2c2r run`, "again" the same with one click moved by two pixels.
+Writes benchmarks/speed.json and a table. Times move with the machine's load: use an idle one.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from measure import run_measured
+from run import CLI, REPOSITORY, made_sample
+
+RESULTS = Path(__file__).resolve().parent / "speed.json"
+STAGES = ("ingest", "segment", "generate", "align", "synthesize", "warp", "export")
+SIZE = (960, 720)
+USUAL_OBJECTS, USUAL_FRAMES = 14, 180
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the cases, and write what they took."""
+    parser = argparse.ArgumentParser(description="Seconds by stage, objects and frames.")
+    parser.add_argument("--objects", type=_numbers, default=(5, 14, 40))
+    parser.add_argument("--frames", type=_numbers, default=(60, 180, 600))
+    parser.add_argument("--workers", type=int, default=0, help="0: as cores and memory allow")
+    parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are used again")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory(prefix="r2c2r-speed-") as scratch:
+        workdir = (options.workdir or Path(scratch)).resolve()
+        workdir.mkdir(parents=True, exist_ok=True)
+        cases = [(count, USUAL_FRAMES) for count in options.objects]
+        cases += [(USUAL_OBJECTS, frames) for frames in options.frames if frames != USUAL_FRAMES]
+        rows = []
+        for count, frames in cases:
+            rows.append(stage_seconds(count, frames, options.workers, workdir))
+            print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
+        document = {
+            "version": 1,
+            "cores": len(os.sched_getaffinity(0)),
+            "workers": options.workers,
+            "stages": rows,
+            "run": run_seconds(options.workers, workdir),
+        }
+    RESULTS.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    print(markdown(document))
+    return 0
+
+
+def stage_seconds(count: int, frames: int, workers: int, workdir: Path) -> dict[str, Any]:
+    """Wall and CPU seconds of every stage, for so many objects of a kitchen filmed in so many frames."""
+    sample = made_sample(0, frames, SIZE, workdir)
+    prompts = json.loads((sample / "prompts.json").read_text())
+    filmed = len(prompts["objects"])
+    prompts["objects"] = [
+        item | {"name": f"{item['name']}_{k // filmed}" if k >= filmed else item["name"]}
+        for k in range(count)
+        for item in [prompts["objects"][k % filmed]]
+    ]
+    work = workdir / f"speed-{count}-{frames}"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir()
+    (work / "prompts.json").write_text(json.dumps(prompts))
+    (work / "request.json").write_text(json.dumps({"source": str(sample / "scan.r3d"), "prompts": "prompts.json"}))
+    taken: dict[str, Any] = {"objects": count, "frames": frames}
+    for stage in STAGES[: 4 if count > filmed else None]:
+        command = [sys.executable, "-m", "r2c2r_core.worker", str(work), "--until", stage, "--workers", str(workers)]
+        cost = run_measured(command, cwd=REPOSITORY, log=work / f"{stage}.log")
+        if cost.exit_code != 0:
+            raise SystemExit(f"{stage} ended with {cost.exit_code}: see {work / f'{stage}.log'}")
+        taken[stage] = {"wall_s": round(cost.wall_s, 1), "cpu_s": round(cost.cpu_s, 1)}
+    return taken
+
+
+def run_seconds(workers: int, workdir: Path) -> dict[str, Any]:
+    """Wall and CPU seconds of `r2c2r run`: from nothing, after one changed click, and with nothing changed."""
+    sample = made_sample(0, USUAL_FRAMES, SIZE, workdir)
+    work = workdir / "speed-run"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir()
+    prompts = json.loads((sample / "prompts.json").read_text())
+    taken = {}
+    for name in ("whole", "again", "nothing changed"):
+        if name == "again":
+            prompts["objects"][0]["points"][0]["x"] += 2.0
+        (work / "prompts.json").write_text(json.dumps(prompts))
+        command = [*CLI, "run", str(sample / "scan.r3d"), "--prompts", str(work / "prompts.json"), "-o", str(work / "b.zip")]
+        cost = run_measured([*command, "--workers", str(workers)], cwd=REPOSITORY, log=work / f"{name}.log")
+        taken[name] = {
+            "wall_s": round(cost.wall_s, 1),
+            "cpu_s": round(cost.cpu_s, 1),
+            "peak_gb": round(cost.peak_bytes / 1e9, 2),
+            "exit_code": cost.exit_code,
+        }
+        print(json.dumps({name: taken[name]}), file=sys.stderr, flush=True)
+    return taken
+
+
+def markdown(document: dict[str, Any]) -> str:
+    """Wall seconds, with CPU seconds in brackets."""
+    lines = [f"| objects | frames | {' | '.join(STAGES)} |", f"|{'---|' * (len(STAGES) + 2)}"]
+    for row in document["stages"]:
+        cells = [f"{row[s]['wall_s']:.0f} ({row[s]['cpu_s']:.0f})" if s in row else "" for s in STAGES]
+        lines.append(f"| {row['objects']} | {row['frames']} | {' | '.join(cells)} |")
+    runs = [f"{name}: {t['wall_s']:.0f} s ({t['cpu_s']:.0f} s of CPU)" for name, t in document["run"].items()]
+    return "\n".join([*lines, "", f"{document['cores']} cores; `r2c2r run`, {'; '.join(runs)}"])
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
