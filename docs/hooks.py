@@ -1,0 +1,56 @@
+"""Pages made from the code while the site is built: every setting of a run, with its default, its bounds and its meaning."""
+
+from dataclasses import Field, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+_BOUNDS = {"ge": "from {}", "gt": "above {}", "le": "to {}", "lt": "below {}"}
+_MARK = "<!-- every setting -->"
+
+
+def on_config(config: Any) -> Any:
+    """Pages that the navigation does not name stand at its end: none is lost."""
+    named = str(config["nav"])
+    further = sorted(page.name for page in Path(config["docs_dir"]).glob("*.md") if page.name not in named)
+    if further:
+        config["nav"].append({"Run it for others": further})
+    return config
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """The page with the tables where it asks for them."""
+    return markdown.replace(_MARK, tables()) if _MARK in markdown else markdown
+
+
+def tables() -> str:
+    """One table a stage, with the sections of its settings below it."""
+    from r2c2r_core.config import ReconstructConfig
+
+    config = ReconstructConfig()
+    return "\n".join(line for stage in fields(config) for line in _section(getattr(config, stage.name), stage.name))
+
+
+def _section(config: Any, path: str) -> list[str]:
+    """Heading, table and nested sections of one settings class."""
+    nested = [field for field in fields(config) if is_dataclass(getattr(config, field.name))]
+    lines = [
+        f"### {path}",
+        "",
+        *((type(config).__doc__ or "").split("\n\n")[:1]),
+        "",
+        "| setting | default | may be | meaning |",
+    ]
+    lines += ["|---|---|---|---|"]
+    for field in fields(config):
+        if field not in nested:
+            cells = (f"`{field.name}`", f"`{getattr(config, field.name)!r}`", _allowed(field), field.metadata["description"])
+            lines.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |")
+    further = [line for field in nested for line in _section(getattr(config, field.name), f"{path}.{field.name}")]
+    return [*lines, "", *further]
+
+
+def _allowed(field: Field[Any]) -> str:
+    """Its type, and its bounds where it has any."""
+    bounds = (text.format(field.metadata[name]) for name, text in _BOUNDS.items() if name in field.metadata)
+    kind = field.type.__name__ if isinstance(field.type, type) else str(field.type).replace("typing.", "")
+    return ", ".join([kind, *bounds])
