@@ -52,6 +52,20 @@ def propose() -> None:
     say(proposals=found, fraction=1.0)
 
 
+def superseded(commands: Queue, number: int, *, wait: bool) -> bool:
+    """Whether a later command ends this one; what it reads stays in the queue, in its order."""
+    read, found = [], False
+    while not found:
+        try:
+            read.append(commands.get(block=wait))
+        except Empty:
+            break
+        found = read[-1] is None or read[-1].get("object") == number
+    for command in read:
+        commands.put(command)
+    return found
+
+
 def main() -> None:
     commands: Queue = Queue()
 
@@ -84,12 +98,7 @@ def main() -> None:
         for frame in FRAMES:
             say(object=number, key=key, frame=frame, confidence=0.9, area=0.005, mask=rectangle(point["x"], point["y"]))
             time.sleep(0.3 if point["x"] >= 150 else 0)
-            try:
-                newer = commands.get(block=point["x"] >= 156)
-            except Empty:
-                continue
-            commands.put(newer)
-            if newer is None or newer.get("object") == number:
+            if superseded(commands, number, wait=point["x"] >= 156):
                 break
         else:
             say(object=number, key=key, end="done")
