@@ -21,6 +21,7 @@ from .tiny_formats import (
     write_nerfstudio,
     write_polycam,
     write_redwood,
+    write_scanner_app,
     write_scannet,
     write_stray,
     write_threedmatch,
@@ -164,6 +165,51 @@ def test_polycams_frames_are_matched_by_time(tmp_path):
     assert [f.index for f in recording.frames] == [0, 2, 3]
     for frame in recording.frames:
         assert frame.depth_name.split("/")[-1][:-4] == frame.rgb_name.split("/")[-1][:-4]
+
+
+# 3D Scanner App
+
+
+def test_scanner_apps_frames_without_a_photo_are_left_out_and_told(tmp_path):
+    recording = open_recording(write_scanner_app(tmp_path / "s", SMALL, without_photo=(0, 2)))
+    assert [f.index for f in recording.frames] == [1, 3]
+    assert told(recording, "2 of 4 frames were left out: 2 a colour image missing")
+    assert [f.timestamp_s for f in recording.frames] == pytest.approx([0.25, 0.75])  # since the first frame, photo or not
+    assert [set(recording.depth_of(f).confidence.ravel().tolist()) for f in recording.frames] == [{1}, {0}]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"cameraPoseARFrame": [1.0, 2.0]},
+        {"cameraPoseARFrame": "none"},
+        {"intrinsics": [0] * 9},
+        {"intrinsics": [10**400] * 9},
+        {"intrinsics": None},
+    ],
+)
+def test_a_camera_file_of_scanner_app_that_holds_no_camera_costs_its_frame_only(damage, tmp_path):
+    folder = write_scanner_app(tmp_path / "s", SMALL)
+    file = folder / "frame_00001.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | damage))
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == [0, 2, 3]
+    assert told(recording, "1 frames have no usable pose")
+
+
+def test_the_real_chair_of_scanner_app_is_read_by_number(real):
+    recording = open_recording(real("3d-scanner-app-chair"))
+    assert [f.index for f in recording.frames] == list(range(0, 70, 3))
+    assert told(recording, "46 of 70 frames were left out: 46 a colour image missing")
+    frame = recording.frames[0]
+    assert frame.depth_name == "depth_00000.png"
+    assert (frame.rgb_camera.width, frame.rgb_camera.height) in {(1920, 1440), (1440, 1920)}
+    assert frame.rgb_camera.fx == pytest.approx(1447.654296875)
+    # The same file's projection matrix, which counts from the image's edge: (1 + 0.0068009) * 1920 / 2
+    assert 966.529 in (pytest.approx(c, abs=0.01) for c in (frame.rgb_camera.cx, frame.rgb_camera.cy))
+    metres, confidence = recording.depth_of(frame)
+    assert set(np.unique(confidence)) <= {0, 1, 2}
+    assert 0.2 < np.median(metres[metres > 0]) < 5
 
 
 # ARKitScenes

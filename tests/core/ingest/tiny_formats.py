@@ -89,6 +89,25 @@ def write_polycam(folder: Path, room: TinyRoom, *, corrected: bool = True, confi
     return folder
 
 
+def write_scanner_app(folder: Path, room: TinyRoom, *, without_photo: tuple[int, ...] = ()) -> Path:
+    """3D Scanner App in sensor orientation; camera files hold ARKit's poses and the photo's calibration matrix."""
+    folder.mkdir(parents=True)
+    (folder / "info.json").write_text('{"title": "Untitled Scan"}')
+    matrix = integer_centred(sensor_camera(room.camera)).ravel().tolist()
+    for k, pose in enumerate(room.poses()):
+        phone = sensor_pose(pose)
+        arkit = Rigid3(YUP_FROM_ZUP @ phone.rotation @ CAMERA_CV_FROM_GL, YUP_FROM_ZUP @ phone.translation)
+        camera = {"cameraPoseARFrame": arkit.matrix.ravel().tolist(), "intrinsics": matrix, "time": 402896.9 + 0.25 * k}
+        (folder / f"frame_{k:05d}.json").write_text(json.dumps(camera))
+        depth = np.rot90(room.depth(pose, room.depth_camera), -1)
+        cv2.imwrite(str(folder / f"depth_{k:05d}.png"), millimetres(depth))
+        cv2.imwrite(str(folder / f"conf_{k:05d}.png"), np.full(depth.shape, k % 3, np.uint8))
+        if k not in without_photo:
+            sensor = np.ascontiguousarray(np.rot90(room.image(pose, room.camera), -1))
+            (folder / f"frame_{k:05d}.jpg").write_bytes(jpeg(sensor))
+    return folder
+
+
 def write_arkitscenes(folder: Path, room: TinyRoom) -> Path:
     """ARKitScenes in sensor orientation: every second image has a pose, names and clocks differ by a millisecond."""
     for name in ("lowres_wide", "lowres_depth", "confidence", "lowres_wide_intrinsics"):
