@@ -122,7 +122,9 @@ def test_a_hopeless_recording_is_refused_in_one_line(name, scan, tmp_path):
 
 
 def test_a_wrong_scale_and_focal_length_are_measured(scan, tmp_path):
-    depth = corrupted("depth x0.9", scan, tmp_path).scale
+    report = corrupted("depth x0.9", scan, tmp_path)
+    assert report.verdict == "unusable"
+    depth = report.scale
     assert depth.factor == pytest.approx(1 / 0.9, rel=0.02)
     assert depth.text == "the depth is 10 % too small"  # and not perhaps something else
     assert corrupted("focal length x1.1", scan, tmp_path).scale.factor == pytest.approx(1 / 1.1, rel=0.03)

@@ -95,6 +95,13 @@ def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
     assert walls == list(capture.room.walls)
 
 
+def test_the_chairs_frames_agree_within_8_mm_and_their_scale_is_no_reason_to_refuse_them(real, tmp_path):
+    capture = read_capture(real("3d-scanner-app-chair"), tmp_path / "store", IngestConfig())
+    report = examine(capture)
+    assert report.figures.pair_error_mm < 8
+    assert report.verdict == "usable with care", report.reasons  # 5 % of scale at 7 mm: less than a LiDAR's noise
+
+
 def test_redwoods_five_frames_agree_within_8_mm(real, tmp_path):
     capture = read_capture(real("open3d-rgbd-5frames-synthetic"), tmp_path / "store", IngestConfig(finest_voxel_m=0.02))
     assert capture.format == "Redwood / Open3D"
