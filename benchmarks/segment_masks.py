@@ -29,7 +29,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.pipeline import Request, reconstruct
-from r2c2r_core.segment.geometric import GeometricSession
+from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace

@@ -1,9 +1,11 @@
 """The house: contracts that import-linter cannot say, and documents that must stay true."""
 
+import ast
 import importlib.util
 import subprocess
 import sys
 import tomllib
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -24,6 +26,52 @@ def test_stages_never_import_each_other() -> None:
             for other in stages:
                 if other != stage:
                     assert f"r2c2r_core.{other}" not in path.read_text(), f"{path} imports {other}"
+
+
+SEGMENT = ROOT / "r2c2r_core" / "segment"
+
+
+@pytest.mark.parametrize("room", sorted(path.parent for path in SEGMENT.rglob("__init__.py")), ids=lambda path: path.name)
+def test_a_room_of_segment_has_at_most_five_import_levels(room: Path) -> None:
+    levels = import_levels(room)
+    assert max(levels.values()) <= 5, {name: level for name, level in levels.items() if level > 5}
+
+
+def test_import_levels_are_counted_through_functions_and_relative_imports(tmp_path: Path) -> None:
+    room = tmp_path / "r2c2r_core" / "room"
+    room.mkdir(parents=True)
+    (room / "a.py").write_text("import os\nfrom r2c2r_core.other.b import x\n")
+    (room / "b.py").write_text("def f():\n    from r2c2r_core.room import a\n")
+    (room / "c.py").write_text("from .b import f\n")
+    (room / "d.py").write_text("import r2c2r_core.room.c as c\n")
+    assert import_levels(room) == {"a": 1, "b": 2, "c": 3, "d": 4}
+    (room / "a.py").write_text("from r2c2r_core.room.d import c\n")
+    with pytest.raises(CycleError):
+        import_levels(room)
+
+
+def import_levels(room: Path) -> dict[str, int]:
+    """By module of a package: how many of its modules the longest chain of imports from it passes, itself counted."""
+    modules = {path.stem: ast.parse(path.read_text()) for path in room.glob("*.py") if path.stem != "__init__"}
+    package = ".".join(room.parts[room.parts.index("r2c2r_core") :])
+    named = {name: _imported(tree, package) for name, tree in modules.items()}
+    imports = {name: {other for other in modules if f"{package}.{other}" in named[name]} for name in modules}
+    levels: dict[str, int] = {}
+    for name in TopologicalSorter(imports).static_order():
+        levels[name] = 1 + max((levels[other] for other in imports[name]), default=0)
+    return levels
+
+
+def _imported(tree: ast.Module, package: str) -> set[str]:
+    """Every name that a module of `package` may import, wherever in it the import stands."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            source = ".".join(filter(None, [package, node.module])) if node.level == 1 else node.module or ""
+            found |= {source, *(f"{source}.{alias.name}" for alias in node.names)}
+    return found
 
 
 @pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main"])

@@ -15,7 +15,7 @@ from app.jobs.mask_wire import bits_mask
 from app.jobs.proposal_wire import read_proposals
 from app.services import masks, prompts
 from app.services.context import Context
-from r2c2r_core.segment.proposals import is_taken
+from r2c2r_core.segment.proposals.propose import is_taken
 
 _SCOPE = "proposals"
 

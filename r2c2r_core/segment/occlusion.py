@@ -1,4 +1,4 @@
-"""Which pixels of a projected surface a frame really shows: depth decides, colour draws the border of an occluder."""
+"""Visibility of a projected surface in one frame: depth decides per pixel, a watershed on colour draws an occluder's border."""
 
 from dataclasses import dataclass
 

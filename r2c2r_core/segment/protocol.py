@@ -1,4 +1,4 @@
-"""What a segmenter is, and its settings."""
+"""The protocol every segmenter satisfies, and its settings."""
 
 from abc import abstractmethod
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A capture prepared for segmenting: images at hand, the fused surface seen from every frame, rays into it."""
+"""A capture with its acceleration structures: decoded images, the fused surface rendered into every frame, ray picking."""
 
 import os
 from collections import OrderedDict

@@ -17,12 +17,12 @@ SEGMENTERS: Registry[Segmenter] = Registry(
     own=(
         Backend(
             name="geometric",
-            target="r2c2r_core.segment.geometric:GeometricSegmenter",
-            summary="weight-free: fronts cut on an ortho mosaic, things cut from the fused surface",
+            target="r2c2r_core.segment.geometric.session:GeometricSegmenter",
+            summary="weight-free: fronts cut on an orthomosaic, things cut from the fused surface",
         ),
         Backend(
             name="sam2",
-            target="r2c2r_core.segment.learned:Sam2Segmenter",
+            target="r2c2r_core.segment.learned.session:Sam2Segmenter",
             extra="learned",
             needs=("torch", "transformers"),
             weights=Weights(usual="facebook/sam2.1-hiera-tiny", variable="R2C2R_SAM2_WEIGHTS"),
@@ -31,7 +31,7 @@ SEGMENTERS: Registry[Segmenter] = Registry(
         ),
         Backend(
             name="edgetam",
-            target="r2c2r_core.segment.learned:EdgeTamSegmenter",
+            target="r2c2r_core.segment.learned.session:EdgeTamSegmenter",
             extra="edgetam",
             needs=("torch", "transformers", "timm", "torchvision"),
             weights=Weights(usual="yonigozlan/EdgeTAM-hf", variable="R2C2R_EDGETAM_WEIGHTS"),
@@ -40,7 +40,7 @@ SEGMENTERS: Registry[Segmenter] = Registry(
         ),
         Backend(
             name="sam3",
-            target="r2c2r_core.segment.learned:Sam3Segmenter",
+            target="r2c2r_core.segment.learned.session:Sam3Segmenter",
             extra="learned",
             needs=("torch", "transformers"),
             weights=Weights(usual="facebook/sam3", variable="R2C2R_SAM3_WEIGHTS", gated=True),

@@ -1,4 +1,4 @@
-"""The fused surface in parts: what lies near a point, and what each frame would see of it."""
+"""Spatial index of the fused surface: triangles near a point, and the depth image that each frame would have of it."""
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor

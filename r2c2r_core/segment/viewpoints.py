@@ -1,4 +1,4 @@
-"""Frames to look at one place from."""
+"""View selection: sharp, near frames in which nothing hides a point, spread over directions."""
 
 import numpy as np
 

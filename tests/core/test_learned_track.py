@@ -9,15 +9,15 @@ from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.align.stage import AlignConfig, place_mesh
 from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates
 from r2c2r_core.overrides import NO_OVERRIDES
-from r2c2r_core.segment.geometric import GeometricSegmenter
-from r2c2r_core.segment.learned import LearnedSession
+from r2c2r_core.segment.geometric.session import GeometricSegmenter
+from r2c2r_core.segment.learned.session import LearnedSession
 from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes
 from tests.core.segment.scenes import DRAWERS, FRONT_Y, click_on, kitchen, prompt
 
 pytest.importorskip("torch")
-from tests.core.segment.test_learned import TrueMasks
+from tests.core.segment.learned.test_session import TrueMasks
 
 
 def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:

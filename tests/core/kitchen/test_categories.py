@@ -12,8 +12,8 @@ from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import SceneObject
-from r2c2r_core.segment import finders
-from r2c2r_core.segment.things import sized_as
+from r2c2r_core.segment.geometric import finders
+from r2c2r_core.segment.things.thing import sized_as
 from r2c2r_core.synthesize.fixtures.spec import Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_of
 from tests.core.synthesize.kitchen_units import Unit, capture

@@ -11,7 +11,7 @@ from r2c2r_core.kitchen import categories
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model import materials
-from r2c2r_core.segment.things import sized_as
+from r2c2r_core.segment.things.thing import sized_as
 from r2c2r_core.synthesize import fixtures
 from tests.core.synthesize.kitchen_units import Unit, capture
 from tests.core.synthesize.test_build_scene import built

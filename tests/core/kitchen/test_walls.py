@@ -11,7 +11,7 @@ from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.kitchen.walls import depths_in, distances_behind, wall_behind
 from r2c2r_core.model.capture import Wall
-from r2c2r_core.segment.fronts import depth_to_wall
+from r2c2r_core.segment.fronts.front import depth_to_wall
 from r2c2r_core.synthesize.dimensions import distance_to_wall
 from tests.core.synthesize.kitchen_units import capture
 

@@ -14,7 +14,7 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
 from r2c2r_core.model.capture import Capture, Depth, Frame, Room, SceneSurface
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.segment.geometric import GeometricSession
+from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.stage import open_session
 

@@ -1,0 +1,204 @@
+"""An appliance's box: the front rectangle with the clearest edges, extruded by the depth its sides show; its masks."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.track import ThingBox
+from r2c2r_core.segment.appliances.back_edges import depth_at_back_edge
+from r2c2r_core.segment.fronts.front import Front, front_corners, side_corners, side_faces
+from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
+from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.scene import Scene
+
+_CANDIDATES = 36  # lines tried a direction
+_SHADOW_M = 0.02  # lines this near above a support are its shadow's
+_COVERED = 1.2  # what depth saw of the plane weighs as much as all four edges: it belongs to the appliance
+_TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
+
+
+def find_rectangle(
+    run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, support_row: float | None = None
+) -> Cell | None:
+    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support."""
+    cell_m = run.grid.cell_m
+    low, high = clicks.min(axis=0), clicks.max(axis=0)
+    part = _component(run, clicks)
+    upright, level = _with_ends(run.vertical, part, 0), _with_ends(run.horizontal, part, 1)
+    vertical, horizontal = _sums(upright), _sums(level)
+    columns = _candidates(upright, low[1], high[1], 0.4 * kind.height.low / cell_m)
+    rows = _candidates(level, low[0], high[0], 0.4 * kind.width.low / cell_m)
+    if support_row is not None:
+        rows = np.append(rows[rows < support_row - _SHADOW_M / cell_m], support_row)
+    support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    best: tuple[float, Cell] | None = None
+    for left in columns[columns < low[0]]:
+        for right in columns[columns > high[0]]:
+            width = (right - left) * cell_m
+            if not kind.width.holds(width):
+                continue
+            tops, bottoms = rows[rows < low[1]], rows[rows > high[1]]
+            top, bottom = (grid.ravel() for grid in np.meshgrid(tops, bottoms, indexing="ij"))
+            tall = (bottom - top) * cell_m
+            fits = (tall >= kind.height.low) & (tall <= kind.height.high)
+            if not fits.any():
+                continue
+            top, bottom, tall = top[fits], bottom[fits], tall[fits]
+            edges = (
+                _along(vertical, left, top, bottom, run.vertical.block)
+                + _along(vertical, right, top, bottom, run.vertical.block)
+                + _along_rows(horizontal, top, left, right, run.horizontal.block)
+                + _along_rows(horizontal, bottom, left, right, run.horizontal.block)
+            ) / 4
+            usual = np.exp(-0.5 * (kind.height.deviation(tall) ** 2 + kind.width.deviation(width) ** 2))
+            score = edges + 0.3 * usual + _COVERED * _covered(support, left, right, top, bottom)
+            for column, row in refused:
+                score = score - 10.0 * ((left < column < right) & (top < row) & (row < bottom))
+            i = int(np.argmax(score))
+            if best is None or score[i] > best[0] + 1e-9:
+                best = (float(score[i]), Cell(float(left), float(top[i]), float(right), float(bottom[i])))
+    return best[1] if best else None
+
+
+def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, float]:
+    """The box's visible pixels in a frame, and the share of its projection that is visible."""
+    grid = front.run.grid
+    slide = front.run.slide_of(frame.index, scene)
+    facets = []
+    if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward > 0.03:
+        facets.append(Facet(front_corners(front.cell, grid, slide)))
+    for side in ("left", "right", "top", "bottom"):
+        if side_faces(front.cell, grid, side, frame.world_from_camera.translation):
+            facets.append(Facet(side_corners(front.cell, grid, slide, side, front.depth_m)))
+    mask, share = visible_mask(facets, scene, frame, _TOLERANCE)
+    if share < 0.05:
+        return np.zeros_like(mask), 0.0
+    return mask, share
+
+
+def measure_depth(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[float, bool]:
+    """How deep the box reaches behind its front, and whether its sides or top showed it."""
+    limit = min(wall_m - 0.035 if wall_m is not None else 1.0, 1.0)
+    points = _surface_points(front, scene)
+    grid, cell = front.run.grid, front.cell
+    local = grid.world_from_plane.inverse.apply(points)
+    at = grid.cells_of(points)
+    slack = 0.03 / grid.cell_m
+    inside = (at[:, 0] > cell.left - slack) & (at[:, 0] < cell.right + slack)
+    inside &= (at[:, 1] > cell.top - slack) & (at[:, 1] < cell.bottom - slack)
+    near_side = np.minimum(np.abs(at[:, 0] - cell.left), np.abs(at[:, 0] - cell.right)) < slack
+    on_face = inside & (near_side | (np.abs(at[:, 1] - cell.top) < slack)) & (local[:, 1] > 0.04) & (local[:, 1] < limit)
+    depths = local[on_face, 1]
+    spread = np.bincount((depths / 0.02).astype(int), minlength=1) if len(depths) else np.zeros(1)
+    filled = spread[2:] > 0.25 * max(np.median(spread[spread > 0]) if (spread > 0).any() else 1, 2)
+    reach = 0
+    while reach < len(filled) and filled[reach : reach + 2].any():  # a hole of 2 cm is no end
+        reach += 1
+    if reach >= 6:
+        about = min((reach + 2) * 0.02, limit)
+        return depth_at_back_edge(front, scene, about, wall_m or 1.0) or about, True
+    return min(usual_m, limit), False
+
+
+def appliance_box(front: Front) -> ThingBox:
+    """The box in the world: the front rectangle extruded."""
+    grid, cell = front.run.grid, front.cell
+    width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
+    centre = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]), front.depth_m / 2)[0]
+    return ThingBox(
+        world_from_object=Rigid3(front.run.region.world_from_plane.rotation, centre),
+        dimensions_m=np.array([width, front.depth_m, height]),
+        support_z_m=float(centre[2] - height / 2),
+    )
+
+
+def _surface_points(front: Front, scene: Scene) -> Points:
+    vertices = scene.capture.surface.vertices_world
+    centre = appliance_box(front).world_from_object.translation
+    return vertices[np.linalg.norm(vertices - centre, axis=1) < 1.8]
+
+
+def _component(run: Run, clicks: np.ndarray) -> np.ndarray:
+    """The seen part of the plane that lies at, or nearest to, the clicks."""
+    count, labels = cv2.connectedComponents(run.seen.astype(np.uint8), connectivity=4)
+    if count <= 1:
+        return np.zeros_like(run.seen)
+    row = np.clip(clicks[:, 1].astype(int), 0, run.seen.shape[0] - 1)
+    column = np.clip(clicks[:, 0].astype(int), 0, run.seen.shape[1] - 1)
+    under = [label for label in labels[row, column].tolist() if label > 0]
+    if under:
+        return np.asarray(np.isin(labels, under))
+    areas = np.bincount(labels.ravel())
+    distance = [
+        np.inf if label == 0 or areas[label] * run.grid.cell_m**2 < 0.004 else _distance(labels == label, clicks[0])
+        for label in range(count)
+    ]
+    nearest = int(np.argmin(distance))
+    return np.asarray(labels == nearest) if np.isfinite(distance[nearest]) else np.zeros_like(run.seen)
+
+
+def _distance(part: np.ndarray, click: np.ndarray) -> float:
+    rows, columns = np.nonzero(part)
+    return float(np.hypot(columns - click[0], rows - click[1]).min())
+
+
+def _covered(support: np.ndarray, left: float, right: float, top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
+    """Share of the support inside the rectangle, less the share of the rectangle's outside that it fills."""
+    total = support[-1, -1]
+    if total <= 0:
+        return np.zeros(len(top))
+    a, b, c, d = round(left), round(right), np.round(top).astype(int), np.round(bottom).astype(int)
+    inside = support[d, b] - support[c, b] - support[d, a] + support[c, a]
+    return np.asarray(inside / total)
+
+
+def _sums(evidence: Evidence) -> np.ndarray:
+    """Running sums over blocks of how clearly each position shows a line (0..1), the best of three neighbours."""
+    clear = cv2.dilate(np.clip(evidence.score, 0, 4).astype(np.float32), np.ones((1, 3), np.uint8)) / 4
+    return np.pad(np.where(evidence.known, clear, 0).cumsum(axis=0), ((1, 0), (0, 0)))
+
+
+def _along(sums: np.ndarray, column: float, top: np.ndarray, bottom: np.ndarray, block: int) -> np.ndarray:
+    first, last = np.floor(top / block).astype(int), np.ceil(bottom / block).astype(int)
+    first, last = first.clip(0, len(sums) - 2), last.clip(1, len(sums) - 1)
+    at = min(max(int(column), 0), sums.shape[1] - 1)
+    return np.asarray((sums[last, at] - sums[first, at]) / np.maximum(last - first, 1))
+
+
+def _along_rows(sums: np.ndarray, rows: np.ndarray, left: float, right: float, block: int) -> np.ndarray:
+    first, last = int(np.clip(left // block, 0, len(sums) - 2)), int(np.clip(np.ceil(right / block), 1, len(sums) - 1))
+    at = rows.astype(int).clip(0, sums.shape[1] - 1)
+    return np.asarray((sums[last, at] - sums[first, at]) / max(last - first, 1))
+
+
+def _candidates(evidence: Evidence, low: float, high: float, reach: float) -> np.ndarray:
+    """Positions (cell centres) of the clearest lines across the clicks' surroundings."""
+    first = int(max((low - reach) // evidence.block, 0))
+    if first >= len(evidence.score):
+        return np.zeros(0)  # the clicks lie beside what was seen
+    last = int(max(min(np.ceil((high + reach) / evidence.block), len(evidence.score)), first + 1))
+    shown = np.where(evidence.known[first:last], np.clip(evidence.score[first:last], 0, 6), 0).mean(axis=0)
+    profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), 1.2)[0]
+    peak = (profile >= cv2.dilate(profile[None], np.ones((1, 7), np.uint8))[0] - 1e-6) & (profile > 0.2)
+    positions = np.flatnonzero(peak)
+    order = np.argsort(-profile[positions], kind="stable")[:_CANDIDATES]
+    return np.sort(positions[order]) + 0.5
+
+
+def _with_ends(evidence: Evidence, part: np.ndarray, axis: int) -> Evidence:
+    """The evidence, and the ends of what depth saw (its outline may be clearer than any colour edge)."""
+    part = part if axis == 0 else part.T
+    across, along = np.flatnonzero(part.mean(axis=0) > 0.3 * part.mean(axis=0).max()), np.flatnonzero(part.any(axis=1))
+    if len(across) == 0 or not part.any():
+        return evidence
+    score, known = evidence.score.copy(), evidence.known.copy()
+    first, last = int(along[0] // evidence.block), int(along[-1] // evidence.block) + 1
+    for end in (int(across[0]), int(across[-1])):
+        score[first:last, end] = np.maximum(score[first:last, end], 3.0)
+        known[first:last, end] = True
+    return Evidence(score, known, evidence.block)

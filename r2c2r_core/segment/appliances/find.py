@@ -1,0 +1,188 @@
+"""Clicks to an appliance: its front's plane where the click lies on the front, on glass without depth, on a side or the top."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.kitchen.categories import every_category
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.segment.appliances.box import find_rectangle, measure_depth
+from r2c2r_core.segment.appliances.outline import outlined, photos_of
+from r2c2r_core.segment.appliances.squaring import squared
+from r2c2r_core.segment.appliances.stance import stood
+from r2c2r_core.segment.appliances.trimming import trimmed
+from r2c2r_core.segment.fronts.front import Front, depth_to_wall, near_plane, nudged
+from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
+from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.handles import find_handles
+from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.thing import ThingConfig, support_height
+
+_LOW_M = 0.6  # lower appliances stand on worktops
+_OWN_WIDTH, _IN_A_RUN = 1.3, 2.5  # of the greatest width: of a plane that is its front, or that its front is part of
+_OFF_FRONT_M = 0.04  # behind its plane: a side or the top
+_PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
+
+
+def appliance_front(
+    prepared: PreparedCapture, prompt: ObjectPrompt, kind: Category, negatives: Points, *, glimpse: bool = False
+) -> tuple[Front, bool] | None:
+    """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
+
+    Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
+    the photographs, which take most of the time and move the box by millimetres.
+    """
+    clicks = [click for click in prompt.points if click.label == 1]
+    found = _plane_of(prepared, clicks[0], kind)
+    if found is None:
+        return None
+    region, point = found
+    run = prepared.run_of(region, margin_m=_margin(region, kind))
+    if run is None:
+        return None
+    on = run.grid.cells_of(np.array([point, *_on_plane(prepared, region, clicks[1:])]))
+    off = run.grid.cells_of(near_plane(run, negatives))
+    cell = _rectangle(run, on, off, kind, _support_row(prepared, run, point, kind))
+    if cell is None:
+        return None
+    lab, seen_colour = as_lab(run.mosaic)
+    cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
+    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    front = trimmed(Front(run, cell, handle, kind.depth.usual), prepared.scene)
+    wall = depth_to_wall(front, prepared.scene.capture.room, kind)
+    depth, seen = measure_depth(front, prepared.scene, kind.depth.usual, wall)
+    front = squared(replace(front, depth_m=depth), prepared.scene)
+    if not glimpse:
+        front, outlined_depth = _photographed(front, prepared.scene, kind.depth.usual, wall)
+        seen = seen or outlined_depth
+    front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
+    return front, seen
+
+
+def _photographed(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
+    """The front by the edges of its box in the photographs; and whether they show its depth."""
+    photos = photos_of(front, scene)
+    front, clear = outlined(front, photos, usual_m, wall_m)
+    standing = stood(front, photos)
+    if standing is front:
+        return front, clear
+    front, again = outlined(standing, photos, usual_m, wall_m)
+    return front, clear or again
+
+
+def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, support_row: float | None) -> Cell | None:
+    """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
+    cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
+    if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
+        on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
+        cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
+    if cell is None:
+        return None
+    missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
+    wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
+    if not missed and not wrong:
+        return cell
+    return find_rectangle(run, np.array([on[0], *missed]), kind, np.array(wrong).reshape(-1, 2), support_row) or cell
+
+
+def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Category) -> float | None:
+    """The row of the run's grid at which what a small appliance stands on lies; None for tall ones and where none was seen."""
+    if kind.height.high > _LOW_M:
+        return None
+    support = support_height(prepared.scene, point[None], ThingConfig(radius_m=kind.width.usual / 2))
+    if support is None:
+        return None
+    row = float(run.grid.cells_of(np.array([[point[0], point[1], support]]))[0, 1])
+    return row if row < run.grid.rows else None
+
+
+def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
+    """The rectangle with its borders moved to the clicks beside them."""
+    for label, clicks in ((1, on), (0, off)):
+        for column, row in clicks:
+            cell = nudged(cell, column, row, label, cell_m) or cell
+    return cell
+
+
+def _on_plane(prepared: PreparedCapture, region: PlaneRegion, clicks: list[PromptPoint]) -> list[Vector3]:
+    """Where clicks meet the front's plane; those whose depth shows a side or the top say nothing about the front."""
+    points = []
+    for click in clicks:
+        seen = prepared.scene.pick(click.frame, click.x, click.y)
+        has_depth = prepared.scene.has_depth(click.frame, click.x, click.y)
+        if has_depth and seen is not None and _behind(region, seen) > _OFF_FRONT_M:
+            continue
+        origin, ray = prepared.scene.ray(click.frame, click.x, click.y)
+        met = region_along((region,), origin, ray, 10.0, 1.0)
+        points += [met[1]] if met else []
+    return points
+
+
+def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> tuple[PlaneRegion, Vector3] | None:
+    """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
+    scene = prepared.scene
+    origin, ray = scene.ray(click.frame, click.x, click.y)
+    point = scene.pick(click.frame, click.x, click.y)
+    if scene.has_depth(click.frame, click.x, click.y) and point is not None:
+        region = region_at(prepared.planes, point)
+        front = _front_before(prepared, point, kind)
+        if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
+            return front, _support_near(front, point)
+        if region is not None:
+            return region, point
+    farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
+    # A plane no wider than such an appliance is rather its front than a run of cupboards that the ray passes over
+    for widest in (_OWN_WIDTH, _IN_A_RUN):
+        planes = tuple(plane for plane in prepared.planes if plane.width_m < widest * kind.width.high)
+        met = region_along(planes, origin, ray, farthest, kind.width.high)
+        if met is not None:
+            return met
+    return None
+
+
+def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
+    """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
+    planes = [
+        plane
+        for plane in prepared.planes
+        if plane.width_m < _OWN_WIDTH * kind.width.high
+        and _OFF_FRONT_M < _behind(plane, point) < kind.depth.usual + 0.1
+        and plane.supports(point[None], 0.12)[0]
+    ]
+    return max(planes, key=lambda plane: _faced(prepared.scene, plane, point), default=None)
+
+
+def _behind(plane: PlaneRegion, point: Vector3) -> float:
+    return -float((point - plane.world_from_plane.translation) @ plane.outward)
+
+
+def _faced(scene: Scene, plane: PlaneRegion, point: Vector3) -> float:
+    """How squarely the recording looks at a plane: the mean cosine over the cameras."""
+    towards = np.stack([frame.world_from_camera.translation for frame in scene.frames]) - point
+    return float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).mean())
+
+
+def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
+    """A point of what was seen of a plane, near to another point."""
+    seen = plane.points
+    order = np.argsort(np.linalg.norm(seen - point, axis=1))
+    return np.asarray(seen[order[: max(1, round(0.06**2 / plane.cell_m**2))]].mean(axis=0))
+
+
+def _margin(region: PlaneRegion, kind: Category) -> float:
+    """How far the front may reach beyond what depth saw of it."""
+    missing = max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
+    return round(missing + 0.05, 2) if missing > 0.08 else 0.0
+
+
+def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
+    """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
+    kinds = [kind for kind in every_category() if kind.kind == "appliance"]
+    larger = [kind for kind in kinds if region.width_m < kind.width.high and region.height_m < kind.height.high]
+    margins = {_margin(region, kind) for kind in larger}
+    return tuple(sorted(margin for margin in margins if 0 < margin <= _PREPARED_MARGIN_M))

@@ -1,0 +1,38 @@
+"""An appliance that clicks found: its box, and the mask of that box in any frame."""
+
+from dataclasses import dataclass
+
+from r2c2r_core.kitchen.category import Kind
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
+from r2c2r_core.segment.expected_iou import expected_iou
+from r2c2r_core.segment.found import View
+from r2c2r_core.segment.fronts.front import Front, front_corners, front_panel
+from r2c2r_core.segment.scene import Scene
+
+_BORDER_M = 0.009  # how far borders were off, on samples and the real kitchen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundAppliance:
+    """A box with a front: refrigerator, microwave."""
+
+    front: Front
+    scene: Scene
+    kind: Kind = "appliance"
+    warnings: tuple[str, ...] = ()
+
+    def see(self, frame: Frame) -> View:
+        """Its pixels; its door is not told open."""
+        mask, share = appliance_mask(self.front, self.scene, frame)
+        corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
+        return View(mask, expected_iou(mask, share, frame, corners, _BORDER_M))
+
+    def panel(self) -> FrontPanel | None:
+        """The rectangle of its front and its handle."""
+        return front_panel(self.front)
+
+    def box(self) -> ThingBox | None:
+        """The front extruded backwards."""
+        return appliance_box(self.front)

@@ -1,0 +1,32 @@
+"""The expected IoU of a mask with the truth, from how far its border is usually off: the confidence of a mask."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points
+from r2c2r_core.model.capture import Frame
+
+_LEAST_PX = 0.7  # no border is better than that
+_HIDDEN_COST = 0.25  # of a thing nearly all hidden, what shows is a guess
+
+
+def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, border_m: float) -> float:
+    """Expected IoU (0..1) of a mask that shows a `share` of a thing at these points, whose border is off by `border_m`.
+
+    A border off by s pixels on one side changes about s times its length of the area; borders of the image are exact.
+    """
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if len(rows) == 0:
+        return 0.0
+    crop = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
+    top, bottom = rows[0] > 0, rows[-1] < mask.shape[0] - 1
+    left, right = columns[0] > 0, columns[-1] < mask.shape[1] - 1
+    framed = cv2.copyMakeBorder(crop, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    framed[0], framed[-1] = framed[0] * (not top), framed[-1] * (not bottom)
+    framed[:, 0], framed[:, -1] = framed[:, 0] * (not left), framed[:, -1] * (not right)
+    inner = cv2.erode(framed, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))[1:-1, 1:-1]
+    area = float(crop.sum())
+    border = area - float((inner & crop).sum())
+    distance = max(float(np.median(frame.world_from_camera.inverse.apply(points_world)[:, 2])), 0.1)
+    off_px = max(border_m * frame.rgb_camera.fx / distance, _LEAST_PX)
+    return area / (area + border * off_px) * (1 - _HIDDEN_COST * (1 - min(max(share, 0.0), 1.0)))

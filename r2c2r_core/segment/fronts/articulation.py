@@ -1,0 +1,147 @@
+"""Articulation state of a front in one frame: how far a drawer is drawn out, or at what angle a door stands open."""
+
+from typing import Literal
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.track import Swing
+from r2c2r_core.segment.fronts.front import Front, front_corners
+from r2c2r_core.segment.scene import Scene
+
+_CLOSED_M = 0.03  # nearer its place it is closed: pose error and handles
+_FARTHEST_M = 0.6
+_FLAT_M = 0.015  # a front is this flat, what else stands before one is not
+_MOST = 0.6  # of the depth points before the front, that must lie on the flat
+_SPAN = 0.7  # of the front's width and height, that they must span
+_BESIDE_M, _BESIDE_SHARE = 0.05, 0.35  # beyond its edges the flat must end: the same outline, not a board before it
+_BEHIND_M, _LEAST_BEHIND = 0.05, 30  # depth points this far behind its place show that a door is not there
+_LEAST_SWING_RAD = np.deg2rad(12.0)
+_BIN_RAD = np.deg2rad(3.0)
+_EDGE_M = 0.04  # of a leaf's free edge: what its width may be measured short, in part from frames where it is open
+_LEAF_SPAN = 0.6  # of a door's width that its flat must span: its hinge side may be hidden
+_OFF_HINGE_M = 0.05  # the open leaf's plane passes the hinge this near: its thickness, and what the edge was measured off
+
+
+_EDGES: tuple[tuple[Literal["left", "right"], float], ...] = (("left", 1.0), ("right", -1.0))
+
+
+def drawn_out(front: Front, scene: Scene, frame: Frame) -> float:
+    """Metres a flat of the front's own outline stands before its place; 0 where closed, hidden or not to be told."""
+    grid = front.run.grid
+    closed = front_corners(front.cell, grid, (0.0, 0.0))
+    lift, x, z = _points_about(front, scene, frame, np.concatenate([closed, closed + grid.outward * _FARTHEST_M]))
+    half_w, half_h = _halves(front)
+    inside = (np.abs(x) < 0.95 * half_w) & (np.abs(z) < 0.95 * half_h)
+    shown = lift[inside & (lift > -_CLOSED_M)]
+    if len(shown) < 60 or (np.abs(shown) < _CLOSED_M).mean() > 0.4:
+        return 0.0
+    counts, edges = np.histogram(shown, bins=np.arange(_CLOSED_M, _FARTHEST_M, 0.005))
+    peak = int(np.argmax(np.convolve(counts, np.ones(5), mode="same")))
+    out = float(edges[peak] + 0.0025)
+    flat = np.abs(lift - out) < _FLAT_M
+    own, beside = flat & inside, flat & ~inside & (np.abs(x) > half_w + 0.01) & (np.abs(x) < half_w + _BESIDE_M)
+    spans = np.ptp(np.quantile(np.stack([x[own], z[own]]), [0.03, 0.97], axis=1), axis=0) if own.sum() > 60 else np.zeros(2)
+    density = own.sum() / (4 * 0.95**2 * half_w * half_h)
+    around = beside.sum() / (4 * half_h * (_BESIDE_M - 0.01))
+    is_front = own.sum() > _MOST * len(shown) and (spans > _SPAN * 1.9 * np.array([half_w, half_h])).all()
+    return out if is_front and around < _BESIDE_SHARE * density else 0.0
+
+
+def swung(front: Front, scene: Scene, frame: Frame) -> Swing | None:
+    """How a door stands open: a flat of its size that hangs on its left or right edge; None where closed or not to be told."""
+    half_w, half_h = _halves(front)
+    lift, x, z = _points_about(front, scene, frame, front_corners(front.cell, front.run.grid, (0.0, 0.0)))
+    place = (np.abs(x) < 0.9 * half_w) & (np.abs(z) < 0.9 * half_h)
+    closed, behind = int((place & (np.abs(lift) < _CLOSED_M)).sum()), int((place & (lift < -_BEHIND_M)).sum())
+    if behind < _LEAST_BEHIND or closed > 0.4 * (closed + behind):
+        return None
+    lift, x, z = _points_about(front, scene, frame, _swept(front))
+    before = (lift > _CLOSED_M) & (np.abs(z) < 0.95 * half_h)
+    leaves = [
+        (leaf, Swing(hinge=hinge, angle_rad=leaf[1]))
+        for hinge, sign in _EDGES
+        if (leaf := _leaf(sign * x[before] + half_w, lift[before], z[before], half_w, half_h)) is not None
+    ]
+    return max(leaves, key=lambda found: found[0][0])[1] if leaves else None
+
+
+def swung_corners(front: Front, swing: Swing) -> Points:
+    """World corners of a door where it stands open, ordered as `front_corners`."""
+    corners = front_corners(front.cell, front.run.grid, (0.0, 0.0))
+    fixed, free = ([0, 3], [1, 2]) if swing.hinge == "left" else ([1, 2], [0, 3])
+    across = corners[free] - corners[fixed]
+    width = np.linalg.norm(across, axis=1, keepdims=True)
+    opened = corners.copy()
+    opened[free] = corners[fixed] + np.cos(swing.angle_rad) * across + np.sin(swing.angle_rad) * width * front.run.grid.outward
+    return opened
+
+
+def _leaf(across: np.ndarray, lift: np.ndarray, z: np.ndarray, half_w: float, half_h: float) -> tuple[int, float] | None:
+    """Points on, and opening angle of, the flat that hangs on the origin of (across, lift); None where none is a door's."""
+    angle, radius = np.arctan2(lift, across), np.hypot(across, lift)
+    reach = (radius > 0.2 * half_w) & (radius < 2 * half_w) & (angle > _LEAST_SWING_RAD)
+    if reach.sum() < 60:
+        return None
+    counts, edges = np.histogram(angle[reach], bins=np.arange(0.0, np.pi, _BIN_RAD))
+    guess = float(edges[int(np.argmax(np.convolve(counts, np.ones(3), mode="same")))] + _BIN_RAD / 2)
+    off, along = _turned(across, lift, guess)
+    near = reach & (np.abs(off) < 1.5 * _OFF_HINGE_M)
+    for _ in range(3):  # a line of its own: the camera may see the leaf's back, beside the hinge by its thickness
+        if near.sum() < 60:
+            return None
+        slope, offset = np.polyfit(along[near], off[near], 1)
+        guess, shift = guess + float(np.arctan(slope)), float(offset * np.cos(np.arctan(slope)))
+        off, along = _turned(across, lift, guess)
+        near = reach & (np.abs(off - shift) < _FLAT_M)
+    own = near & (along < 2 * half_w)
+    beyond = (np.abs(off - shift) < _FLAT_M) & (along > 2 * half_w + _EDGE_M) & (along < 2 * half_w + _EDGE_M + _BESIDE_M)
+    if own.sum() < 60 or abs(shift) > _OFF_HINGE_M or guess < _LEAST_SWING_RAD:
+        return None
+    spans = np.ptp(np.quantile(np.stack([along[own], z[own]]), [0.03, 0.97], axis=1), axis=0)
+    if (spans < [_LEAF_SPAN * 2 * half_w, _SPAN * 1.9 * half_h]).any() or own.sum() < _MOST * near.sum():
+        return None
+    density = own.sum() / spans.prod()
+    around = beyond.sum() / (_BESIDE_M * spans[1])
+    return (int(own.sum()), guess) if around < _BESIDE_SHARE * density else None
+
+
+def _turned(across: np.ndarray, lift: np.ndarray, angle_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distances off, and along, the line through the origin at an angle."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return c * lift - s * across, c * across + s * lift
+
+
+def _swept(front: Front) -> Points:
+    """Corners of the space that the door passes through, hung on either side."""
+    grid = front.run.grid
+    closed = front_corners(front.cell, grid, (0.0, 0.0))
+    aside = 0.5 * (closed[[1, 1, 2, 2]] - closed[[0, 0, 3, 3]]) * np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
+    wide = closed + aside
+    return np.concatenate([wide, wide + grid.outward * front.cell.width * grid.cell_m])
+
+
+def _halves(front: Front) -> tuple[float, float]:
+    """Half the front's width and height, metres."""
+    cell_m = front.run.grid.cell_m
+    return front.cell.width * cell_m / 2, front.cell.height * cell_m / 2
+
+
+def _points_about(front: Front, scene: Scene, frame: Frame, space: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Depth points in view of a space (world corners), as height over the front's plane, and x to the right and z up in it."""
+    grid, camera, depth = front.run.grid, frame.depth_camera, scene.depth(frame.index)
+    corners = front_corners(front.cell, grid, (0.0, 0.0))
+    seen = frame.world_from_camera.inverse.apply(space)
+    nothing = np.zeros(0)
+    if seen[:4, 2].min() < 0.2:
+        return nothing, nothing, nothing
+    uv = project(np.maximum(seen, [-np.inf, -np.inf, 0.2]), camera)
+    left, top = np.clip(np.floor(uv.min(axis=0)), 0, [camera.width, camera.height]).astype(int)
+    right, bottom = np.clip(np.ceil(uv.max(axis=0)), 0, [camera.width, camera.height]).astype(int)
+    row, column = np.nonzero(depth[top:bottom, left:right] > 0)
+    row, column = row + top, column + left
+    points = unproject(np.stack([column + 0.5, row + 0.5], axis=1), depth[row, column].astype(np.float64), camera)
+    local = (frame.world_from_camera.apply(points) - corners.mean(axis=0)) @ grid.world_from_plane.rotation
+    return -local[:, 1], local[:, 0], local[:, 2]

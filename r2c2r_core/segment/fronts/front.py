@@ -1,0 +1,318 @@
+"""The panel under the clicks as a metric rectangle on its run's plane, and its mask in every frame by reprojection."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.walls import wall_behind
+from r2c2r_core.model.capture import Frame, Room
+from r2c2r_core.model.track import FrontHandle, FrontPanel
+from r2c2r_core.segment.fronts.units import drawer_cell, line_clarity, unit_cell
+from r2c2r_core.segment.occlusion import Facet, visible_mask
+from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, joined
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.scene import Scene
+
+_USUAL_PROTRUSION_M = 0.035
+_PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
+_MET_WIDTH_SHARE, _HANDLES_MEET = 0.2, 0.5  # a cell may hold the gap beside its door
+_SUPPORTED_SHARE = 0.25  # of a column or row of cells, for it to belong to the panel
+_OFF_PLANE_M = 0.06  # handles stand out by up to 5 cm
+_STEADY_M = 0.012  # clicks this near a border are within pose error of it
+_BORDER_M = 0.035  # and those this near correct it: no panel is so narrow
+_HULL_SHARE = 1.3  # two panels whose rectangle is larger than this times theirs do not belong together
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Front:
+    """A panel on a run, with the sides of its carcass that the scan shows."""
+
+    run: Run
+    cell: Cell
+    handle: GridHandle | None
+    depth_m: float  # to the wall behind, or the usual depth
+    sides: tuple[str, ...] = ()  # of left, right, bottom, top: faces of the carcass in view
+
+
+def find_front(
+    run: Run, positives: Points, negatives: Points, *, pair: bool, unit: Category | None = None, stacked: bool = False
+) -> Front | None:
+    """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
+
+    `pair` joins the two doors of a cabinet, `unit` says that it is one front of that kind, `stacked` that it is a drawer.
+    """
+    on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
+    first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
+    if first is None:
+        return None
+    if unit is not None:
+        first = unit_cell(run, float(on[0, 0]), float(on[0, 1]), unit) or first
+    if stacked:
+        first = drawer_cell(run, first, float(on[0, 1]))
+    cells = [first]
+    partner = _partner(run, first) if pair else None
+    cells += [partner] if partner is not None else []
+    cell = joined(cells)
+    for column, row in on[1:]:
+        cell, taken = _with(cell, float(column), float(row), run)
+        cells += taken
+    for column, row in off:
+        cell = _without(cell, float(column), float(row), run, on)
+    handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
+    lab, seen = as_lab(run.mosaic)
+    return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
+
+
+def front_panel(front: Front) -> FrontPanel:
+    """The measured rectangle in the `front` frame."""
+    grid, cell = front.run.grid, front.cell
+    centre = front_middle(front)
+    rotation = front.run.region.world_from_plane.rotation
+    width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
+    handle = _handle_in_front(front, cell) if front.handle is not None else None
+    return FrontPanel(
+        world_from_front=Rigid3(rotation, centre),
+        width_m=width,
+        height_m=height,
+        handle=handle,
+        confidence=float(np.mean(edge_strengths(front))),
+        roll_rad=front.run.roll_rad,
+    )
+
+
+def front_mask(front: Front, scene: Scene, frame: Frame, opened: Points | None = None) -> tuple[Mask, float]:
+    """The front's visible pixels in a frame, and the share of its projection that is visible; where open, at these corners."""
+    grid = front.run.grid
+    if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
+        return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
+    slide = front.run.slide_of(frame.index, scene)
+    facets = [Facet(front_corners(front.cell, grid, slide) if opened is None else opened)]
+    facets += [
+        Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
+        for side in (front.sides if opened is None else ())
+        if side_faces(front.cell, grid, side, frame.world_from_camera.translation)
+    ]
+    return visible_mask(facets, scene, frame)
+
+
+def depth_to_wall(front: Front, room: Room, category: Category) -> float | None:
+    """Distance from a front to the wall behind it; None where none is as far as things of that kind are deep."""
+    return wall_behind(room.walls, front_middle(front), front.run.grid.outward, category.depth)
+
+
+def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
+    """Faces of the carcass that depth confirms over most of their area, away from the front's own edge."""
+    found = []
+    for side in ("left", "right", "bottom"):
+        agree = total = 0
+        points = _side_samples(front, side)
+        for frame in scene.frames[:: max(1, len(scene.frames) // 40)]:
+            if not side_faces(front.cell, front.run.grid, side, frame.world_from_camera.translation):
+                continue
+            z, depth, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+            known = (depth > 0) & ~scene.noise.occluded(depth, z, 0.30)  # far occluders say nothing
+            agree += int(scene.noise.agrees(depth, z, 0.03).sum())
+            total += int(known.sum())
+        if total > 200 and agree > 0.5 * total:
+            found.append(side)
+    return tuple(found)
+
+
+def _partner(run: Run, cell: Cell) -> Cell | None:
+    """The other door of a pair: beside it, as high and as wide, preferably where the handle points."""
+    slack = 0.02 / run.grid.cell_m
+    beside = [
+        other
+        for other in run.cells
+        if abs(other.top - cell.top) < slack
+        and abs(other.bottom - cell.bottom) < slack
+        and min(abs(other.left - cell.right), abs(other.right - cell.left)) < slack
+        and abs(other.width - cell.width) < _width_slack(run, cell, other) * cell.width
+    ]
+    if not beside:
+        return None
+    return max(beside, key=lambda other: (_pair_score(run, cell, other), -abs(other.width - cell.width)))
+
+
+def _width_slack(run: Run, cell: Cell, other: Cell) -> float:
+    """How differently wide two doors of a pair may have been cut, as a share: more where their handles meet at the seam."""
+    return _MET_WIDTH_SHARE if _pair_score(run, cell, other) > _HANDLES_MEET else _PAIR_WIDTH_SHARE
+
+
+def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
+    """Handles of a pair stand beside the shared seam."""
+    score = 0.0
+    for door, mate in ((cell, other), (other, cell)):
+        handle = run.handles[run.cells.index(door)]
+        if handle is not None:
+            offset = ((handle.left + handle.right) / 2 - door.left) / door.width
+            towards = offset if mate.left > door.left else 1 - offset
+            score += handle.confidence * (towards - 0.5)
+    return score
+
+
+def near_plane(run: Run, clicks: Points) -> Points:
+    """The clicks that lie on the panels' plane: others are on sides, or on things in front, and say nothing about panels."""
+    away = run.grid.world_from_plane.inverse.apply(clicks)[:, 1]
+    return clicks[np.abs(away) < _OFF_PLANE_M]
+
+
+def nudged(cell: Cell, column: float, row: float, label: int, cell_m: float) -> Cell | None:
+    """The cell with its border moved to a click beside it, or left where that is within pose error; None for other clicks."""
+    if (label == 1) == cell.contains(column, row):
+        return cell
+    edges = np.array([cell.left, cell.top, cell.right, cell.bottom])
+    beyond = np.array([cell.left - column, cell.top - row, column - cell.right, row - cell.bottom])
+    moved = np.flatnonzero(beyond > 0) if label == 1 else np.array([int(np.argmax(beyond))])
+    off = np.abs(beyond[moved]).max() * cell_m
+    if off > _BORDER_M:
+        return None
+    if off > _STEADY_M:
+        edges[moved] = np.array([column, row, column, row])[moved]
+    return Cell(*edges.tolist())
+
+
+def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[Cell]]:
+    """The cell made to hold a click, and the panels it took in: a click well off it means the panel there.
+
+    Where that makes no rectangle with it, or no panel is there, the border goes to the click.
+    """
+    corrected = nudged(cell, column, row, 1, run.grid.cell_m)
+    if corrected is not None:
+        return corrected, []
+    other = run.cell_at(column, row)
+    both = joined([cell, other]) if other is not None else cell
+    if other is None or _area(both) > _HULL_SHARE * (_area(cell) + _area(other)):
+        return joined([cell, Cell(column, row, column, row)]), []
+    return both, [other]
+
+
+def _area(cell: Cell) -> float:
+    return cell.width * cell.height
+
+
+def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The cell without a click: its border drawn in where the click is beside it, else cut along the clearest line."""
+    corrected = nudged(cell, column, row, 0, run.grid.cell_m)
+    return corrected if corrected is not None else _cut_off(cell, column, row, run, kept)
+
+
+def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The part of the cell, of two along the clearest line between the clicks, that does not hold the click off it."""
+    options: list[tuple[float, Cell]] = []
+    for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
+        profile = _profile(run, cell, axis)
+        low, high = (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
+        below, above = on[on < off], on[on > off]
+        if len(below) and len(above):
+            continue  # a click off it between two on it: no straight cut along this axis
+        start, stop = (float(below.max()), off) if len(below) else (off, float(above.min())) if len(above) else (off, off)
+        window = profile[max(round(start - low), 0) : max(round(stop - low), 0) + 1]
+        if len(window) < 2:
+            continue
+        position = low + max(round(start - low), 0) + int(np.argmax(window)) + 0.5
+        first = Cell(low, cell.top, position, cell.bottom) if axis == 0 else Cell(cell.left, low, cell.right, position)
+        second = Cell(position, cell.top, high, cell.bottom) if axis == 0 else Cell(cell.left, position, cell.right, high)
+        options.append((float(window.max()), first if len(below) else second))
+    return max(options, key=lambda option: option[0])[1] if options else cell
+
+
+def _profile(run: Run, cell: Cell, axis: int) -> np.ndarray:
+    """Mean line evidence across a cell, at each of its positions along an axis."""
+    evidence = run.vertical if axis == 0 else run.horizontal
+    low, high, across = (
+        (cell.left, cell.right, (cell.top, cell.bottom)) if axis == 0 else (cell.top, cell.bottom, (cell.left, cell.right))
+    )
+    first = int(across[0] // evidence.block)
+    last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
+    return np.asarray(evidence.score[first:last, round(low) : round(high)].mean(axis=0))
+
+
+def _supported(cell: Cell, run: Run) -> Cell:
+    """The cell without margins the scan never saw as part of the plane."""
+    rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
+    seen = run.seen[rows, columns]
+    across = np.flatnonzero(seen.mean(axis=0) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
+    down = np.flatnonzero(seen.mean(axis=1) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
+    if len(across) == 0 or len(down) == 0:
+        return cell
+    slack = 0.03 / run.grid.cell_m  # seen depth stops short of an edge by about its own resolution
+    left = cell.left if across[0] < slack else cell.left + float(across[0])
+    right = cell.right if cell.width - across[-1] < slack else cell.left + float(across[-1]) + 1
+    top = cell.top if down[0] < slack else cell.top + float(down[0])
+    bottom = cell.bottom if cell.height - down[-1] < slack else cell.top + float(down[-1]) + 1
+    return Cell(left, top, right, bottom)
+
+
+def _handle_on(run: Run, cell: Cell) -> GridHandle | None:
+    if cell in run.cells:
+        return run.handles[run.cells.index(cell)]
+    return find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+
+
+def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
+    assert front.handle is not None
+    cell_m, handle = front.run.grid.cell_m, front.handle
+    middle_x, middle_z = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
+    return FrontHandle(
+        left_m=(handle.left - middle_x) * cell_m,
+        right_m=(handle.right - middle_x) * cell_m,
+        bottom_m=(middle_z - handle.bottom) * cell_m,
+        top_m=(middle_z - handle.top) * cell_m,
+        protrusion_m=handle.protrusion_m or _USUAL_PROTRUSION_M,
+        confidence=handle.confidence,
+    )
+
+
+def edge_strengths(front: Front) -> tuple[float, ...]:
+    """How clearly each edge shows, 0..1: left, right, top, bottom."""
+    return line_clarity(front.run, front.cell)
+
+
+def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:
+    """World corners of a panel as a frame shows it: top left, then clockwise."""
+    corners = np.array([[cell.left, cell.top], [cell.right, cell.top], [cell.right, cell.bottom], [cell.left, cell.bottom]])
+    return grid.points_at(corners - np.array(slide))
+
+
+def front_middle(front: Front) -> Vector3:
+    """The world point in the middle of a panel."""
+    cell = front.cell
+    at = np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]])
+    return np.asarray(front.run.grid.points_at(at)[0])
+
+
+_SIDE_EDGES = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}
+
+
+def side_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float], side: str, depth_m: float) -> Points:
+    """World corners of the carcass face that starts at one edge of a panel."""
+    corners = front_corners(cell, grid, slide)[list(_SIDE_EDGES[side])]
+    back = corners - grid.outward * depth_m
+    return np.stack([corners[0], corners[1], back[1], back[0]])
+
+
+def side_faces(cell: Cell, grid: PlaneGrid, side: str, camera_world: Vector3) -> bool:
+    """Whether a camera is on the outer side of a carcass face."""
+    local = grid.cells_of(camera_world[None])[0]
+    return bool(
+        {
+            "left": local[0] < cell.left,
+            "right": local[0] > cell.right,
+            "top": local[1] < cell.top,
+            "bottom": local[1] > cell.bottom,
+        }[side]
+    )
+
+
+def _side_samples(front: Front, side: str) -> Points:
+    corners = side_corners(front.cell, front.run.grid, (0.0, 0.0), side, front.depth_m)
+    along, deep = np.meshgrid(np.linspace(0.1, 0.9, 9), np.linspace(min(0.10 / max(front.depth_m, 0.11), 0.5), 0.9, 9))
+    a, d = along.ravel()[:, None], deep.ravel()[:, None]
+    return (1 - d) * ((1 - a) * corners[0] + a * corners[1]) + d * ((1 - a) * corners[3] + a * corners[2])

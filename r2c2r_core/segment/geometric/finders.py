@@ -1,0 +1,121 @@
+"""Clicks to an object: the method the category suggests first (front, appliance, thing), then what the scan suggests."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.segment.appliances.find import appliance_front
+from r2c2r_core.segment.appliances.found import FoundAppliance
+from r2c2r_core.segment.found import Found
+from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.fronts.front import depth_to_wall, find_front, seen_sides
+from r2c2r_core.segment.planes import PlaneRegion, region_at
+from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
+from r2c2r_core.segment.things.found import FoundThing
+from r2c2r_core.segment.things.thing import ThingConfig, find_thing, sized_as
+from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
+
+_SMALL_M = 0.25  # things below this radius are carved by silhouettes
+
+
+def find_object(prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits) -> Found:
+    """The object under the clicks; raises ObjectNotSeen when neither a front nor a thing is there."""
+    if category.kind == "front":
+        found = _front(prepared, category, positives.points, negatives.points)
+        if found is not None:
+            return found
+    if category.kind == "appliance":
+        appliance = _appliance(prepared, prompt, category, negatives.points)
+        if appliance is not None:
+            return appliance
+    thing = _thing(prepared, prompt, category, positives, negatives.points) if positives.clicks else None
+    if thing is not None:
+        warnings = (
+            ()
+            if category.kind != "front"
+            else (f"no flat front under the click: treated as a thing of its own ({prompt.category})",)
+        )
+        return replace(thing, warnings=warnings)
+    raise ObjectNotSeen(
+        f"{prompt.name}: no surface of its own under {len(positives.clicks)} click(s)",
+        hint="click on its middle, or add a second click",
+    )
+
+
+def glimpse_object(
+    prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits
+) -> Found | None:
+    """A first look at what is slow to find, from depth alone: small things, appliances. None for the rest, found at once."""
+    if category.kind == "appliance":
+        return _appliance(prepared, prompt, category, negatives.points, glimpse=True)
+    config = sized_as(category)
+    if category.kind != "thing" or config.radius_m >= _SMALL_M or not positives.clicks:
+        return None
+    small = glimpse_small(
+        prepared.scene, positives.points, negatives.points, config, _structure_off(prepared, positives.points[0])
+    )
+    return FoundThing(small, prepared.scene, small=True, round=config.round) if small is not None else None
+
+
+def _front(prepared: PreparedCapture, category: Category, positives: Points, negatives: Points) -> FoundFront | None:
+    region = region_at(prepared.planes, positives[0])
+    run = prepared.run_of(region) if region is not None else None
+    if run is None:
+        return None
+    unit = category if category.one_front else None
+    front = find_front(run, positives, negatives, pair=category.may_be_pair, unit=unit, stacked=category.one_of_a_stack)
+    if front is None:
+        return None
+    depth = depth_to_wall(front, prepared.scene.capture.room, category) or category.depth.usual
+    front = replace(front, depth_m=depth)
+    swings = category.opens in ("side", "bottom") and not category.may_be_pair
+    return FoundFront(replace(front, sides=seen_sides(front, prepared.scene)), prepared.scene, swings=swings)
+
+
+def _appliance(
+    prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, negatives: Points, *, glimpse: bool = False
+) -> FoundAppliance | None:
+    front, seen = appliance_front(prepared, prompt, category, negatives, glimpse=glimpse) or (None, False)
+    if front is None:
+        return None
+    assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
+    return FoundAppliance(front, prepared.scene, warnings=() if seen else (assumed,))
+
+
+def _thing(
+    prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, hits: Hits, negatives: Points
+) -> FoundThing | None:
+    config = sized_as(category)
+    positives = _on_thing(prepared, hits, config)
+    if config.radius_m < _SMALL_M:
+        small = find_small(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
+        if small is not None:
+            return FoundThing(replace(small, clicks=prompt.points), prepared.scene, small=True, round=config.round)
+    thing = find_thing(prepared.scene, positives, negatives, config)
+    return FoundThing(thing, prepared.scene) if thing is not None else None
+
+
+def _on_thing(prepared: PreparedCapture, hits: Hits, config: ThingConfig) -> Points:
+    """The clicks' points, those that fell on what is behind the thing drawn forward to it; farther ones are left out."""
+    first = hits.points[0]
+    points = [first]
+    across = 1.2 * config.width_m + 0.02 if config.width_m is not None else 2.2 * config.radius_m
+    for click, seen in zip(hits.clicks[1:], hits.points[1:], strict=True):
+        point = seen
+        if np.linalg.norm((point - first)[:2]) > across:
+            origin, ray = prepared.scene.ray(click.frame, click.x, click.y)
+            point = origin + ray * float((first - origin)[:2] @ ray[:2]) / max(float(ray[:2] @ ray[:2]), 1e-6)
+        if np.linalg.norm((point - first)[:2]) <= across:
+            points.append(point)
+    return np.array(points)
+
+
+def _structure_off(prepared: PreparedCapture, point: Vector3) -> tuple[PlaneRegion, ...]:
+    """Walls and runs that a thing may touch; not the one it is itself."""
+    structure = tuple(plane for plane in prepared.planes if plane.area_m2 > 0.4)
+    own = region_at(structure, point, 0.02)
+    return tuple(plane for plane in structure if plane is not own)

@@ -1,0 +1,230 @@
+"""The weight-free segmenter: fronts cut on orthomosaics, things cut from the fused surface."""
+
+import hashlib
+import importlib
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Vector3
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import PackedMask, pack_mask
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.model.track import MaskTrack, Swing
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.appliances.find import appliance_margins
+from r2c2r_core.segment.found import Found, View
+from r2c2r_core.segment.geometric.cache import kept
+from r2c2r_core.segment.geometric.finders import find_object, glimpse_object
+from r2c2r_core.segment.planes import PlaneRegion, find_planes
+from r2c2r_core.segment.prompts import check_prompt
+from r2c2r_core.segment.proposals.propose import propose_steps
+from r2c2r_core.segment.protocol import Glimpse, SegmentConfig, Segmenter
+from r2c2r_core.segment.runs.prepared import Hits
+from r2c2r_core.segment.runs.run import Run, make_run
+from r2c2r_core.segment.scene import Scene, prepare_scene
+from r2c2r_core.segment.surface import in_threads
+from r2c2r_core.sources import source_key
+
+
+class GeometricSegmenter(Segmenter):
+    """Needs no weights and no extra."""
+
+    def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
+        """Prepare a capture: see the surface from every frame, find its vertical planes, cut the furniture runs."""
+        folder = cache / f"geometric-{_cache_key(capture, config)}"
+        _forget_others(folder)
+        _import_heavy()
+        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.3))
+        progress.at(0.3, "looking for flat upright parts")
+        centres = np.stack([frame.world_from_camera.translation for frame in capture.frames])
+        planes = kept(folder / "planes.noun", lambda: find_planes(capture.surface, centres))
+        session = GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
+        session.cut_runs(progress=progress.part(0.35, 1.0))
+        progress.at(1.0, f"{len(planes)} flat upright parts found")
+        return session
+
+
+@dataclass(slots=True, eq=False)
+class GeometricSession:
+    """Clicks on one capture. Runs are keyed by plane and objects by prompt, so answers never depend on their order."""
+
+    scene: Scene
+    planes: tuple[PlaneRegion, ...]
+    config: SegmentConfig
+    folder: Path
+    _runs: dict[str, Run | None] = field(default_factory=dict)
+    _found: dict[ObjectPrompt, Found] = field(default_factory=dict)
+
+    def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
+        """The object's mask in one frame; empty when that frame does not show it."""
+        known = {frame.index for frame in self.scene.frames}
+        if frame_index not in known:
+            raise PromptError(
+                f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
+                hint="choose another",
+            )
+        return self.find(prompt).see(self.scene.frame(frame_index)).mask
+
+    def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
+        """A first mask in the frame clicked last: what `stream` brings there; of things and appliances, nearly that."""
+        found = self._found.get(prompt) or glimpse_object(self, prompt, *self._clicked(prompt)) or self.find(prompt)
+        frame = self.scene.frame(prompt.points[-1].frame)
+        view = found.see(frame)
+        return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None
+
+    def prefetch(self) -> Iterator[None]:
+        """Decode images, as many as stay in memory."""
+        return self.scene.prefetch()
+
+    def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
+        """The object in every frame that sees it; raises ObjectNotSeen when none does."""
+        progress.at(0.0, f"{prompt.name}: finding it")
+        found = self.find(prompt)
+        masks: dict[int, PackedMask] = {}
+        confidence: dict[int, float] = {}
+        opened_m: dict[int, float] = {}
+        swung: dict[int, Swing] = {}
+        total = len(self.scene.frames)
+        for position, (index, view) in enumerate(self._views(prompt)):
+            masks[index], confidence[index] = pack_mask(view.mask), view.trust
+            if view.opened_m > 0:
+                opened_m[index] = view.opened_m
+            if view.swing is not None:
+                swung[index] = view.swing
+            progress.at(min(0.1 + 0.9 * position / total, 0.99), f"{prompt.name}: seen in {position + 1} frames")
+        if not masks:
+            raise ObjectNotSeen(
+                f"{prompt.name}: seen in 0 of {total} frames, at least 1 expected", hint="click where it is in plain view"
+            )
+        progress.at(1.0, f"{prompt.name}: {len(masks)} frames")
+        return MaskTrack(
+            name=prompt.name,
+            category=prompt.category,
+            masks=dict(sorted(masks.items())),
+            confidence=dict(sorted(confidence.items())),
+            front=found.panel(),
+            box=found.box(),
+            kind=found.kind,
+            backend="geometric",
+            prompt_count=len(prompt.points),
+            warnings=found.warnings,
+            opened_m=dict(sorted(opened_m.items())),
+            swung=dict(sorted(swung.items())),
+        )
+
+    def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:
+        """Frame, mask, confidence: the frame clicked last, then outwards both ways."""
+        for index, view in self._views(prompt):
+            yield index, pack_mask(view.mask), view.trust
+
+    def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
+        """Proposals so far, surest first, with the share of the work done; the last step has them all."""
+        return propose_steps(self)
+
+    def find(self, prompt: ObjectPrompt) -> Found:
+        """What the clicks mean, computed once a prompt."""
+        found = self._found.get(prompt)
+        if found is None:
+            hint, positives, negatives = self._clicked(prompt)
+            found = self._found[prompt] = find_object(self, prompt, hint, positives, negatives)
+        return found
+
+    def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
+        """The furniture run on a plane, and this far around it; computed once."""
+        key = f"run{self.planes.index(region)}-{round(margin_m * 1000)}"
+        if key not in self._runs:
+            cell_m, frames = self.config.cell_m, self.config.mosaic_frames
+            path = self.folder / f"{key}.noun"
+            self._runs[key] = kept(path, lambda: make_run(region, self.scene, cell_m, frames, margin_m))
+        return self._runs[key]
+
+    def cut_runs(self, *, progress: Progress = SILENT) -> None:
+        """Cut the runs of all planes, and those around planes that may be a part of an appliance, before any click."""
+        tasks = [(region, 0.0) for region in self.planes]
+        tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
+        for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
+            progress.at(done / len(tasks), f"cutting furniture runs {done}/{len(tasks)}")
+
+    def _views(self, prompt: ObjectPrompt) -> Iterator[tuple[int, View]]:
+        """Frames that show it, the one clicked last first, then outwards both ways."""
+        found = self.find(prompt)
+        for frame in _outwards(self.scene.frames, prompt.points[-1].frame):
+            view = found.see(frame)
+            if self._shows(view):
+                yield frame.index, view
+
+    def _shows(self, view: View) -> bool:
+        return bool(np.count_nonzero(view.mask) >= self.config.least_area_px)
+
+    def _clicked(self, prompt: ObjectPrompt) -> tuple[Category, Hits, Hits]:
+        """Its category, and what was clicked on it and off it."""
+        check_prompt(self.scene.capture, prompt)
+        category = category_of(prompt.category)
+        positives = self._hits(prompt, 1, must_hit=category.kind != "appliance")
+        return category, positives, self._hits(prompt, 0, must_hit=False)
+
+    def _hits(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Hits:
+        """What the clicks of one label hit; raises PromptError where the first must hit a surface and does not.
+
+        A later one on what has no depth (glass, gloss, a far wall) counts where its ray passes nearest to the first.
+        """
+        clicks: list[PromptPoint] = []
+        points: list[Vector3] = []
+        for click in (click for click in prompt.points if click.label == label):
+            point = self.scene.pick(click.frame, click.x, click.y)
+            if point is None and points and label == 1:
+                origin, ray = self.scene.ray(click.frame, click.x, click.y)
+                point = origin + ray * float((points[0] - origin) @ ray)
+            if point is not None:
+                clicks.append(click)
+                points.append(point)
+            elif must_hit:
+                raise PromptError(
+                    _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
+                )
+        return Hits(tuple(clicks), np.array(points).reshape(-1, 3))
+
+
+def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:
+    return (
+        f"{prompt.name}: the click at ({click.x:g}, {click.y:g}) on frame {click.frame} hits no surface, "
+        "a point with depth expected"
+    )
+
+
+def _outwards(frames: tuple[Frame, ...], start: int) -> list[Frame]:
+    return sorted(frames, key=lambda frame: (abs(frame.index - start), frame.index))
+
+
+def _forget_others(folder: Path) -> None:
+    """Drop what older code, or another setting, prepared here: it is never read again."""
+    for path in folder.parent.glob("geometric-*"):
+        if path != folder:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _import_heavy() -> None:
+    """What the first click would otherwise wait for."""
+    for name in ("scipy.ndimage", "scipy.sparse.csgraph", "skimage.measure", "skimage.segmentation"):
+        importlib.import_module(name)
+
+
+def _cache_key(capture: Capture, config: SegmentConfig) -> str:
+    parts = (
+        source_key("segment", "kitchen", "geometry", "model"),
+        capture.sha256,
+        config,
+        capture.world_from_capture.matrix.round(9).tolist(),
+        len(capture.surface.vertices_world),
+        len(capture.surface.faces),
+        [frame.index for frame in capture.frames],
+    )
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

@@ -1,0 +1,139 @@
+"""Learned masks and depth: the paper's intersection with a mask of the depth picture, and our evidence from all frames.
+
+`depth-mask` (paper 4.1): the same clicks are followed a second time through pictures of the depth, and both masks are
+intersected; where less than 40 % of the colour mask is left, the colour mask stays and the frame is counted as apart.
+`evidence` (default): all frames vote on the fused surface; a frame loses the pixels whose depth lies off what was agreed
+(leaks over a depth edge), and gets the agreed surface's outline where the model lost an object that is in plain view.
+The intersection also deletes what a depth picture cannot show, such as handles and flush gaps (method.md row 13).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image, Mask
+from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.learned.voting import Body
+from r2c2r_core.segment.occlusion import refine_border
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.thing import Thing, thing_mask
+
+LEAST_OVERLAP = 0.4  # of the colour mask that the intersection must keep
+_OFF_BODY_M, _OFF_BODY_SHARE = 0.04, 0.01  # a pixel this far from the agreed surface is not the object (handles: 4 cm)
+_LEAK_SHARE = 0.01  # of the mask: fewer pixels off the body are noise of depth, not a leak
+_LOST_SHARE = 0.25  # of the agreed surface's visible pixels: a smaller mask has lost the object
+_IN_PLAIN_VIEW = 0.5  # of the agreed surface's projection that must be visible to fill it in
+_FILLED_CONFIDENCE = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fused:
+    """Masks and their confidence by frame number, and what a person should know."""
+
+    masks: Mapping[int, PackedMask]
+    confidence: Mapping[int, float]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthPictures:
+    """Depth as 8-bit pictures, one brightness for one distance in the whole recording (near is bright)."""
+
+    scene: Scene
+    near_m: float
+    far_m: float
+
+    @classmethod
+    def over(cls, scene: Scene) -> "DepthPictures":
+        """From the 2nd to the 98th percentile of the recording's depth."""
+        step = max(1, len(scene.frames) // 16)
+        seen = [depth[depth > 0][::7] for frame in scene.frames[::step] if (depth := scene.depth(frame.index)).any()]
+        near, far = np.percentile(np.concatenate(seen), [2, 98]) if seen else (0.0, 1.0)
+        return cls(scene, float(near), max(float(far), float(near) + 0.1))
+
+    def picture(self, position: int) -> Image:
+        """The depth of the frame at a position of the recording; holes take the nearest known pixel."""
+        depth = nearest_filled(self.scene.filled_depth(self.scene.frames[position].index))
+        share = np.clip((self.far_m - depth) / (self.far_m - self.near_m), 0, 1)
+        return np.repeat((share * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def nearest_filled(depth_m: np.ndarray) -> np.ndarray:
+    """The depth with every hole given the value of its nearest known pixel (the paper's fill); zeros when none is known."""
+    known = depth_m > 0
+    if known.all() or not known.any():
+        return depth_m
+    _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    values = np.zeros(int(labels.max()) + 1, depth_m.dtype)
+    values[labels[known]] = depth_m[known]
+    return np.asarray(values[labels])
+
+
+def both_masks(colour: Mask, depth: Mask) -> tuple[Mask, bool]:
+    """The intersection (paper 4.1), or the colour mask and False where the intersection keeps less than 40 % of it.
+
+    `depth` may have another resolution: the picture's own.
+    """
+    if depth.shape != colour.shape:
+        size = (colour.shape[1], colour.shape[0])
+        depth = cv2.resize(depth.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    both = colour & depth
+    agreed = np.count_nonzero(both) >= LEAST_OVERLAP * np.count_nonzero(colour)
+    return (both, True) if agreed else (colour, False)
+
+
+def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) -> Fused:
+    """The masks without their leaks over depth edges, and with the frames the model lost; unchanged without a surface."""
+    if not body.exists:
+        return found
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(body.vertices)
+    thing = Thing(body.vertices, body.faces, None, scene.capture.surface.voxel_m)
+    masks: dict[int, PackedMask] = {}
+    confidence: dict[int, float] = {}
+    filled = 0
+    for frame in scene.frames:
+        mask, trust = None, found.confidence.get(frame.index, 0.0)
+        if frame.index in found.masks:
+            mask = without_leaks(unpack_mask(found.masks[frame.index]), scene, frame, near)
+        outline, share = thing_mask(thing, scene, frame, refine=False)
+        lost = np.count_nonzero(mask) if mask is not None else 0
+        if share > _IN_PLAIN_VIEW and lost < _LOST_SHARE * np.count_nonzero(outline):
+            mask, trust, filled = _snapped(outline, scene, frame), _FILLED_CONFIDENCE, filled + 1
+        if mask is not None and np.count_nonzero(mask) >= least_area_px:
+            masks[frame.index], confidence[frame.index] = pack_mask(mask), trust
+    if not masks:
+        return found
+    said = (f"the model lost it in {filled} frames: filled in from where the others see it",) if filled else ()
+    return Fused(masks, confidence, found.warnings + said)
+
+
+def without_leaks(mask: Mask, scene: Scene, frame: Frame, near: object) -> Mask:
+    """The mask without pixels whose measured depth lies off the agreed surface (`near` is its cKDTree)."""
+    depth = scene.depth(frame.index)
+    small = cv2.resize(mask.astype(np.uint8), (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
+    row, column = np.nonzero(small & (depth > 0))
+    if not len(row):
+        return mask
+    metres = depth[row, column].astype(np.float64)
+    points = unproject(np.stack([column + 0.5, row + 0.5], axis=1), metres, frame.depth_camera)
+    limit = _OFF_BODY_M + _OFF_BODY_SHARE * metres
+    away, _ = near.query(frame.world_from_camera.apply(points), distance_upper_bound=float(limit.max()))  # type: ignore[attr-defined]  # scipy has no types
+    off = np.zeros(depth.shape, np.uint8)
+    off[row, column] = away > limit
+    off = cv2.morphologyEx(off, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))  # single pixels of mixed depth
+    if off.sum() < _LEAK_SHARE * small.sum():
+        return mask
+    wide = cv2.resize(off, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_LINEAR) > 0
+    kept = mask & ~wide
+    band = max(2, round(1.5 * mask.shape[1] / depth.shape[1]))
+    return refine_border(scene.rgb(frame.index), kept, band, within=mask) if kept.any() else kept
+
+
+def _snapped(outline: Mask, scene: Scene, frame: Frame) -> Mask:
+    return refine_border(scene.rgb(frame.index), outline, max(2, frame.rgb_camera.width // 160)) if outline.any() else outline

@@ -1,0 +1,225 @@
+"""Masks to measures: the front's rectangle and handle, an appliance's box, a thing's box, whoever drew the masks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import pixel_rays, unproject
+from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.kitchen.category import Category, Kind
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.segment.appliances.box import appliance_box, measure_depth
+from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_panel
+from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
+from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
+from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.handles import find_handles
+from r2c2r_core.segment.runs.orthomosaic import Cell, joined
+from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.boxes import box_of
+from r2c2r_core.segment.things.thing import sized_as, support_height
+
+_GRID_STEP_M = 0.01  # of the votes on a plane
+_COVERED = 0.6  # of the votes: what some views add at one side stays out
+_ON_PLANE_M = 0.03
+_LEAST_ON_PLANE = 0.08  # of a body's surface that a clicked plane must hold
+_MAINLY_ON_PLANE = 0.25  # and one that nobody clicked
+_LEAST_OF_PLANE = 0.3  # of a plane that must be the body, for a click without depth to mean it: not the wall behind
+_FARTHEST_M, _GLASS_M = 10.0, 1.0  # along a click's ray; from where it meets a plane to what depth saw of it
+_SAME_PANEL = 0.8  # overlap from which the voted rectangle is the panel the lines cut, whose edges are finer
+_POINT_FRAMES = 20
+_WIDEST_FRAMES = 7
+_GRID_PAD_M = 0.06  # the plane's grid reaches a little further than this anyway
+_MOST_BEYOND_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """What later stages need beside the masks."""
+
+    kind: Kind
+    front: FrontPanel | None = None
+    box: ThingBox | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
+    """The object's front or box: `masks` say which part of the scan it is, `body` is that part of the fused surface."""
+    category = category_of(prompt.category)
+    usual_m = category.depth.usual
+    if category.kind == "thing":
+        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category))
+    front = _front(prepared, prompt, masks, body, category)
+    if front is None:
+        said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
+        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
+    wall = depth_to_wall(front, prepared.scene.capture.room, category)
+    if category.kind == "front":
+        return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or usual_m)))
+    depth, seen = measure_depth(front, prepared.scene, usual_m, wall)
+    warnings = () if seen else (f"its depth was not seen: {depth:.2f} m is usual for a {prompt.category}",)
+    front = replace(front, depth_m=depth)
+    return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
+
+
+def _front(
+    prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
+) -> Front | None:
+    region = _front_plane(prepared, prompt, body)
+    run = prepared.run_of(region, _beyond(region, prepared.scene, masks)) if region is not None else None
+    if run is None:
+        return None
+    voted = _voted_rectangle(run, prepared.scene, masks, body)
+    if voted is None:
+        return None
+    cell = _as_cut(run, voted)
+    lab, seen = as_lab(run.mosaic)
+    cell = panel_edges(cell, lab, seen, run.seen, run.grid.cell_m)
+    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    return Front(run, cell, handle, category.depth.usual)
+
+
+def _front_plane(prepared: PreparedCapture, prompt: ObjectPrompt, body: Body) -> PlaneRegion | None:
+    """The clicked plane among those the body lies on (where glass returns no depth, its side may be larger), or the largest."""
+    shares = [(plane, _share_on(plane, body)) for plane in prepared.planes] if body.exists else []
+    on_body = tuple(plane for plane, share in shares if share > _LEAST_ON_PLANE)
+    mostly_body = tuple(plane for plane, share in shares if share * body.area_m2 > _LEAST_OF_PLANE * plane.area_m2)
+    for click in prompt.points:
+        if click.label != 1:
+            continue
+        point = prepared.scene.pick(click.frame, click.x, click.y)
+        if point is not None and prepared.scene.has_depth(click.frame, click.x, click.y):
+            clicked = region_at(on_body, point)
+        else:
+            met = region_along(mostly_body, *prepared.scene.ray(click.frame, click.x, click.y), _FARTHEST_M, _GLASS_M)
+            clicked = met[0] if met is not None else None
+        if clicked is not None:
+            return clicked
+    plane, share = max(shares, key=lambda entry: entry[1], default=(None, 0.0))
+    return plane if share > _MAINLY_ON_PLANE else None
+
+
+def _share_on(plane: PlaneRegion, body: Body) -> float:
+    """The share of a body's surface that lies on a plane."""
+    off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
+    return float(((off < _ON_PLANE_M) & plane.supports(body.vertices, 0.02)).mean())
+
+
+def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) -> float:
+    """How far the masks reach beyond what depth saw of the plane, metres: glass and gloss return nothing."""
+    largest = sorted(masks, key=lambda index: -masks[index].area_px)[:_WIDEST_FRAMES]
+    reaches = []
+    for index in largest:
+        mask, frame = masks[index], scene.frame(index)
+        columns = np.array([0, mask.box_width, mask.box_width, 0]) + mask.left
+        rows = np.array([0, 0, mask.box_height, mask.box_height]) + mask.top
+        rays = pixel_rays(np.stack([columns, rows], axis=1).astype(np.float64), frame.rgb_camera)
+        inward = region.world_from_plane.inverse.rotation @ frame.world_from_camera.rotation
+        eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation[None])[0]
+        rays = rays @ inward.T
+        if (rays[:, 1] < 0.15).any():  # seen too flatly to say where a ray meets it
+            continue
+        met = eye - rays * (eye[1] / rays[:, 1])[:, None]
+        over = np.abs(met[:, [0, 2]]) - [region.width_m / 2, region.height_m / 2]
+        reaches.append(float(over.max()))
+    reach = float(np.quantile(reaches, 0.25)) if reaches else 0.0  # seen from the side, the mask holds the side too
+    return round(min(reach + 0.05, _MOST_BEYOND_M), 2) if reach > _GRID_PAD_M else 0.0
+
+
+def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Cell | None:
+    """The rectangle of a run's plane (grid cells) that most masks cover, where the body is."""
+    step = max(1, round(_GRID_STEP_M / run.grid.cell_m))
+    columns, rows = np.arange(step / 2, run.grid.columns, step), np.arange(step / 2, run.grid.rows, step)
+    at = np.stack([grid.ravel() for grid in np.meshgrid(columns, rows)], axis=1)
+    inside, seen = vote(scene, _frontal(masks, run.region, scene), run.grid.points_at(at))
+    covered = ((seen > 0) & (inside > _COVERED * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
+    if count <= 1:
+        return None
+    part = labels == _part_of(labels, stats, body, run, step)
+    across, down = part.sum(axis=0), part.sum(axis=1)
+    wide, tall = np.flatnonzero(across > 0.5 * across.max()), np.flatnonzero(down > 0.5 * down.max())
+    if len(wide) < 3 or len(tall) < 3:
+        return None
+    return Cell(*(float(step * edge) for edge in (wide[0], tall[0], wide[-1] + 1, tall[-1] + 1)))
+
+
+def _frontal(masks: Mapping[int, PackedMask], region: PlaneRegion, scene: Scene) -> dict[int, PackedMask]:
+    """The half of the masks seen most from the front: seen from the side, a box's mask holds its side too."""
+
+    def facing(index: int) -> float:
+        towards = scene.frame(index).world_from_camera.translation - region.world_from_plane.translation
+        return float(towards @ region.outward / np.linalg.norm(towards))
+
+    return {index: masks[index] for index in sorted(masks, key=facing)[len(masks) // 2 :]}
+
+
+def _part_of(labels: np.ndarray, stats: np.ndarray, body: Body, run: Run, step: int) -> int:
+    """The label that most of the body's surface on the plane falls into, else the largest."""
+    on_plane = body.vertices[np.abs(run.grid.world_from_plane.inverse.apply(body.vertices)[:, 1]) < _ON_PLANE_M]
+    column, row = (run.grid.cells_of(on_plane) / step).astype(int).T
+    inside = (column >= 0) & (row >= 0) & (column < labels.shape[1]) & (row < labels.shape[0])
+    held = np.bincount(labels[row[inside], column[inside]], minlength=len(stats))
+    held[0] = 0
+    return int(np.argmax(held)) if held.any() else 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+
+
+def _as_cut(run: Run, voted: Cell) -> Cell:
+    """The panel, or the neighbouring panels, that the run's lines cut there; the voted rectangle where none fits."""
+    within = [cell for cell in run.cells if _overlap(cell, voted) > 0.6 * cell.width * cell.height]
+    if not within:
+        return voted
+    cut = joined(within)
+    shared = _overlap(cut, voted)
+    union = cut.width * cut.height + voted.width * voted.height - shared
+    return cut if shared > _SAME_PANEL * union else voted
+
+
+def _overlap(a: Cell, b: Cell) -> float:
+    wide = min(a.right, b.right) - max(a.left, b.left)
+    tall = min(a.bottom, b.bottom) - max(a.top, b.top)
+    return max(wide, 0.0) * max(tall, 0.0)
+
+
+def _thing_box(
+    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
+) -> ThingBox | None:
+    """The box of its points on its support; None where depth never saw it."""
+    points = _points(scene, masks, body)
+    if len(points) < 20:
+        return None
+    clicked = [scene.pick(click.frame, click.x, click.y) for click in prompt.points if click.label == 1]
+    hits = np.array([point for point in clicked if point is not None]).reshape(-1, 3)
+    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], sized_as(category))
+    if support is not None and (points[:, 2] > support).sum() >= 20:
+        points = points[points[:, 2] > support]
+    centres = np.stack([frame.world_from_camera.translation for frame in scene.frames])
+    yaw = scene.capture.room.manhattan_yaw_rad
+    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=category.round)
+
+
+def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:
+    """World points of depth pixels well inside the masks, near the body where there is one."""
+    found = [np.zeros((0, 3))]
+    for index in voting_frames(masks, _POINT_FRAMES):
+        frame, depth = scene.frame(index), scene.depth(index)
+        mask = unpack_mask(masks[index]).astype(np.uint8)
+        small = cv2.resize(mask, (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_AREA)
+        inner = cv2.erode(small, np.ones((3, 3), np.uint8)) if small.sum() > 200 else small
+        row, column = np.nonzero((inner > 0) & (depth > 0))
+        uv = np.stack([column + 0.5, row + 0.5], axis=1)
+        found.append(frame.world_from_camera.apply(unproject(uv, depth[row, column].astype(np.float64), frame.depth_camera)))
+    points = np.concatenate(found)
+    if not body.exists or not len(points):
+        return points
+    from scipy.spatial import cKDTree
+
+    away, _ = cKDTree(body.vertices).query(points, distance_upper_bound=2.5 * scene.capture.surface.voxel_m)
+    return points[np.isfinite(away)]

@@ -1,0 +1,208 @@
+"""Learned segmenters: a video model draws masks, depth prunes them, furniture is measured as without weights."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from r2c2r_core.arrays import Image, Mask
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.geometric.session import GeometricSegmenter, GeometricSession
+from r2c2r_core.segment.learned.fuse import DepthPictures, Fused, both_masks, with_evidence
+from r2c2r_core.segment.learned.measure import Measured, measure
+from r2c2r_core.segment.learned.sam_video import EDGETAM, SAM2, SAM3, Click, Family, Seen, VideoModel, load_model
+from r2c2r_core.segment.learned.voting import agreed_body
+from r2c2r_core.segment.prompts import check_prompt
+from r2c2r_core.segment.protocol import SegmentConfig, Segmenter
+
+_KEPT_OBJECTS = 8  # followed so far and no further: a later click goes on where it stopped
+
+Found = tuple[int, PackedMask, float]  # frame, mask, confidence
+
+
+class LearnedSegmenter(Segmenter):
+    """A backend whose masks come from a video model in the folder `weights`."""
+
+    name: str
+    family: Family
+
+    def __init__(self, weights: Path) -> None:
+        self.weights = weights
+
+    def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "LearnedSession":
+        """Load the model, and prepare the capture as the weight-free segmenter does: measuring needs its surface and planes."""
+        progress.at(0.0, f"loading {self.name}")
+        model = load_model(self.weights, self.family)
+        prepared = GeometricSegmenter().open(capture, cache, config, progress=progress.part(0.2, 1.0))
+        return LearnedSession(name=self.name, model=model, prepared=prepared, config=config)
+
+
+class Sam2Segmenter(LearnedSegmenter):
+    """SAM 2 and 2.1 (Ravi et al. 2024)."""
+
+    name, family = "sam2", SAM2
+
+
+class EdgeTamSegmenter(LearnedSegmenter):
+    """EdgeTAM (Zhou et al. 2025)."""
+
+    name, family = "edgetam", EDGETAM
+
+
+class Sam3Segmenter(LearnedSegmenter):
+    """SAM 3's tracker (Meta 2025)."""
+
+    name, family = "sam3", SAM3
+
+
+@dataclass(slots=True, eq=False)
+class LearnedSession:
+    """Clicks on one capture. Every prompt has its own memory in the model, so objects never disturb each other."""
+
+    name: str
+    model: VideoModel
+    prepared: GeometricSession
+    config: SegmentConfig
+    _followed: dict[ObjectPrompt, "_Followed"] = field(default_factory=dict)
+    _depths: DepthPictures | None = None
+
+    @property
+    def capture(self) -> Capture:
+        """The capture that was opened."""
+        return self.prepared.scene.capture
+
+    def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
+        """The model's mask in one frame; follows the object up to there when that was not done yet."""
+        known = {frame.index for frame in self.capture.frames}
+        if frame_index not in known:
+            raise PromptError(
+                f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
+                hint="choose another",
+            )
+        found = next((packed for index, packed, _ in self._of(prompt).all() if index == frame_index), None)
+        assert found is not None
+        return unpack_mask(found)
+
+    def glimpse(self, prompt: ObjectPrompt) -> Found | None:
+        """None: the model's own first mask comes first in `stream`, and the model is not for two threads."""
+        return None
+
+    def prefetch(self) -> Iterator[None]:
+        """Decode images."""
+        return self.prepared.prefetch()
+
+    def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
+        """As the model gives them: the frame clicked last, the other clicked ones, then outwards both ways."""
+        return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)
+
+    def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
+        """The object in every frame that sees it, after all frames had their say; raises ObjectNotSeen."""
+        total, followed = len(self.capture.frames), self._of(prompt)
+        masks: dict[int, PackedMask] = {}
+        confidence: dict[int, float] = {}
+        for position, (index, packed, trust) in enumerate(followed.all()):
+            if packed.area_px >= self.config.least_area_px:
+                masks[index], confidence[index] = packed, trust
+            progress.at(0.9 * (position + 1) / total, f"{prompt.name}: {self.name} at frame {position + 1}/{total}")
+        if not masks:
+            raise ObjectNotSeen(
+                f"{prompt.name}: {self.name} sees it in 0 of {total} frames, at least 1 expected",
+                hint="click where it is in plain view, or add a second click",
+            )
+        progress.at(0.9, f"{prompt.name}: comparing frames")
+        body = agreed_body(self.prepared.scene, masks)
+        fused = Fused(masks, confidence, followed.warnings())
+        if self.config.fusion == "evidence":
+            fused = with_evidence(self.prepared.scene, fused, body, self.config.least_area_px)
+        progress.at(0.95, f"{prompt.name}: measuring it")
+        return self._track(prompt, fused, measure(self.prepared, prompt, fused.masks, body))
+
+    def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
+        """What the weight-free segmenter sees; the model follows what is confirmed."""
+        return self.prepared.propose()
+
+    def _track(self, prompt: ObjectPrompt, fused: Fused, measured: Measured) -> MaskTrack:
+        return MaskTrack(
+            name=prompt.name,
+            category=prompt.category,
+            masks=dict(sorted(fused.masks.items())),
+            confidence=dict(sorted(fused.confidence.items())),
+            front=measured.front,
+            box=measured.box,
+            kind=measured.kind,
+            backend=self.name,
+            prompt_count=len(prompt.points),
+            warnings=fused.warnings + measured.warnings,
+        )
+
+    def _of(self, prompt: ObjectPrompt) -> "_Followed":
+        """The object as far as it was followed: what was computed before is not computed again."""
+        if prompt not in self._followed:
+            check_prompt(self.capture, prompt)
+            while len(self._followed) >= _KEPT_OBJECTS:
+                self._followed.pop(next(iter(self._followed)))
+            self._followed[prompt] = _Followed(self._follow(prompt))
+        return self._followed[prompt]
+
+    def _follow(self, prompt: ObjectPrompt) -> Iterator[tuple[int, Seen, bool]]:
+        """Frame number, what was seen there, and whether the depth mask (where there is one) agreed."""
+        frames = self.capture.frames
+        position_of = {frame.index: position for position, frame in enumerate(frames)}
+        clicks: dict[int, list[Click]] = {}
+        for point in prompt.points:
+            camera = self.capture.frame(point.frame).rgb_camera
+            click = Click(point.x / camera.width, point.y / camera.height, point.label)
+            position = position_of[point.frame]
+            clicks[position] = [*clicks.pop(position, []), click]  # the frame clicked last comes last
+        colour = self.model.follow(self._colour, len(frames), clicks)
+        if self.config.fusion != "depth-mask":
+            for seen in colour:
+                yield frames[seen.position].index, seen, True
+            return
+        if self._depths is None:
+            self._depths = DepthPictures.over(self.prepared.scene)
+        depth = self.model.follow(self._depths.picture, len(frames), clicks, channel="depth")
+        for seen, beside in zip(colour, depth, strict=True):
+            mask, agreed = both_masks(seen.mask, beside.mask)
+            yield frames[seen.position].index, seen._replace(mask=mask), agreed
+
+    def _colour(self, position: int) -> Image:
+        return self.prepared.scene.rgb(self.capture.frames[position].index)
+
+
+class _Followed:
+    """One object as far as it was followed; goes on when more is asked for."""
+
+    def __init__(self, rest: Iterator[tuple[int, Seen, bool]]) -> None:
+        self._rest = rest
+        self._found: list[Found] = []
+        self._apart = 0  # frames whose depth mask was too different to count
+
+    def all(self) -> Iterator[Found]:
+        """What was found, and then what is found next."""
+        position = 0
+        while position < len(self._found) or self._advance():
+            yield self._found[position]
+            position += 1
+
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know about it."""
+        if not self._apart:
+            return ()
+        return (f"colour and depth masks disagreed in {self._apart} of {len(self._found)} frames: colour was taken there",)
+
+    def _advance(self) -> bool:
+        following = next(self._rest, None)
+        if following is None:
+            return False
+        index, seen, agreed = following
+        self._found.append((index, pack_mask(np.asarray(seen.mask)), seen.confidence))
+        self._apart += not agreed
+        return True

@@ -1,0 +1,123 @@
+"""Free-standing clusters of the fused surface: what stands on a level support and belongs to no vertical plane."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.segment.planes import PlaneRegion
+
+_VOXEL_M = 0.02
+_MAP_M = 0.04  # of the heights of level surfaces
+_LEVEL_COS = 0.85
+_LEAST_LEVEL_M2 = 0.05  # glossy worktops lose most of their depth
+_BESIDE_M = 0.20  # a thing stands this near to where its support was seen: it hides the rest
+_CLEARANCE_M = 0.012
+_STANDS_M = 0.06  # the seen part of a thing starts this near its support
+_OFF_PLANE_M = 0.03
+_STRUCTURE_M2 = 0.12  # smaller upright planes may be the face of a box
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clump:
+    """A connected part of the scan, world frame."""
+
+    points: Points
+    extent_m: np.ndarray  # along the room's axes and up
+    base_m: float  # world height of what it stands on
+    confidence: float
+
+
+def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump]:
+    """Things on level surfaces, surest first."""
+    surface = capture.surface
+    corners = surface.vertices_world[surface.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(cross, axis=1) / 2
+    centres, up = corners.mean(axis=1), cross[:, 2] / np.maximum(2 * areas, 1e-12)
+    yaw = capture.room.manhattan_yaw_rad
+    c, s = np.cos(yaw), np.sin(yaw)
+    turned = centres @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # along the room's axes
+    levels = _levels(turned, areas, up)
+    if not levels:
+        return []
+    free = np.ones(len(centres), bool)
+    for plane in planes:
+        if plane.area_m2 > _STRUCTURE_M2:
+            off = np.abs((centres - plane.world_from_plane.translation) @ plane.outward)
+            free &= ~((off < _OFF_PLANE_M) & plane.supports(centres, 0.04))
+    found = []
+    for height, mask, origin in levels:
+        found += _standing_on(height, mask, origin, centres[free], turned[free], areas[free])
+    found.sort(key=lambda clump: -clump.confidence)
+    kept: list[Clump] = []
+    for clump in found:
+        middle = clump.points.mean(axis=0)
+        if all(np.linalg.norm(middle - other.points.mean(axis=0)) > 0.05 for other in kept):
+            kept.append(clump)
+    return kept
+
+
+def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Level surfaces as (height, map of where they are, map origin); overlapping heights are one."""
+    level = up > _LEVEL_COS
+    if not level.any():
+        return []
+    heights = points[level, 2]
+    low = heights.min()
+    profile = np.bincount(((heights - low) / 0.01).astype(int), areas[level])
+    smooth = ndimage.uniform_filter1d(np.pad(profile, 3), 3) * 3
+    highest = ndimage.maximum_filter1d(smooth, 7)
+    origin = points[:, :2].min(axis=0)
+    shape = tuple(((points[:, :2].max(axis=0) - origin) / _MAP_M).astype(int) + 2)
+    found = []
+    for peak in np.flatnonzero((smooth == highest) & (smooth > _LEAST_LEVEL_M2)):
+        height = low + (peak - 3 + 0.5) * 0.01
+        near = level & (np.abs(points[:, 2] - height) < 0.02)
+        cells = ((points[near, :2] - origin) / _MAP_M).astype(int)
+        seen = np.zeros(shape, bool)
+        seen[cells[:, 0], cells[:, 1]] = True
+        beside = np.asarray(ndimage.binary_dilation(seen, iterations=round(_BESIDE_M / _MAP_M)))
+        found.append((float(np.average(points[near, 2], weights=areas[near])), beside, origin))
+    return found
+
+
+def _standing_on(
+    height: float, seen: np.ndarray, origin: np.ndarray, centres: Points, turned: Points, areas: np.ndarray
+) -> list[Clump]:
+    cells = ((turned[:, :2] - origin) / _MAP_M).astype(int)
+    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + _CLEARANCE_M) & (turned[:, 2] < height + 1.3)
+    if above.sum() < 10:
+        return []
+    points, local, area = centres[above], turned[above], areas[above]
+    low = local.min(axis=0) - _VOXEL_M
+    index = ((local - low) / _VOXEL_M).astype(int)
+    filled = np.zeros(index.max(axis=0) + 3, bool)
+    filled[index[:, 0] + 1, index[:, 1] + 1, index[:, 2] + 1] = True
+    labels, count = ndimage.label(filled, np.ones((3, 3, 3)))
+    own = labels[index[:, 0] + 1, index[:, 1] + 1, index[:, 2] + 1]
+    found = []
+    for label in range(1, count + 1):
+        member = own == label
+        if member.sum() < 12:
+            continue
+        bottom, top = np.quantile(local[member], 0.01, axis=0), np.quantile(local[member], 0.99, axis=0)
+        extent = top - bottom
+        extent[2] = top[2] - height
+        if bottom[2] > height + _STANDS_M or not _thing_sized(extent, height):
+            continue
+        # Half of a thing is seen at best: its surface compared with half that of its box.
+        shown = float(area[member].sum() / max(extent[0] * extent[1] / 2 + extent[2] * (extent[0] + extent[1]), 1e-4))
+        confidence = float(np.clip(shown / 0.5, 0.1, 1) * np.clip(extent[2] / 0.08, 0.3, 1) * 0.9)
+        found.append(Clump(points[member], extent, height, confidence))
+    return found
+
+
+def _thing_sized(extent: np.ndarray, height: float) -> bool:
+    """Larger than a lump of noise, smaller than furniture that is built in."""
+    on_floor = height < 0.15
+    most_across, most_high = (1.2, 1.3) if on_floor else (0.6, 0.6)
+    least = 0.15 if on_floor else 0.04
+    return bool(extent[2] > least and extent[:2].max() > 0.04 and extent[:2].max() < most_across and extent[2] < most_high)

@@ -1,0 +1,211 @@
+"""Panels of a run that pass as fronts: lines on four sides, flat, of a usual size, with a handle."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.kitchen.walls import distances_behind
+from r2c2r_core.model.capture import Room
+from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front, front_corners
+from r2c2r_core.segment.proposals.naming import FrontLook, name_front
+from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.runs.run import Run
+
+_SHALLOWEST_M = 0.15  # nearer to a wall is the wall, what hangs flat on it, or the back of a sink
+_DARK_LIGHTNESS = 60.0  # of 255
+_SMALLEST_M = 0.09
+_CORNER_M = 0.06  # how exactly a side starts where a front ends
+_DEEPEST_M = 0.8  # of a carcass
+_ROW_M = 0.03  # how exactly the fronts of a row line up
+_MATE_WORTH = 0.5  # how much a sure front beside it says for a panel
+_SUREST = 0.99
+_LEAST_MATE = 0.1  # confidence below which a panel is no company
+_SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
+_NO_POINTS = np.zeros((0, 3))
+_EQUAL_DOORS_M = 0.012  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
+_WIDEST_CABINET_M = 0.95
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """A panel that may be a front, with the evidence for it."""
+
+    front: Front
+    category: str
+    confidence: float
+    usual: float = 1.0  # 0..1: how usual its size is where it is; part of the confidence
+
+    @property
+    def run(self) -> Run:
+        """The run it is part of."""
+        return self.front.run
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height."""
+        cell_m = self.run.grid.cell_m
+        return self.front.cell.width * cell_m, self.front.cell.height * cell_m
+
+    @property
+    def centre(self) -> Vector3:
+        """Its middle, in the world."""
+        cell = self.front.cell
+        return self.run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
+
+    @property
+    def corners(self) -> Points:
+        """Its corners in the world: top left, then clockwise."""
+        return front_corners(self.front.cell, self.run.grid, (0.0, 0.0))
+
+
+def find_panels(run: Run, room: Room) -> list[Panel]:
+    """The run's panels that could be fronts, the doors of a pair joined."""
+    found: list[Panel] = []
+    mates: list[Cell] = []
+    for cell in sorted(run.cells, key=lambda cell: (cell.left, cell.top)):
+        if cell in mates or min(cell.width, cell.height) * run.grid.cell_m < _SMALLEST_M:
+            continue
+        panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=False), room)
+        mate = _mate(run, cell)
+        if panel is not None and panel.category == "cabinet" and mate is not None:
+            panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=True), room, pair=True)
+            mates.append(mate)
+        if panel is not None:
+            found.append(panel)
+    return [_beside(panel, [other for other in found if other is not panel]) for panel in found]
+
+
+def without_sides(panels: list[Panel]) -> list[Panel]:
+    """The panels without those on the sides of carcasses: of two faces that meet at an outer corner, the better front stays."""
+    strength: dict[int, float] = {}
+    for panel in panels:
+        strength[id(panel.run)] = strength.get(id(panel.run), 0.0) + panel.confidence * _area(panel)
+    return [
+        panel
+        for panel in panels
+        if not any(strength[id(panel.run)] < strength[id(other.run)] and _is_side_of(panel, other) for other in panels)
+    ]
+
+
+def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | None:
+    """A front with its name and the evidence for it; None when it is too small for one."""
+    if front is None:
+        return None
+    run, cell, cell_m = front.run, front.cell, front.run.grid.cell_m
+    area = (slice(max(round(cell.top), 0), round(cell.bottom)), slice(max(round(cell.left), 0), round(cell.right)))
+    if min(cell.width, cell.height) * cell_m < _SMALLEST_M or not run.seen[area].size:
+        return None
+    bottom = float(run.grid.points_at(np.array([[cell.left, cell.bottom]]))[0, 2]) if room.floor_found else None
+    look = FrontLook(
+        width_m=cell.width * cell_m,
+        height_m=cell.height * cell_m,
+        bottom_m=bottom,
+        handle=front.handle,
+        dark=_dark_share(run, area),
+        pair=pair,
+    )
+    category, usual = name_front(look)
+    return Panel(front, category, usual * _evidence(front, area, room), usual)
+
+
+def _beside(panel: Panel, others: list[Panel]) -> Panel:
+    """The panel in the light of its run: fronts stand in rows and stacks, and small flat things stand alone."""
+    slack = _ROW_M / panel.run.grid.cell_m
+    mates = [
+        other for other in others if other.confidence > _LEAST_MATE and _aligned(panel.front.cell, other.front.cell, slack)
+    ]
+    category = panel.category
+    if category == "dishwasher" and not _odd_one_out(mates):
+        category = "cabinet"
+    if mates:
+        best = max(other.confidence for other in mates)
+        unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - _MATE_WORTH * best)
+        return replace(panel, category=category, confidence=min(panel.usual * (1 - unsure), _SUREST))
+    alone = _ALONE_WORTH if _area(panel) < _SMALL_M2 else 1.0
+    return replace(panel, category=category, confidence=alone * panel.confidence)
+
+
+def _aligned(a: Cell, b: Cell, slack: float) -> bool:
+    """Whether two panels stand in one row, or above each other."""
+    in_row = abs(a.top - b.top) < slack and abs(a.bottom - b.bottom) < slack
+    return in_row or (abs(a.left - b.left) < slack and abs(a.right - b.right) < slack)
+
+
+def _odd_one_out(mates: list[Panel]) -> bool:
+    """Whether the doors beside a lying handle carry upright ones: a machine among cupboards."""
+    handles = [mate.front.handle for mate in mates if mate.category in ("cabinet", "dishwasher")]
+    return bool(handles) and all(handle is not None and handle.height > 1.8 * handle.width for handle in handles)
+
+
+def outlined(front: Front) -> float:
+    """0..1: lines on its four sides, and a handle."""
+    edges = edge_strengths(front)
+    lines = np.clip((np.mean(edges) - 0.45) / 0.45, 0, 1) * np.clip((min(edges) - 0.1) / 0.5, 0.3, 1)
+    return float(lines * (0.6 + 0.4 * (front.handle.confidence if front.handle is not None else 0.0)))
+
+
+def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
+    """0..1: outlined, flat where depth saw it, and no wall."""
+    flat = np.clip((front.run.seen[area].mean() - 0.3) / 0.5, 0, 1)
+    return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room) else 1.0))
+
+
+def is_on_wall(run: Run, room: Room, shallowest_m: float = _SHALLOWEST_M) -> bool:
+    """Whether a run is a wall, or too near one that faces the same way to have a carcass behind it."""
+    middle = run.region.world_from_plane.translation
+    return any(abs(distance) < shallowest_m for distance in distances_behind(room.walls, middle, run.grid.outward))
+
+
+def _middle(run: Run, cell: Cell) -> Points:
+    return run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))
+
+
+def _mate(run: Run, cell: Cell) -> Cell | None:
+    """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
+    slack = 0.02 / run.grid.cell_m
+    for other in run.cells:
+        beside = abs(other.left - cell.right) < slack
+        if not beside or abs(other.top - cell.top) > slack or abs(other.bottom - cell.bottom) > slack:
+            continue
+        left, right = (find_front(run, _middle(run, door), _NO_POINTS, pair=False) for door in (cell, other))
+        if left is None or right is None or left.handle is None or right.handle is None:
+            continue
+        equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
+        one_cabinet = (left.cell.width + right.cell.width) * run.grid.cell_m < _WIDEST_CABINET_M
+        if equal and one_cabinet and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
+            return other
+    return None
+
+
+def _handle_at(front: Front) -> float:
+    """Where across a front its handle is, 0 at the left edge and 1 at the right."""
+    assert front.handle is not None
+    return ((front.handle.left + front.handle.right) / 2 - front.cell.left) / front.cell.width
+
+
+def _dark_share(run: Run, area: tuple[slice, slice]) -> float:
+    colours = run.mosaic[area]
+    known = colours.any(axis=2)
+    return float((colours[known].mean(axis=1) < _DARK_LIGHTNESS).mean()) if known.any() else 0.0
+
+
+def _area(panel: Panel) -> float:
+    width, height = panel.size_m
+    return width * height
+
+
+def _is_side_of(side: Panel, front: Panel) -> bool:
+    """Whether a panel lies on the face that starts at a front's left or right edge and runs backwards."""
+    normal = front.run.grid.outward
+    if abs(float(normal @ side.run.grid.outward)) > 0.3:
+        return False
+    width, height = front.size_m
+    local = front.run.region.world_from_plane.rotation.T @ (side.corners - front.centre).T
+    x, behind, z = local
+    outward = float(front.run.region.world_from_plane.rotation[:, 0] @ side.run.grid.outward)
+    at_edge = abs(abs(float(x.mean())) - width / 2) < _CORNER_M and float(x.mean()) * outward > 0
+    # The side may end short of the front: a door stands before its carcass, or the cut took a piece of it.
+    is_behind = behind.min() > -_CORNER_M and behind.min() < 0.35 and behind.max() < _DEEPEST_M
+    overlap = min(float(z.max()), height / 2) - max(float(z.min()), -height / 2)
+    return at_edge and bool(is_behind) and overlap > 0.5 * min(height, float(np.ptp(z)))

@@ -1,0 +1,269 @@
+"""Object proposals before any click: fronts, appliances and free-standing things, each with the click that confirms it."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask, Vector3
+from r2c2r_core.errors import R2C2RError
+from r2c2r_core.geometry.camera import project
+from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.segment.appliances.found import FoundAppliance
+from r2c2r_core.segment.found import Found
+from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.fronts.front import front_mask
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.proposals.clicks import best_views, click_on, clump_clicks, panel_clicks
+from r2c2r_core.segment.proposals.clutter import Clump, find_clumps
+from r2c2r_core.segment.proposals.naming import name_thing
+from r2c2r_core.segment.proposals.panels import Panel, find_panels, is_on_wall, outlined, without_sides
+from r2c2r_core.segment.runs.prepared import PreparedCapture
+
+Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
+
+_LEAST_CONFIDENCE, _LEAST_OF_BOXES, _LEAST_OF_THINGS = 0.3, 0.5, 0.4
+_LEAST_PLANE_M2, _LEAST_SIDE_M = 0.02, 0.09
+_MOST_THINGS = 24
+_SHALLOWEST_BOX_M = 0.25  # microwaves are 0.3 m deep and more; what stands on a shelf is not
+_SAME_PLANE_M = 0.12
+_BOX_SLACK_M = 0.03
+_TAKEN_SHARE = 0.4
+_TALL_M, _FOOT_M = 1.25, 0.4  # the front of a refrigerator: how high at least, and how near to the floor
+_ON_WORKTOP_M, _LEAST_SEEN_M = (0.7, 1.5), 0.12  # the front of a microwave, of which glass may leave little
+
+
+def propose_steps(prepared: PreparedCapture) -> Steps:
+    """Proposals so far, surest first, after each bit of work, with the share of the work done. The last step has them all."""
+    panels: list[Panel] = []
+    planes = [plane for plane in prepared.planes if _worth_cutting(plane)]
+    for position, plane in enumerate(planes):
+        run = prepared.run_of(plane)
+        panels += find_panels(run, prepared.scene.capture.room) if run is not None else []
+        panels += _boxes(prepared, plane)
+        yield 0.5 * (position + 1) / len(planes), ()
+    fronts = without_sides([panel for panel in panels if panel.confidence > 0.5 * _LEAST_CONFIDENCE])
+    wanted = _apart([panel for panel in fronts if panel.confidence >= _least(panel.category)])
+    found: list[Proposal] = []
+    shown: list[tuple[Proposal, Panel]] = []
+    for position, panel in enumerate(wanted):
+        proposal = _present_panel(prepared, panel)
+        if proposal is not None:
+            found.append(proposal)
+            shown.append((proposal, panel))
+        yield 0.5 + 0.3 * (position + 1) / len(wanted), _ranked(found)
+    clumps = find_clumps(prepared.scene.capture, prepared.planes)[:_MOST_THINGS]
+    for position, clump in enumerate(clumps):
+        inside = any(_holds(proposal, panel, clump) for proposal, panel in shown)
+        proposal = None if inside else _present_clump(prepared, clump, found)
+        found += [proposal] if proposal is not None else []
+        yield 0.8 + 0.2 * (position + 1) / len(clumps), _ranked(found)
+    yield 1.0, _ranked(found)
+
+
+def is_taken(outline: Mask, masks: Iterable[Mask]) -> bool:
+    """Whether one of the masks (of clicked objects, in the proposal's frame, at the outline's size) already covers it."""
+    enough = _TAKEN_SHARE * np.count_nonzero(outline)
+    return any(np.count_nonzero(outline & mask) > enough for mask in masks)
+
+
+def _least(category: str) -> float:
+    return _LEAST_OF_BOXES if _is_box(category) else _LEAST_CONFIDENCE
+
+
+def _is_box(category: str) -> bool:
+    return category_of(category).kind == "appliance"
+
+
+def _ranked(found: list[Proposal]) -> tuple[Proposal, ...]:
+    return tuple(sorted(found, key=lambda proposal: -proposal.confidence))
+
+
+def _worth_cutting(plane: PlaneRegion) -> bool:
+    return plane.area_m2 > _LEAST_PLANE_M2 and min(plane.width_m, plane.height_m) > _LEAST_SIDE_M
+
+
+def _apart(panels: list[Panel]) -> list[Panel]:
+    """No panel inside another on the same plane: boxes before their doors, then the surer one."""
+    kept: list[Panel] = []
+    for panel in sorted(panels, key=lambda panel: (not _is_box(panel.category), -panel.confidence)):
+        if not any(_covers(other, panel.centre) or _covers(panel, other.centre) or _same_box(panel, other) for other in kept):
+            kept.append(panel)
+    return kept
+
+
+def _same_box(panel: Panel, other: Panel) -> bool:
+    """Whether two faces belong to one appliance: no two of a kind stand corner to corner."""
+    if panel.category != other.category or not _is_box(panel.category):
+        return False
+    return bool(np.linalg.norm(panel.centre - other.centre) < max(panel.size_m[0], other.size_m[0]))
+
+
+def _covers(panel: Panel, point: Vector3) -> bool:
+    local = panel.run.region.world_from_plane.rotation.T @ (point - panel.centre)
+    width, height = panel.size_m
+    return bool(abs(local[1]) < _SAME_PLANE_M and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
+
+
+def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
+    """Whether a clump is part of the box behind a front."""
+    x, behind, z = panel.run.region.world_from_plane.rotation.T @ (clump.points.mean(axis=0) - panel.centre)
+    width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + _BOX_SLACK_M
+    return bool(abs(x) < width and abs(z) < height and -2 * _BOX_SLACK_M < behind < depth)
+
+
+# Boxes: refrigerators of several doors, microwaves
+
+
+def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
+    """The appliance whose front a whole plane could be."""
+    room = prepared.scene.capture.room
+    if not room.floor_found:
+        return []
+    middle = plane.world_from_plane.translation
+    bottom = float(middle[2]) - plane.height_m / 2
+    tall, small = category_of("refrigerator"), category_of("microwave")
+    if tall.width.holds(plane.width_m) and _TALL_M < plane.height_m < tall.height.high and bottom < _FOOT_M:
+        kind = tall
+    elif (
+        _LEAST_SEEN_M < plane.width_m < small.width.high
+        and _LEAST_SEEN_M < plane.height_m < small.height.high
+        and _ON_WORKTOP_M[0] < bottom < _ON_WORKTOP_M[1]
+    ):
+        kind = small
+    else:
+        return []
+    found = _confirmed(prepared, kind.name, click_on(prepared.scene, middle, plane.outward))
+    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, _SHALLOWEST_BOX_M):
+        return []
+    cell, cell_m = found.front.cell, found.front.run.grid.cell_m
+    off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
+    front = replace(found.front, depth_m=min(found.front.depth_m, kind.depth.high))
+    return [Panel(front, kind.name, outlined(front) * float(np.exp(-(off @ off) / 8)))]
+
+
+# Presenting: the frame that shows it best, and a click there that means it
+
+
+def _present_panel(prepared: PreparedCapture, panel: Panel) -> Proposal | None:
+    scene, is_box = prepared.scene, _is_box(panel.category)
+    views = best_views(scene, panel.corners, panel.run.grid.outward)
+    shown = [(front_mask(panel.front, scene, frame), frame) for frame in views]
+    for (mask, _), frame in sorted(shown, key=lambda view: -np.count_nonzero(view[0][0])):
+        for click in panel_clicks(scene, panel, frame, mask):
+            found = _confirmed(prepared, panel.category, click)
+            if isinstance(found, FoundFront | FoundAppliance) and isinstance(found, FoundAppliance) == is_box:
+                if _overlap(panel, found) > 0.7:
+                    return _proposal(prepared, panel, found, frame, click)
+                break
+    return None
+
+
+def _proposal(
+    prepared: PreparedCapture, panel: Panel, found: FoundFront | FoundAppliance, frame: Frame, click: PromptPoint
+) -> Proposal:
+    width, height = panel.size_m
+    return Proposal(
+        kind=found.kind,
+        category=panel.category,
+        confidence=round(panel.confidence, 3),
+        click=click,
+        outline=pack_mask(found.see(frame).mask),
+        size_m=(width, panel.front.depth_m or found.front.depth_m, height),
+        centre_world=panel.centre,
+        handle_px=_handle_px(panel, frame),
+    )
+
+
+def _present_clump(prepared: PreparedCapture, clump: Clump, others: list[Proposal]) -> Proposal | None:
+    scene = prepared.scene
+    for click in clump_clicks(scene, clump):
+        frame = scene.frame(click.frame)
+        floor = clump.base_m if scene.capture.room.floor_found else None
+        category = name_thing(clump.extent_m, floor)
+        found = _confirmed(prepared, category, click)
+        if found is None or found.kind != "thing":
+            continue
+        mask, box = found.see(frame).mask, found.box()
+        if box is None or np.count_nonzero(mask) < prepared.config.least_area_px:
+            continue
+        if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
+            return None
+        width, depth, height = box.dimensions_m
+        confidence = clump.confidence * _agreement(clump, box.dimensions_m)
+        if confidence < _LEAST_OF_THINGS:
+            continue
+        return Proposal(
+            kind="thing",
+            category=category,
+            confidence=round(confidence, 3),
+            click=click,
+            outline=pack_mask(mask),
+            size_m=(float(width), float(depth), float(height)),
+            centre_world=box.world_from_object.translation,
+            handle_px=(),
+        )
+    return None
+
+
+def _agreement(clump: Clump, dimensions_m: np.ndarray) -> float:
+    """0..1: how well what a click would give fits what stands there; the depth of a thing is seen worst."""
+    seen = np.array([clump.extent_m[:2].max(), clump.extent_m[2]])
+    given = np.array([dimensions_m[:2].max(), dimensions_m[2]])
+    return float(np.exp(-np.abs(np.log(given / seen)).sum()))
+
+
+def _hits(mask: Mask, frame: Frame, others: list[Proposal]) -> bool:
+    return any(other.click.frame == frame.index and mask[int(other.click.y), int(other.click.x)] for other in others) or any(
+        _inside(mask, frame, other.centre_world) for other in others if other.kind != "front"
+    )
+
+
+def _inside(mask: Mask, frame: Frame, point: Vector3) -> bool:
+    local = frame.world_from_camera.inverse.apply(point[None])
+    if local[0, 2] < 0.1:
+        return False
+    u, v = project(local, frame.rgb_camera)[0]
+    return bool(0 <= u < mask.shape[1] and 0 <= v < mask.shape[0] and mask[int(v), int(u)])
+
+
+def _confirmed(prepared: PreparedCapture, category: str, click: PromptPoint | None) -> Found | None:
+    """What a person would get from this click."""
+    if click is None:
+        return None
+    try:
+        return prepared.find(ObjectPrompt(name="proposal", category=category, points=(click,)))
+    except R2C2RError:
+        return None
+
+
+def _overlap(panel: Panel, found: FoundFront | FoundAppliance) -> float:
+    """IoU of two rectangles on about the same plane."""
+    other, width, height = found.front, *panel.size_m
+    cell = other.cell
+    ends = other.run.grid.points_at(np.array([[cell.left, cell.top], [cell.right, cell.bottom]]))
+    (x0, y0, z1), (x1, y1, z0) = (panel.run.region.world_from_plane.rotation.T @ (end - panel.centre) for end in ends)
+    if max(abs(y0), abs(y1)) > _SAME_PLANE_M:
+        return 0.0
+    across = max(min(x1, width / 2) - max(x0, -width / 2), 0.0)
+    down = max(min(z1, height / 2) - max(z0, -height / 2), 0.0)
+    shared = across * down
+    return float(shared / (width * height + (x1 - x0) * (z1 - z0) - shared))
+
+
+def _handle_px(panel: Panel, frame: Frame) -> tuple[tuple[float, float], ...]:
+    handle = panel.front.handle
+    if handle is None:
+        return ()
+    corners = [
+        [handle.left, handle.top],
+        [handle.right, handle.top],
+        [handle.right, handle.bottom],
+        [handle.left, handle.bottom],
+    ]
+    local = frame.world_from_camera.inverse.apply(panel.run.grid.points_at(np.array(corners), -0.02))
+    return tuple((round(float(u), 1), round(float(v), 1)) for u, v in project(local, frame.rgb_camera))

@@ -1,0 +1,1 @@
+"""A furniture run: orthomosaic -> line evidence -> XY-cut into panels -> handles; `run` puts them together, once a plane."""

@@ -1,0 +1,183 @@
+"""Line evidence on an orthomosaic: a robust score of a straight gap or edge at each column (or row), block by block."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.segment.runs.orthomosaic import Tile
+
+BLOCK_M = 0.03
+"""Evidence is pooled over this much of the line's length, so that a line must be seen along most of its span."""
+_SCALES_M = (0.005, 0.0075)  # widths of the dark ridge and of the colour step
+_NOISE_FLOOR = 0.35  # grey levels: below this, differences mean nothing
+_MAX_SHIFT_M = 0.03  # pose error between frames (30 mm on a KinectFusion trajectory)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Robust z-scores (blocks, positions); `known` where at least one tile saw both sides."""
+
+    score: np.ndarray
+    known: np.ndarray
+    block: int  # cells in a block
+    ends: np.ndarray | None = None  # the part of the score that depth gave: where the plane begins or ends
+
+
+def gather(tiles: list[Tile], axis: int, cell_m: float, allowed: np.ndarray | None = None) -> Evidence:
+    """Evidence of all tiles, each first slid (at most 3 cm) onto those before it; sets the tiles' shifts.
+
+    Axis 0 looks for vertical lines (positions are columns), axis 1 for horizontal ones. The slide is one-dimensional on
+    purpose: two-dimensional correlation on flat panels suffers from the aperture problem.
+    """
+    reach = round(_MAX_SHIFT_M / cell_m)
+    scored = [tile_scores(tile, axis, cell_m, allowed) for tile in tiles]
+    placed: list[np.ndarray] = []  # of each tile: its weighted score and its weight, slid
+    slides: list[int] = []
+    total = np.zeros((2, *scored[0][0].shape))
+    for score, weight in scored:
+        slide = 0
+        if placed:
+            slide, weight = _placed_on(score, weight, total, reach)
+        slides.append(slide)
+        placed.append(np.roll(np.stack([score * weight, weight]), slide, axis=2))
+        total += placed[-1]
+    for i, (score, weight) in enumerate(scored):  # the first tiles met few others: place all once more
+        total -= placed[i]
+        if len(placed) > 1:
+            slides[i], weight = _placed_on(score, weight, total, reach)
+        placed[i] = np.roll(np.stack([score * weight, weight]), slides[i], axis=2)
+        total += placed[i]
+    middle = round(float(np.median(slides)))
+    for tile, slide in zip(tiles, slides, strict=True):
+        tile.shift = (float(slide - middle), tile.shift[1]) if axis == 0 else (tile.shift[0], float(slide - middle))
+    scores, weights = np.roll(np.sum(placed, axis=0), -middle, axis=2)
+    return Evidence(scores / np.maximum(weights, 1e-6), weights > 0, _block(cell_m))
+
+
+def _placed_on(score: np.ndarray, weight: np.ndarray, reference: np.ndarray, reach: int) -> tuple[int, np.ndarray]:
+    """A tile's slide and its weight: next to nothing where its lines agree with no slide."""
+    slide, agreement = _best_slide(score, weight, reference[0], reference[1], reach)
+    return (0, weight * 0.15) if agreement < 0.25 else (slide, weight)
+
+
+def tile_scores(tile: Tile, axis: int, cell_m: float, allowed: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """One tile's z-scores (blocks, positions) and their weights, 0 where unseen."""
+    lab = cv2.GaussianBlur(tile.lab, (0, 0), 0.8).astype(np.float32)
+    weight = tile.weight if allowed is None else tile.weight * allowed
+    block = _block(cell_m)
+    weights = _pooled(weight, block, axis)
+    means = _pooled(lab * weight[..., None], block, axis) / np.maximum(weights, 1e-6 / block)[..., None]
+    seen = _pooled((weight > 0).astype(np.float32), block, axis) > 0.6
+    total = weights * block
+    strength, known = _strength(means, seen, cell_m)
+    known[known.sum(axis=1) < 20] = False
+    middle = _row_medians(strength, known)
+    spread = 1.4826 * _row_medians(np.abs(strength - middle), known) + _NOISE_FLOOR
+    score = np.where(known, np.clip((strength - middle) / spread, -2, 6), np.float32(0))
+    quality = float(np.median(total[known])) if known.any() else 0.0
+    return score, np.where(known, np.float32(quality), np.float32(0))
+
+
+def _pooled(values: np.ndarray, block: int, axis: int) -> np.ndarray:
+    """Means over blocks of a line's length, (blocks, positions, …): rows are pooled for axis 0, columns for axis 1."""
+    length = values.shape[axis]
+    count = max(1, length // block)
+    kept = values[: count * block] if axis == 0 else values[:, : count * block]
+    size = (values.shape[1], count) if axis == 0 else (count, values.shape[0])
+    pooled = cv2.resize(kept, size, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(pooled if axis == 0 else np.swapaxes(pooled, 0, 1))
+
+
+def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """The median over the known part of each row, (rows, 1); nought where nothing is known."""
+    ordered = np.sort(np.where(known, values, np.inf), axis=1)
+    count = known.sum(axis=1, keepdims=True)
+    pair = np.take_along_axis(
+        ordered, np.concatenate([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[1] - 1)], axis=1), axis=1
+    )
+    return np.where(count > 0, pair.mean(axis=1, keepdims=True), 0).astype(values.dtype)
+
+
+def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """The stronger of a dark ridge and a colour step, in grey levels, over two widths."""
+    best = np.full(means.shape[:2], -9.0, np.float32)
+    known = seen.copy()
+    for scale_m in _SCALES_M:
+        k = max(1, round(scale_m / cell_m))
+        left, right = np.roll(means, 2 * k, axis=1), np.roll(means, -2 * k, axis=1)
+        centre = cv2.blur(means, (k | 1, 1))
+        ridge = (left[..., 0] + right[..., 0]) / 2 - centre[..., 0]
+        step = 0.5 * np.linalg.norm(np.roll(means, k, axis=1) - np.roll(means, -k, axis=1), axis=2)
+        best = np.maximum(best, np.maximum(ridge, 0.9 * step))
+        known &= np.roll(seen, 2 * k, axis=1) & np.roll(seen, -2 * k, axis=1)
+    margin = min(8, means.shape[1] // 4)
+    known[:, :margin] = False
+    known[:, means.shape[1] - margin :] = False
+    return best, known
+
+
+def _best_slide(score: np.ndarray, weight: np.ndarray, total: np.ndarray, weights: np.ndarray, reach: int) -> tuple[int, float]:
+    """The slide in cells that best correlates a tile's profile with the running one, and that correlation."""
+    profile = _smooth((score * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-6))
+    reference = _smooth(total.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-6))
+    seen, known = weight.sum(axis=0) > 0, weights.sum(axis=0) > 0
+    slides = np.arange(-reach, reach + 1)
+    both = known & _rolled(seen, slides)
+    count = np.maximum(both.sum(axis=1, keepdims=True), 1)
+    a, b = np.where(both, _rolled(profile, slides), 0.0), np.where(both, reference, 0.0)
+    a, b = (
+        np.where(both, a - a.sum(axis=1, keepdims=True) / count, 0),
+        np.where(both, b - b.sum(axis=1, keepdims=True) / count, 0),
+    )
+    agreement = (a * b).sum(axis=1) / (np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1)) + 1e-9) - 0.1 * np.abs(slides) / reach
+    agreement[both.sum(axis=1) < 40] = -1
+    best = int(np.argmax(agreement))
+    return (int(slides[best]), float(agreement[best])) if agreement[best] > -1 else (0, -1.0)
+
+
+def _rolled(values: np.ndarray, slides: np.ndarray) -> np.ndarray:
+    """np.roll of a row by each of the slides, (slides, positions); rows of their own when `values` has as many."""
+    at = (np.arange(values.shape[-1]) - slides[:, None]) % values.shape[-1]
+    return values[at] if values.ndim == 1 else np.take_along_axis(values, at, axis=1)
+
+
+def frame_slide(tile: Tile, axis: int, cell_m: float, evidence: Evidence) -> float:
+    """The slide in cells that lays one more frame onto finished evidence (0 when nothing decides)."""
+    score, weight = tile_scores(tile, axis, cell_m)
+    seen = np.where(weight > 0, np.clip(score, 0, 4), 0)
+    reference = np.where(evidence.known, np.clip(evidence.score, 0, 4), 0)
+    reach = round(_MAX_SHIFT_M / cell_m)
+    values = [
+        float((np.roll(seen, slide, axis=1) * reference).sum()) * (1 - 0.15 * abs(slide) / reach)
+        for slide in range(-reach, reach + 1)
+    ]
+    best = int(np.argmax(values))
+    return float(best - reach) if values[best] > 0 else 0.0
+
+
+def find_roll(vertical: Evidence, horizontal: Evidence, most_rad: float = np.radians(5.0)) -> float:
+    """The in-plane tilt of the lines: the turn of the axes under which the line profiles have most energy."""
+    best, best_angle = 1.05 * (_sheared_energy(vertical, 0.0) + _sheared_energy(horizontal, 0.0)), 0.0  # a tilt must pay
+    for angle in np.radians(np.arange(-np.degrees(most_rad), np.degrees(most_rad) + 0.01, 0.25)):
+        energy = _sheared_energy(vertical, angle) + _sheared_energy(horizontal, -angle)
+        if energy > best * (1 + 1e-9):
+            best, best_angle = energy, float(angle)
+    return -best_angle
+
+
+def _sheared_energy(evidence: Evidence, angle_rad: float) -> float:
+    score, known = evidence.score, evidence.known
+    slides = np.round((np.arange(len(score)) - len(score) / 2) * evidence.block * np.tan(angle_rad)).astype(int)
+    total = _rolled(np.where(known, np.clip(score, -1, 4), 0), slides).sum(axis=0)
+    count = _rolled(known, slides).sum(axis=0)
+    profile = np.where(count > 0.4 * len(score), total / np.maximum(count, 1), 0)
+    return float((np.clip(profile - np.median(profile), 0, 9) ** 2).sum())
+
+
+def _block(cell_m: float) -> int:
+    return max(1, round(BLOCK_M / cell_m))
+
+
+def _smooth(profile: np.ndarray) -> np.ndarray:
+    return cv2.GaussianBlur(profile[None].astype(np.float32), (0, 0), 1.5)[0]

@@ -1,0 +1,226 @@
+"""Orthomosaic of a vertical plane: every frame warped by a homography onto one metric grid, occluders left out."""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
+from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.scene import Scene
+
+_PAD_M = 0.08  # around the seen part, so that its outer edges lie inside
+_BORDER_SHARE = 0.004  # of the width: a tile is shifted by pixels to meet the others, and what lies at its border is gone then
+_VIEW_IN_FRONT_M = 0.08  # nearer by more hides the plane from a view: handles (5 cm) and the fused surface's error do not
+_IN_FRONT_M = 0.05  # nearer than the plane by more is an occluder (handles are not)
+_LEAST_COSINE = 0.12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneGrid:
+    """Square cells on a plane. Columns run along +x of `world_from_plane`, rows down along -z, from (left, top)."""
+
+    world_from_plane: Rigid3
+    left_m: float
+    top_m: float
+    cell_m: float
+    columns: int
+    rows: int
+
+    @property
+    def outward(self) -> Vector3:
+        """Unit normal towards the room."""
+        return -self.world_from_plane.rotation[:, 1]
+
+    def cells_of(self, points_world: Points) -> np.ndarray:
+        """Continuous (column, row) of world points, projected along the normal."""
+        local = self.world_from_plane.inverse.apply(points_world)
+        return np.stack([(local[:, 0] - self.left_m) / self.cell_m, (self.top_m - local[:, 2]) / self.cell_m], axis=1)
+
+    def points_at(self, cells: np.ndarray, depth_m: float = 0.0) -> Points:
+        """World points of continuous (column, row) positions (n, 2), `depth_m` behind the plane."""
+        x = self.left_m + cells[:, 0] * self.cell_m
+        z = self.top_m - cells[:, 1] * self.cell_m
+        return self.world_from_plane.apply(np.stack([x, np.full(len(x), depth_m), z], axis=1))
+
+    def pixel_from_cell(self, frame: Frame, camera: Intrinsics, out_m: float = 0.0) -> Matrix3:
+        """Homography from continuous cells to continuous pixels; its third row gives z in metres. `out_m` lifts the plane."""
+        rotation = self.world_from_plane.rotation
+        origin = self.world_from_plane.apply(np.array([[self.left_m, -out_m, self.top_m]]))[0]
+        world = np.column_stack([rotation[:, 0] * self.cell_m, -rotation[:, 2] * self.cell_m, origin])
+        seen = frame.world_from_camera.inverse
+        local = seen.rotation @ world
+        local[:, 2] += seen.translation
+        return camera.matrix @ local
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A rectangle of grid cells, edges at continuous positions (columns left..right, rows top..bottom)."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    @property
+    def width(self) -> float:
+        """In grid cells."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """In grid cells."""
+        return self.bottom - self.top
+
+    def contains(self, column: float, row: float) -> bool:
+        """Whether a position lies inside."""
+        return self.left <= column < self.right and self.top <= row < self.bottom
+
+
+@dataclass(slots=True, eq=False)
+class Tile:
+    """One frame on the grid. `shift` is how far (columns, rows) its content must move to meet the other frames."""
+
+    frame_index: int
+    lab: np.ndarray  # (rows, columns, 3) uint8
+    weight: np.ndarray  # (rows, columns) float32, 0 where unseen or occluded
+    shift: tuple[float, float] = field(default=(0.0, 0.0))
+
+
+def make_grid(region: PlaneRegion, cell_m: float, roll_rad: float = 0.0, margin_m: float = 0.0) -> PlaneGrid:
+    """The grid over a region and a margin, its axes turned in the plane by `roll_rad` (positive lifts the right side)."""
+    c, s = np.cos(roll_rad), np.sin(roll_rad)
+    turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    rotation = region.world_from_plane.rotation @ turn
+    half_w = region.width_m / 2 * c + region.height_m / 2 * abs(s) + _PAD_M + margin_m
+    half_h = region.height_m / 2 * c + region.width_m / 2 * abs(s) + _PAD_M + margin_m
+    return PlaneGrid(
+        Rigid3(rotation, region.world_from_plane.translation),
+        -half_w,
+        half_h,
+        cell_m,
+        int(2 * half_w / cell_m),
+        int(2 * half_h / cell_m),
+    )
+
+
+def support_on(grid: PlaneGrid, region: PlaneRegion, reach_m: float) -> np.ndarray:
+    """Grid cells (rows, columns) within `reach_m` of what the scan saw of the region."""
+    step = 4
+    column, row = np.meshgrid(np.arange(0, grid.columns, step) + step / 2, np.arange(0, grid.rows, step) + step / 2)
+    points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
+    seen = region.supports(points, reach_m).reshape(row.shape).astype(np.uint8)
+    return cv2.resize(seen, (grid.columns, grid.rows), interpolation=cv2.INTER_NEAREST) > 0
+
+
+def choose_frames(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> list[int]:
+    """The frames that see the region best: for each coarse part of it, the largest, sharpest and most frontal views."""
+    spacing = min(0.1, region.width_m / 2, region.height_m / 2) / grid.cell_m
+    column, row = np.meshgrid(np.arange(spacing / 2, grid.columns, spacing), np.arange(spacing / 2, grid.rows, spacing))
+    points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
+    points = points[region.supports(points, 0.03)]
+    if len(points) == 0:
+        return []
+    quality = np.stack([_view_quality(points, grid.outward, frame, scene) for frame in scene.frames])
+    per_point = max(3, count // 4)
+    ranks = np.argsort(-quality, axis=0, kind="stable")[:per_point]
+    score = np.zeros(len(scene.frames))
+    for point in range(len(points)):
+        score[ranks[:, point]] += quality[ranks[:, point], point]
+    best = np.argsort(-score, kind="stable")[:count]
+    return [scene.frames[i].index for i in best if score[i] > 0]
+
+
+def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) -> np.ndarray:
+    to_camera = frame.world_from_camera.translation - points
+    cosine = (to_camera @ outward) / np.linalg.norm(to_camera, axis=1)
+    width, height = _stored_size(scene, frame)
+    camera = frame.rgb_camera.resized(width, height)
+    local = frame.world_from_camera.inverse.apply(points)
+    uv, z = project(local, camera), local[:, 2]
+    seen, _ = sample_nearest(scene.surface_depth(frame.index, (width, height)), uv)
+    border = _BORDER_SHARE * width
+    inside = (z > 0.15) & (uv > border).all(axis=1) & (uv < [width - border, height - border]).all(axis=1)
+    good = inside & (cosine > _LEAST_COSINE) & ~scene.noise.occluded(seen, z, _VIEW_IN_FRONT_M)
+    return np.where(good, cosine * np.sqrt(max(frame.sharpness, 1e-3)) / np.maximum(z, 0.4), 0)
+
+
+def _stored_size(scene: Scene, frame: Frame) -> tuple[int, int]:
+    stored = scene.rendered_mm[frame.index]
+    return stored.shape[1], stored.shape[0]
+
+
+def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int, out_m: float = 0.0) -> Tile | None:
+    """One frame warped onto the grid; None when it shows too little of it."""
+    frame = scene.frame(frame_index)
+    if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.05:
+        return None
+    visible, z = visible_cells(grid, scene, frame, out_m)
+    if visible.mean() < 0.02:
+        return None
+    homography = grid.pixel_from_cell(frame, frame.rgb_camera, out_m)
+    image = cv2.warpPerspective(
+        scene.rgb(frame_index),
+        _for_opencv(homography),
+        (grid.columns, grid.rows),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+    )
+    density = np.minimum(frame.rgb_camera.fx * grid.cell_m / np.maximum(z, 0.2), 1.0)
+    weight = np.where(visible, density**2 * np.sqrt(max(frame.sharpness, 1e-3)), 0).astype(np.float32)
+    return Tile(frame_index, cv2.cvtColor(image, cv2.COLOR_RGB2LAB), weight)
+
+
+def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Cells (rows, columns) inside the image with no occluder in front, and the plane's z-depth there."""
+    column, row = np.arange(grid.columns) + 0.5, np.arange(grid.rows) + 0.5
+    homography = grid.pixel_from_cell(frame, frame.rgb_camera, out_m)
+    z, u, v = (
+        (homography[k, 0] * column).astype(np.float32) + (homography[k, 1] * row + homography[k, 2]).astype(np.float32)[:, None]
+        for k in (2, 0, 1)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = u / z, v / z
+    camera = frame.rgb_camera
+    inside = (z > 0.15) & (u > 3) & (v > 3) & (u < camera.width - 3) & (v < camera.height - 3)
+    depth = scene.filled_depth(frame.index)
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    to_depth = grid.pixel_from_cell(frame, frame.depth_camera, out_m)
+    seen = cv2.warpPerspective(depth, _for_opencv(to_depth), (grid.columns, grid.rows), flags=flags)
+    occluded = scene.noise.occluded(seen, z, _IN_FRONT_M)
+    grown = cv2.dilate(occluded.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    return inside & ~grown, z
+
+
+def blend(tiles: list[Tile], count: int) -> Image:
+    """RGB mosaic of the best `count` tiles, each moved by its own shift."""
+    total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
+    weights = np.zeros(tiles[0].weight.shape, np.float32)
+    for tile in tiles[:count]:
+        move = np.array([[1, 0, tile.shift[0]], [0, 1, tile.shift[1]]], np.float32)
+        size = (tile.weight.shape[1], tile.weight.shape[0])
+        colour = cv2.warpAffine(tile.lab.astype(np.float32), move, size)
+        weight = cv2.warpAffine(tile.weight, move, size) ** 2
+        total += colour * weight[..., None]
+        weights += weight
+    lab = (total / np.maximum(weights, 1e-9)[..., None]).clip(0, 255).astype(np.uint8)
+    image = cv2.cvtColor(lab, cv2.COLOR_LAB2RGB)
+    image[weights == 0] = 0
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _for_opencv(pixel_from_cell: Matrix3) -> Matrix3:
+    """OpenCV puts cell and pixel centres at integers; ours lie at i + 0.5."""
+    shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    back = np.array([[1, 0, -0.5], [0, 1, -0.5], [0, 0, 1]])
+    return back @ pixel_from_cell @ shift
+
+
+def joined(cells: list[Cell]) -> Cell:
+    """The smallest rectangle around cells."""
+    return Cell(
+        min(c.left for c in cells), min(c.top for c in cells), max(c.right for c in cells), max(c.bottom for c in cells)
+    )

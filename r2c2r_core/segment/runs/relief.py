@@ -1,0 +1,115 @@
+"""Height map over a plane: depth points of many frames, binned on its grid."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.segment.runs.orthomosaic import PlaneGrid
+from r2c2r_core.segment.scene import Scene
+
+_RAISED_M, _HIGHEST_M = 0.012, 0.10  # a handle: above depth noise, below things that stand in front
+_DEEPEST_M = 0.04
+_HANDLE_THICK_M = 0.05
+_LEDGE_M = 0.035
+_END_WINDOW_M = 0.02  # beyond an end of the plane there are no points of it for this far
+STEP = 2
+"""Grid cells in a cell of the relief: depth is coarser than colour."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relief:
+    """Over grid cells of `cell_m`: how many depth points fell there, the share that is raised, and how far on average."""
+
+    cell_m: float
+    count: np.ndarray
+    raised: np.ndarray  # 0..1
+    lift_m: np.ndarray  # mean of the raised points; 0 where there are none
+    level_m: np.ndarray  # mean of the points that are not raised: the panel itself
+
+    def on_plane(self) -> np.ndarray:
+        """Cells dense with points of the plane, as against cells that rays reach only beside or behind it."""
+        flat = _box_mean(self.count * (1 - self.raised), 2)
+        around = _box_mean(flat, round(0.10 / self.cell_m))
+        filled = ((flat > 0.4 * around) & (flat > 0.3)).astype(np.uint8)
+        size = 2 * round(_HANDLE_THICK_M / self.cell_m / 2) + 1  # handles leave holes: closed, without growing outwards
+        element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+        closed = cv2.morphologyEx(np.pad(filled, size), cv2.MORPH_CLOSE, element)[size:-size, size:-size]
+        return np.asarray(cv2.medianBlur(closed, 5) > 0)
+
+    def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
+        """Where the plane begins or ends, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
+        flat = self._blocks(_box_mean(self.count * (1 - self.raised), 1), axis, block, columns, rows)
+        raised = self._blocks(_box_mean(self.count * self.raised, 1), axis, block, columns, rows)
+        share = raised / np.maximum(flat + raised, 0.05)
+        reach = max(2, round(_END_WINDOW_M / self.cell_m) * STEP)
+        before, after = _windows(flat, reach)
+        high, low = np.maximum(before, after), np.minimum(before, after)
+        usual = float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
+        step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
+        score = 6 * np.clip((step - 0.55) / 0.3, 0, 1)
+        # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
+        ledge = _windows(share, round(_LEDGE_M / self.cell_m) * STEP)
+        beside = _windows(share, reach)
+        rise = np.maximum(ledge[0] - beside[1], ledge[1] - beside[0])
+        score = np.maximum(score, 6 * np.clip((rise - 0.5) / 0.2, 0, 1))
+        score[:, :reach] = score[:, -reach:] = 0
+        peak = score >= cv2.dilate(score.astype(np.float32), np.ones((1, 2 * reach + 1), np.uint8)) - 1e-3
+        # Ends wander by a cell or two from block to block: widened, so that blocks agree.
+        return np.asarray(cv2.dilate(np.where(peak, score, 0).astype(np.float32), np.ones((1, 5), np.uint8)))
+
+    def _blocks(self, values: np.ndarray, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
+        """Means over blocks of the grid, (blocks, positions)."""
+        fine = cv2.resize(values.astype(np.float32), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_LINEAR)
+        fine = np.pad(fine, ((0, max(rows - fine.shape[0], 0)), (0, max(columns - fine.shape[1], 0))))[:rows, :columns]
+        if axis == 1:
+            fine = fine.T
+        count = max(1, fine.shape[0] // block)
+        means = fine[: count * block].reshape(count, -1, fine.shape[1]).mean(axis=1)
+        return np.asarray(cv2.blur(means, (1, 3), borderType=cv2.BORDER_REPLICATE))
+
+
+def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> Relief:
+    """The relief of a plane on cells of STEP grid cells."""
+    step = STEP
+    shape = (grid.rows // step + 1, grid.columns // step + 1)
+    size = shape[0] * shape[1]
+    count, raised, lifts, level = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    for index in frame_indices:
+        frame = scene.frame(index)
+        depth = scene.depth(index)
+        points = depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64)
+        local = (grid.world_from_plane.inverse @ frame.world_from_camera).apply(points)
+        lift = -local[:, 1]
+        column = np.floor((local[:, 0] - grid.left_m) / (grid.cell_m * step)).astype(int)
+        row = np.floor((grid.top_m - local[:, 2]) / (grid.cell_m * step)).astype(int)
+        near = (lift > -_DEEPEST_M) & (lift < _HIGHEST_M)
+        near &= (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
+        cell, lift = row[near] * shape[1] + column[near], lift[near]
+        high = lift > _RAISED_M
+        count += np.bincount(cell, minlength=size)
+        raised += np.bincount(cell[high], minlength=size)
+        lifts += np.bincount(cell[high], lift[high], minlength=size)
+        level += np.bincount(cell[~high], lift[~high], minlength=size)
+    return Relief(
+        grid.cell_m * step,
+        count.reshape(shape),
+        (raised / np.maximum(count, 1)).reshape(shape),
+        (lifts / np.maximum(raised, 1)).reshape(shape),
+        (level / np.maximum(count - raised, 1)).reshape(shape),
+    )
+
+
+def _windows(values: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the `reach` positions up to, and from, each position."""
+    window = np.ones((1, reach), np.float32) / reach
+    return (
+        cv2.filter2D(values, -1, window, anchor=(reach - 1, 0), borderType=cv2.BORDER_CONSTANT),
+        cv2.filter2D(values, -1, window, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT),
+    )
+
+
+def _box_mean(values: np.ndarray, radius: int) -> np.ndarray:
+    size = 2 * radius + 1
+    return np.asarray(cv2.blur(values.astype(np.float32), (size, size)))

@@ -1,0 +1,106 @@
+"""A furniture run: one plane's orthomosaic, line evidence, panels and handles. Keyed by plane, never by click."""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.lines import Evidence, find_roll, frame_slide, gather
+from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, Tile, blend, choose_frames, make_grid, make_tile, support_on
+from r2c2r_core.segment.runs.relief import STEP, Relief, measure_relief
+from r2c2r_core.segment.runs.xy_cut import cut_panels
+from r2c2r_core.segment.scene import Scene
+
+_ALLOWED_M = 0.08  # evidence counts this far beyond what the scan saw of the plane
+_ROLL_WORTH_RAD = np.radians(0.2)
+_RELIEF_FRAMES = 60
+_STEADY_CELLS = 1.0  # slides below this are measurement noise: poses agree
+
+
+@dataclass(slots=True, eq=False)
+class Run:
+    """Everything computed once about a plane. `slides` fills as frames are asked for."""
+
+    region: PlaneRegion
+    grid: PlaneGrid
+    roll_rad: float
+    vertical: Evidence
+    horizontal: Evidence
+    mosaic: Image
+    relief: Relief
+    seen: np.ndarray  # grid cells the scan has depth for
+    cells: tuple[Cell, ...]
+    handles: tuple[GridHandle | None, ...]  # one a cell
+    poses_agree: bool
+    slides: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+    def cell_at(self, column: float, row: float) -> Cell | None:
+        """The panel at a grid position."""
+        return next((cell for cell in self.cells if cell.contains(column, row)), None)
+
+    def slide_of(self, frame_index: int, scene: Scene) -> tuple[float, float]:
+        """How far (columns, rows) a frame's content must move to meet the mosaic: its pose error in the plane."""
+        if self.poses_agree:
+            return 0.0, 0.0
+        if frame_index not in self.slides:
+            tile = make_tile(self.grid, scene, frame_index)
+            self.slides[frame_index] = (0.0, 0.0) if tile is None else self._measure(tile)
+        return self.slides[frame_index]
+
+    def _measure(self, tile: Tile) -> tuple[float, float]:
+        return (
+            frame_slide(tile, 0, self.grid.cell_m, self.vertical),
+            frame_slide(tile, 1, self.grid.cell_m, self.horizontal),
+        )
+
+
+def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, margin_m: float = 0.0) -> Run | None:
+    """Warp, gather evidence, level the axes to the lines, cut. `margin_m` reaches beyond what the scan saw of the plane."""
+    grid = make_grid(region, cell_m, 0.0, margin_m)
+    tiles = _tiles(grid, region, scene, max(frame_count // 2, 4))
+    if not tiles:
+        return None
+    vertical, horizontal = _evidence(tiles, grid, region, margin_m)
+    roll = find_roll(vertical, horizontal)
+    if abs(roll) > _ROLL_WORTH_RAD:
+        grid = make_grid(region, cell_m, roll, margin_m)
+    else:
+        roll = 0.0
+    tiles = _tiles(grid, region, scene, frame_count)
+    if not tiles:
+        return None
+    relief = measure_relief(grid, scene, choose_frames(grid, region, scene, _RELIEF_FRAMES))
+    vertical, horizontal = _evidence(tiles, grid, region, margin_m)
+    vertical, horizontal = _with_edges(vertical, relief, 0, grid), _with_edges(horizontal, relief, 1, grid)
+    spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
+    poses_agree = bool(spread <= _STEADY_CELLS)
+    if poses_agree:
+        for tile in tiles:
+            tile.shift = (0.0, 0.0)
+    mosaic = blend(tiles, max(frame_count // 2, 8))
+    cells = tuple(cut_panels(vertical, horizontal, mosaic, cell_m))
+    seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
+    seen = seen[: grid.rows, : grid.columns]
+    slides = {tile.frame_index: tile.shift for tile in tiles}
+    handles = find_handles(mosaic, relief, cells, cell_m)
+    return Run(region, grid, roll, vertical, horizontal, mosaic, relief, seen, cells, handles, poses_agree, slides)
+
+
+def _tiles(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> list[Tile]:
+    chosen = choose_frames(grid, region, scene, count)
+    return [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
+
+
+def _evidence(tiles: list[Tile], grid: PlaneGrid, region: PlaneRegion, margin_m: float) -> tuple[Evidence, Evidence]:
+    allowed = cv2.blur(support_on(grid, region, _ALLOWED_M + margin_m).astype(np.float32), (3, 3)) > 0.5
+    return gather(tiles, 0, grid.cell_m, allowed), gather(tiles, 1, grid.cell_m, allowed)
+
+
+def _with_edges(evidence: Evidence, relief: Relief, axis: int, grid: PlaneGrid) -> Evidence:
+    """Colour evidence, and the plane's own ends as depth shows them."""
+    edges = relief.edge_evidence(axis, evidence.block, grid.columns, grid.rows)[: len(evidence.score)]
+    score = np.where(edges > 1, np.maximum(evidence.score, edges), evidence.score)
+    return Evidence(score, evidence.known | (edges > 2), evidence.block, edges)

@@ -1,0 +1,69 @@
+"""A cylinder fitted to silhouettes: for small upright things where the poses disagree too much to carve a hull."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.silhouettes import colours_of, hull_view, small_mask
+from r2c2r_core.segment.things.thing import Thing, ThingConfig
+
+WANDERS_M = 0.05  # how far small things were seen to wander between frames of such recordings
+
+
+def upright_shape(
+    scene: Scene, positives: Points, views: list[Frame], config: ThingConfig, support: float | None
+) -> Thing | None:
+    """A cylinder of the usual size at the click, then of the size its outlines have: masks are found frame by frame."""
+    base = support if support is not None else float(positives[:, 2].min()) - 0.5 * config.radius_m
+    width = config.width_m or 1.2 * config.radius_m
+    height = max(1.5 * config.radius_m, float(positives[:, 2].max()) - base + 0.01)
+    nearest = min(views, key=lambda frame: float(np.linalg.norm(frame.world_from_camera.translation - positives[0])))
+    away = (positives.mean(axis=0) - nearest.world_from_camera.translation) * [1, 1, 0]
+    centre = positives.mean(axis=0) + 0.45 * width * away / max(float(np.linalg.norm(away)), 1e-6)
+    thing = _cylinder(centre, base, width, height, support)
+    for _ in range(2):
+        outlines = [outline for frame in views if (outline := _outline(thing, scene, frame)) is not None]
+        if not outlines:
+            break
+        across, tall, east, north = (float(value) for value in np.median(np.array(outlines), axis=0))
+        width, height = float(np.clip(across, 0.6 * width, 1.5 * width)), float(np.clip(tall, 0.6 * height, 1.5 * height))
+        centre = centre + np.array([east, north, 0.0])  # the click was beside its middle
+        thing = _cylinder(centre, base, width, height, support)
+        thing = replace(thing, colours=colours_of(thing, scene, views, 0.012))
+    return thing
+
+
+def _cylinder(centre: Vector3, base: float, width: float, height: float, support: float | None) -> Thing:
+    spacing = 0.004
+    levels, angles = max(2, round(height / spacing)), max(12, round(np.pi * width / spacing))
+    rings = max(1, round(width / 2 / spacing))
+    side = [(width / 2, angle, z) for z in np.linspace(0, height, levels) for angle in np.arange(angles) / angles * 2 * np.pi]
+    lids = [
+        (radius, angle, z)
+        for z in (0.0, height)
+        for radius in np.linspace(0, width / 2, rings, endpoint=False)
+        for angle in np.arange(angles) / angles * 2 * np.pi
+    ]
+    polar = np.array(side + lids)
+    vertices = np.stack([polar[:, 0] * np.cos(polar[:, 1]), polar[:, 0] * np.sin(polar[:, 1]), polar[:, 2]], axis=1)
+    placed = vertices + np.array([centre[0], centre[1], base])
+    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=WANDERS_M, border_m=0.010)
+
+
+def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
+    """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
+    mask, share = small_mask(thing, scene, frame, 0.015)
+    view = hull_view(thing, scene, frame, pad_m=WANDERS_M + 0.03)
+    if share < 0.9 or view is None or not mask.any():
+        return None
+    hull, _, area, scale = view
+    found, drawn = np.argwhere(mask[area]), np.argwhere(hull)
+    if found.min() < 2 or (found.max(axis=0) > np.array(hull.shape) - 3).any():
+        return None
+    grown = found.std(axis=0) / np.maximum(drawn.std(axis=0), 1e-6)
+    low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+    sideways = frame.world_from_camera.rotation[:, 0] * float(found[:, 1].mean() - drawn[:, 1].mean()) / scale
+    return float((high - low)[0] * grown[1]), float((high - low)[2] * grown[0]), float(sideways[0]), float(sideways[1])

@@ -1,0 +1,48 @@
+"""A free-standing thing that clicks found: its box, and its mask in any frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.kitchen.category import Kind
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.segment.expected_iou import expected_iou
+from r2c2r_core.segment.found import View
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.boxes import box_of
+from r2c2r_core.segment.things.silhouettes import small_mask
+from r2c2r_core.segment.things.thing import Thing, thing_mask
+
+_BORDER_M = 0.01  # how far borders were off, on samples and the real kitchen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundThing:
+    """A free-standing thing."""
+
+    thing: Thing
+    scene: Scene
+    small: bool = False  # a visual hull, whose border follows colour
+    round: bool = False
+    kind: Kind = "thing"
+    warnings: tuple[str, ...] = ()
+
+    def see(self, frame: Frame) -> View:
+        """Its pixels."""
+        mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
+        border_m = 0.5 * self.thing.border_m if self.small else _BORDER_M
+        sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
+        return View(mask, expected_iou(mask, share, frame, sample, border_m))
+
+    def panel(self) -> FrontPanel | None:
+        """None: things have no front panel."""
+        return None
+
+    def box(self) -> ThingBox | None:
+        """Its box on its support."""
+        centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
+        room = self.scene.capture.room
+        return box_of(
+            self.thing.points, self.thing.support_z_m, room.manhattan_yaw_rad, centres.mean(axis=0), round_thing=self.round
+        )

@@ -1,0 +1,144 @@
+"""Min-cut over surface voxels: the part of a surface that belongs to clicks, cut along creases and colour edges."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Colours, Faces, Points, Vector3
+
+_CAPACITY_SCALE = 1000.0
+_CONVEX_COST, _CONCAVE_COST, _COLOUR_COST = 2.0, 9.0, 0.6
+_LARGE = 1e5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VoxelGraph:
+    """Voxels that hold surface, with their mean position, normal, colour and area, and which touch (26 neighbours)."""
+
+    positions: Points
+    normals: Points
+    lab: np.ndarray  # (n, 3) float
+    area_m2: np.ndarray
+    edges: np.ndarray  # (m, 2)
+    voxel_of_face: np.ndarray
+    size_m: float
+
+    def nearest(self, point_world: Vector3) -> int:
+        """The voxel whose surface is closest to a point."""
+        return int(np.argmin(((self.positions - point_world) ** 2).sum(axis=1)))
+
+
+def build_graph(vertices: Points, faces: Faces, colours: Colours, size_m: float) -> VoxelGraph:
+    """The voxel graph of a triangle surface."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))  # sums over axes of three are many times slower
+    cross = np.cross(b - a, c - a)
+    area = 0.5 * np.sqrt(cross[:, 0] ** 2 + cross[:, 1] ** 2 + cross[:, 2] ** 2)
+    centres = (a + b + c) / 3
+    keys = np.floor((centres - centres.min(axis=0)) / size_m).astype(np.int64) + 1
+    span = keys.max(axis=0) + 2
+    flat = (keys[:, 0] * span[1] + keys[:, 1]) * span[2] + keys[:, 2]
+    unique, member = np.unique(flat, return_inverse=True)
+    count = len(unique)
+    weight = np.bincount(member, area, count)
+    safe = np.maximum(weight, 1e-12)
+    positions = np.stack([np.bincount(member, area * centres[:, k], count) / safe for k in range(3)], axis=1)
+    normals = np.stack([np.bincount(member, cross[:, k], count) for k in range(3)], axis=1)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    rgb = sum(colours[faces[:, k]].astype(np.uint16) for k in range(3)) // 3
+    face_lab = cv2.cvtColor(np.asarray(rgb, np.uint8)[None], cv2.COLOR_RGB2LAB)[0].astype(np.float32)
+    lab = np.stack([np.bincount(member, area * face_lab[:, k], count) / safe for k in range(3)], axis=1)
+    return VoxelGraph(positions, normals, lab, weight, _touching(unique, span), member, size_m)
+
+
+def cut(
+    graph: VoxelGraph,
+    positive: list[int],
+    negative: list[int],
+    radius_m: float,
+    background: np.ndarray,
+    *,
+    gap_m: float = 0.0,
+    upright: bool = False,
+) -> tuple[np.ndarray, float]:
+    """Voxels joined to the positive ones, and the cut's cost per square root of area (lower is a cleaner cut).
+
+    `background` marks voxels of structure (floor, worktop, walls); farther than about `radius_m` a voxel is unlikely.
+    Things that are `upright` (chairs) reach as far down as they do: only plan distance counts. Parts up to `gap_m` apart
+    count as joined: scans lose dark and thin pieces.
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
+    count = len(graph.positions)
+    a, b = graph.edges.T
+    capacity = _capacities(graph)
+    positions = graph.positions[:, :2] if upright else graph.positions
+    seeds = [*positions[positive], positions[positive].mean(axis=0)]
+    distance = np.min([np.linalg.norm(positions - seed, axis=1) for seed in seeds], axis=0)
+    prior = np.exp(-((distance / radius_m) ** 2))
+    weight = graph.area_m2 * 1e4 * 0.25
+    source, sink = weight * prior * 0.35, weight * (1 - prior) * 0.5
+    sink[background] += weight[background] * 3 + 20
+    source[positive], sink[positive] = _LARGE, 0
+    sink[negative], source[negative] = _LARGE, 0
+    nodes = np.arange(count)
+    rows = np.concatenate([a, b, np.full(count, count), nodes])
+    columns = np.concatenate([b, a, nodes, np.full(count, count + 1)])
+    values = np.concatenate([capacity, capacity, source, sink])
+    matrix = csr_matrix(
+        ((values * _CAPACITY_SCALE).round().clip(0, 2**31 - 1).astype(np.int32), (rows, columns)), shape=(count + 2, count + 2)
+    )
+    residual = matrix - maximum_flow(matrix, count, count + 1).flow
+    residual.data = (residual.data > 0).astype(np.int32)
+    residual.eliminate_zeros()
+    inside = np.zeros(count + 2, bool)
+    inside[breadth_first_order(residual, count, return_predecessors=False)] = True
+    chosen = connected_to(graph, inside[:count], positive, gap_m)
+    crossing = capacity[chosen[a] != chosen[b]].sum()
+    return chosen, float(crossing / np.sqrt(max(graph.area_m2[chosen].sum() * 1e4, 1e-6)))
+
+
+def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0) -> np.ndarray:
+    """The voxels of `inside` that touch a seed through others of it, or lie within `gap_m` of such."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    a, b = graph.edges.T
+    if gap_m > 0:
+        members = np.flatnonzero(inside)
+        near = cKDTree(graph.positions[members]).query_pairs(gap_m, output_type="ndarray")
+        a, b = np.concatenate([a, members[near[:, 0]]]), np.concatenate([b, members[near[:, 1]]])
+    both = inside[a] & inside[b]
+    count = len(inside)
+    links = coo_matrix((np.ones(int(both.sum())), (a[both], b[both])), shape=(count, count))
+    _, labels = connected_components(links, directed=False)
+    return np.asarray(inside & np.isin(labels, labels[seeds]))
+
+
+def _capacities(graph: VoxelGraph) -> np.ndarray:
+    a, b = graph.edges.T
+    towards = graph.positions[b] - graph.positions[a]
+    length = np.linalg.norm(towards, axis=1)
+    cosine = np.clip(_dot(graph.normals[a], graph.normals[b]), -1, 1)
+    bend = _dot(graph.normals[b] - graph.normals[a], towards) / np.maximum(length, 1e-9)
+    colour = _dot(graph.lab[a] - graph.lab[b], graph.lab[a] - graph.lab[b]) / 40**2
+    weight = np.arccos(cosine) + _COLOUR_COST * colour
+    cost = np.where(bend > 0.02, _CONVEX_COST, _CONCAVE_COST)
+    share = np.minimum(graph.area_m2[a], graph.area_m2[b]) / graph.size_m**2  # slivers hold little together
+    return np.asarray(graph.size_m * 100 * (np.exp(-cost * weight) + 0.02) * np.clip(share, 0.05, 1.0) / 2)
+
+
+def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("nk,nk->n", first, second))
+
+
+def _touching(unique: np.ndarray, span: np.ndarray) -> np.ndarray:
+    offsets = [(dx * span[1] + dy) * span[2] + dz for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)]
+    pairs = []
+    for offset in sorted(int(o) for o in offsets if o > 0):
+        target = np.searchsorted(unique, unique + offset)
+        found = (target < len(unique)) & (unique[np.minimum(target, len(unique) - 1)] == unique + offset)
+        pairs.append(np.stack([np.flatnonzero(found), target[found]], axis=1))
+    return np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64)

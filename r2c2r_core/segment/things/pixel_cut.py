@@ -1,0 +1,91 @@
+"""Foreground segmentation of a crop by min-cut (as GrabCut): colour models and known pixels against contrast edges."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Image, Mask
+
+_BINS = (16, 32, 32)  # of Lab: lightness changes with the light, hue does not
+_LARGEST_PX = 110  # a longer side is cut at a lower resolution, its border drawn at the full one
+_SMOOTH = 2.5  # cost of a border between equal colours, in log-odds a pixel
+_MOST_ODDS = 2.5  # a colour alone decides no pixel
+_UNSEEN = 2e-4  # share of a colour that neither side showed
+_CAPACITY_SCALE = 100.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourModel:
+    """How much likelier each colour is on the thing than around it: log-odds over Lab bins."""
+
+    table: np.ndarray
+
+    def odds(self, lab: np.ndarray) -> np.ndarray:
+        """Log-odds (h, w) of an 8-bit Lab image."""
+        return np.asarray(self.table[_bins_of(lab)])
+
+
+def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
+    """The model of (8-bit Lab image, pixels surely on the thing, pixels surely off it)."""
+    on = sum((_histogram(lab[sure]) for lab, sure, _ in samples), np.zeros(_BINS))
+    off = sum((_histogram(lab[sure]) for lab, _, sure in samples), np.zeros(_BINS))
+    on, off = on / np.maximum(on.sum(), 1.0), off / np.maximum(off.sum(), 1.0)
+    odds = np.log((on + _UNSEEN) / (off + _UNSEEN))
+    return ColourModel(np.clip(odds, -_MOST_ODDS, _MOST_ODDS).astype(np.float32))
+
+
+def cut_pixels(rgb: Image, odds: np.ndarray) -> Mask:
+    """The mask of least cost: log-odds of being the thing (h, w) for each pixel, and borders that prefer colour edges."""
+    height, width = odds.shape
+    shrink = max(1.0, max(height, width) / _LARGEST_PX)
+    size = (max(4, round(width / shrink)), max(4, round(height / shrink)))
+    small_odds = cv2.resize(odds.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    small_rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+    mask = _min_cut(small_rgb, small_odds * min(shrink, 2.0))
+    if shrink == 1.0:
+        return mask
+    grown = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(grown > 0.5)
+
+
+def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
+    height, width = odds.shape
+    count = height * width
+    node = np.arange(count).reshape(height, width)
+    lab = cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB).astype(np.float32)
+    pairs: list[tuple[np.ndarray, np.ndarray, float]] = [(node[:, :-1], node[:, 1:], 1.0), (node[:-1], node[1:], 1.0)]
+    pairs += [(node[:-1, :-1], node[1:, 1:], 0.7), (node[:-1, 1:], node[1:, :-1], 0.7)]
+    flat = lab.reshape(-1, 3)
+    steps = [((flat[a.ravel()] - flat[b.ravel()]) ** 2).sum(axis=1) for a, b, _ in pairs]
+    usual = 2 * float(np.mean(np.concatenate(steps[:2]))) + 1e-6
+    weights = [_SMOOTH * w * (np.exp(-step / usual) + 0.04) for step, (_, _, w) in zip(steps, pairs, strict=True)]
+    a = np.concatenate([first.ravel() for first, _, _ in pairs])
+    b = np.concatenate([second.ravel() for _, second, _ in pairs])
+    weight = np.concatenate(weights)
+    nodes = node.ravel()
+    rows = np.concatenate([a, b, np.full(count, count), nodes])
+    columns = np.concatenate([b, a, nodes, np.full(count, count + 1)])
+    values = np.concatenate([weight, weight, np.clip(odds.ravel(), 0, None), np.clip(-odds.ravel(), 0, None)])
+    capacity = csr_matrix(((values * _CAPACITY_SCALE).round().astype(np.int32), (rows, columns)), shape=(count + 2, count + 2))
+    residual = capacity - maximum_flow(capacity, count, count + 1).flow
+    residual.data = (residual.data > 0).astype(np.int32)
+    residual.eliminate_zeros()
+    inside = np.zeros(count + 2, bool)
+    inside[breadth_first_order(residual, count, return_predecessors=False)] = True
+    return inside[:count].reshape(height, width)
+
+
+def _histogram(lab: np.ndarray) -> np.ndarray:
+    """Smoothed counts of Lab colours (n, 3)."""
+    from scipy import ndimage
+
+    counts = np.bincount(np.ravel_multi_index(_bins_of(lab), _BINS), minlength=int(np.prod(_BINS))).reshape(_BINS)
+    return np.asarray(ndimage.gaussian_filter(counts.astype(np.float64), 0.7))
+
+
+def _bins_of(lab: np.ndarray) -> tuple[np.ndarray, ...]:
+    return tuple(lab[..., k].astype(np.int64) * _BINS[k] // 256 for k in range(3))

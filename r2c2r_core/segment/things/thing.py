@@ -1,0 +1,268 @@
+"""Free-standing things: the part of the fused surface above its support that the clicks belong to, by min-cut; its masks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
+from r2c2r_core.geometry.camera import project, ray_slopes
+from r2c2r_core.geometry.fusion import DepthView, fuse_depth
+from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.occlusion import refine_border
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.min_cut import VoxelGraph, build_graph, cut
+from r2c2r_core.segment.things.pixel_cut import ColourModel
+
+_SUPPORT_REACH_M = 0.35
+_BIN_M = 0.005  # of heights
+_SECTORS = 16
+_AROUND = 0.4  # share of the directions in which a support goes on: walls and edges bound it, neighbours stand on it
+_CLEARANCE_M = 0.012
+_SEEN_THROUGH_M = 0.10
+_FURNITURE_GAP_M = 0.08  # legs and seats are lost in part
+_LEVEL_COS = 0.92
+_FARTHEST_M = 1.0  # from a click: of what is larger, as a worktop, that much is found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThingConfig:
+    """How large a thing may be, and what it stands on; from its name where the name says it."""
+
+    radius_m: float  # half its largest side, about
+    width_m: float | None = None  # across, about, where the name says it
+    round: bool = False  # as deep as wide
+    on_floor: bool = False
+
+
+def sized_as(category: Category) -> ThingConfig:
+    """How large things of a category may be."""
+    return ThingConfig(
+        radius_m=min(category.longest_m / 2, _FARTHEST_M),
+        width_m=category.width.usual if category.round else None,
+        round=category.round,
+        on_floor=category.on_floor,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """The surface found, in the world, and the height of what it stands on."""
+
+    vertices: Points
+    faces: Faces
+    support_z_m: float | None
+    spacing_m: float = 0.01  # between neighbouring vertices
+    pose_error_m: float = 0.02  # how far a frame may show it from where it stands
+    border_m: float = 0.006  # how far its outline may be off
+    colours: ColourModel | None = None  # learned from where frames are sure
+    clicks: tuple[PromptPoint, ...] = ()  # what a person said of single pixels holds in their frames
+
+    @property
+    def points(self) -> Points:
+        """Its vertices."""
+        return self.vertices
+
+
+def find_thing(
+    scene: Scene, positives: Points, negatives: Points, config: ThingConfig, *, voxel_m: float | None = None
+) -> Thing | None:
+    """The surface that the clicks (world points) belong to; None when there is none within reach."""
+    reach = 2.2 * config.radius_m + 0.15
+    vertices, faces, colours = _local_surface(scene, positives, reach, voxel_m)
+    if len(faces) < 20:
+        return None
+    support = support_height(scene, positives, config)
+    keep = np.ones(len(faces), bool)
+    if support is not None:
+        height = vertices[:, 2]
+        keep = (height[faces[:, 0]] + height[faces[:, 1]] + height[faces[:, 2]]) / 3 > support + _CLEARANCE_M
+    if keep.sum() < 10:
+        return None
+    faces = faces[keep]
+    size = max(0.006, min(0.025, config.radius_m / 8))
+    graph = build_graph(vertices, faces, colours, size)
+    seeds = [graph.nearest(point) for point in positives]
+    if np.linalg.norm(graph.positions[seeds] - positives, axis=1).min() > 0.12:
+        return None
+    refused = [graph.nearest(point) for point in negatives]
+    refused = [voxel for voxel in refused if voxel not in seeds]
+    gap_m = _FURNITURE_GAP_M if config.on_floor else 0.0
+    structure = _structure(graph, seeds)
+    chosen, _ = cut(graph, seeds, refused, config.radius_m, structure, gap_m=gap_m, upright=config.on_floor)
+    return _extract(vertices, faces, chosen[graph.voxel_of_face], support)
+
+
+def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True) -> tuple[Mask, float]:
+    """The thing's visible pixels in a frame, and the share of its projection that is visible."""
+    camera = frame.rgb_camera
+    size = (camera.width, camera.height)
+    scale = max(1, round(camera.width / 480))
+    small = camera.resized(camera.width // scale, camera.height // scale)
+    raster = rasterize(
+        thing.vertices, thing.faces, np.zeros((len(thing.vertices), 3), np.float32), small, frame.world_from_camera.inverse
+    )
+    model = raster.depth_m
+    projected = model > 0
+    if projected.sum() < 12:
+        return np.zeros((size[1], size[0]), bool), 0.0
+    import cv2
+
+    depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
+    hidden = projected & scene.noise.occluded(depth, model, 0.05)
+    sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
+    through = scene.noise.seen_through(sensor, model, _SEEN_THROUGH_M)  # between slats, which the surface closes
+    shown = projected & ~hidden & ~through
+    shown = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+    share = float(shown.sum() / projected.sum())
+    mask = cv2.resize(shown, size, interpolation=cv2.INTER_LINEAR) > 0
+    if not mask.any():
+        return mask, 0.0
+    if not refine:
+        return mask, share
+    return _refined(mask, scene, frame), share
+
+
+def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    pad = 24
+    area = (
+        slice(max(rows[0] - pad, 0), rows[-1] + pad + 1),
+        slice(max(columns[0] - pad, 0), columns[-1] + pad + 1),
+    )
+    band = int(np.clip(np.sqrt(mask.sum()) / 10, 2, max(4, frame.rgb_camera.width / 110)))
+    result = np.zeros_like(mask)
+    result[area] = refine_border(scene.rgb(frame.index)[area], mask[area], band)
+    return result
+
+
+def support_height(scene: Scene, positives: Points, config: ThingConfig) -> float | None:
+    """World height of what the thing stands on: the floor, or the highest level surface below that lies around it.
+
+    Around: in enough directions, farther off than the thing reaches. Where there is none, the highest large level one below.
+    """
+    if config.on_floor:
+        return 0.0 if scene.capture.room.floor_found else None
+    lowest = positives[np.argmin(positives[:, 2])]
+    centres, areas = _level_faces(scene, lowest, _SUPPORT_REACH_M + 1.5 * config.radius_m)
+    below = centres[:, 2] < lowest[2] - 0.004
+    centres, areas = centres[below], areas[below]
+    if len(centres) == 0:
+        return None
+    away = centres[:, :2] - lowest[:2]
+    distance = np.hypot(away[:, 0], away[:, 1])
+    height_bin = np.floor((centres[:, 2] - centres[:, 2].min()) / _BIN_M).astype(int)
+    sector = np.floor((np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) % 1.0) * _SECTORS).astype(int) % _SECTORS
+    ring = distance > config.radius_m
+    spread = np.zeros((height_bin.max() + 1, _SECTORS))
+    np.add.at(spread, (height_bin[ring], sector[ring]), areas[ring])
+    around = (_over_bins(spread) > 5e-4).mean(axis=1)
+    near = distance < _SUPPORT_REACH_M + config.radius_m
+    profile = _over_bins(np.bincount(height_bin[near], areas[near], len(spread))[:, None])[:, 0]
+    enough = max(0.005, 0.15 * np.pi * (0.7 * config.radius_m) ** 2)
+    peaks = [i for i in range(len(profile)) if profile[i] > enough and profile[i] == profile[max(0, i - 4) : i + 5].max()]
+    if not peaks:
+        return None
+    reaching = [i for i in peaks if around[i] >= _AROUND]
+    top = (reaching or peaks)[-1]
+    chosen = near & (np.abs(height_bin - top) <= 2)
+    return float(np.average(centres[chosen, 2], weights=areas[chosen]))
+
+
+def _level_faces(scene: Scene, point: Vector3, reach_m: float) -> tuple[Points, np.ndarray]:
+    """Centres and areas of the surface's level faces around a point, in plan."""
+    parts = scene.parts
+    near = parts.faces_near(point, reach_m, any_height=True)
+    near = near[parts.upward[near] > _LEVEL_COS]
+    near = near[np.linalg.norm(parts.middles[near, :2] - point[:2], axis=1) < reach_m]
+    return parts.middles[near], parts.areas_m2[near]
+
+
+def _over_bins(profile: np.ndarray) -> np.ndarray:
+    """Sums over five neighbouring bins of the first axis."""
+    padded = np.pad(profile, ((2, 2), (0, 0)))
+    return np.asarray(sum(padded[k : k + len(profile)] for k in range(5)))
+
+
+def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
+    """Voxels of large flat parts (walls, worktops, table tops) that hold no click."""
+    background = np.zeros(len(graph.positions), bool)
+    for axis in ("level", "upright"):
+        flat = np.abs(graph.normals[:, 2]) > 0.93 if axis == "level" else np.abs(graph.normals[:, 2]) < 0.25
+        a, b = graph.edges.T
+        parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > 0.94
+        step = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a])) < 0.35 * graph.size_m
+        link = flat[a] & flat[b] & parallel & step
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        count = len(flat)
+        _, labels = connected_components(
+            coo_matrix((np.ones(int(link.sum())), (a[link], b[link])), shape=(count, count)), directed=False
+        )
+        areas = np.bincount(labels, graph.area_m2)
+        large = areas[labels] > 0.45
+        background |= large & flat & ~np.isin(labels, labels[seeds])
+    return background
+
+
+def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: float | None) -> tuple[Points, Faces, Colours]:
+    """The fused scan around the clicks; fused anew with finer voxels when asked."""
+    centre = positives.mean(axis=0)
+    reach = reach_m + float(np.linalg.norm(positives - centre, axis=1).max())
+    if voxel_m is None or voxel_m >= scene.capture.surface.voxel_m:
+        surface = scene.capture.surface
+        vertices, colours = surface.vertices_world, surface.colours
+        faces = surface.faces[scene.parts.faces_near(centre, reach)]
+    else:
+        fine = fuse_depth(_views_of(scene, centre, reach), voxel_m, depth_max_m=4.0, block_count=32_000)
+        vertices, faces, colours = fine.vertices, fine.faces, fine.colours
+    used, around = _renumbered(faces, len(vertices))
+    near = np.linalg.norm(vertices[used] - centre, axis=1) < reach
+    used, renumbered = _renumbered(faces[near[around[:, 0]] & near[around[:, 1]] & near[around[:, 2]]], len(vertices))
+    return vertices[used], renumbered, colours[used]
+
+
+def _renumbered(faces: Faces, count: int) -> tuple[np.ndarray, Faces]:
+    """The vertices (of `count`) that faces use, and the faces with numbers among them."""
+    used = np.zeros(count, bool)
+    used[faces] = True
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[faces]
+
+
+def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> list[DepthView]:
+    """The sharpest, nearest depth images that see a ball, everything outside it removed."""
+    rated = []
+    for frame in scene.frames:
+        local = frame.world_from_camera.inverse.apply(centre[None])[0]
+        camera = frame.depth_camera
+        if not 0.25 < local[2] < 4.0:
+            continue
+        u, v = project(local, camera)
+        if -0.1 * camera.width < u < 1.1 * camera.width and -0.1 * camera.height < v < 1.1 * camera.height:
+            rated.append((-np.sqrt(max(frame.sharpness, 1e-3)) / local[2] ** 1.5, frame.index))
+    views = []
+    for _, index in sorted(rated)[:most]:
+        frame = scene.frame(index)
+        depth, camera = scene.depth(index), frame.depth_camera
+        local = frame.world_from_camera.inverse.apply(centre[None])[0]
+        x, y = ray_slopes(np.arange(camera.width), np.arange(camera.height), camera)
+        away = (x[None] * depth - local[0]) ** 2 + (y[:, None] * depth - local[1]) ** 2 + (depth - local[2]) ** 2
+        inside = (depth > 0) & (away < reach_m**2)
+        if inside.sum() < 30:
+            continue
+        import cv2
+
+        colour = cv2.resize(scene.rgb(index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+        views.append(DepthView(np.where(inside, depth, 0).astype(np.float32), camera, frame.world_from_camera, colour))
+    return views
+
+
+def _extract(vertices: Points, faces: Faces, chosen: np.ndarray, support: float | None) -> Thing | None:
+    kept = faces[chosen]
+    if len(kept) < 8:
+        return None
+    used, renumbered = _renumbered(kept, len(vertices))
+    return Thing(vertices[used], renumbered, support)

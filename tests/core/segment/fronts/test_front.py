@@ -1,0 +1,114 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.stage import open_session
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
+
+Boxes = tuple[Capture, Truth]
+
+
+@pytest.mark.parametrize("name", DOORS)
+def test_one_click_measures_a_door_within_3_mm(session: GeometricSession, boxes: Boxes, name: str) -> None:
+    left, width = DOORS[name]
+    panel = session.find(prompt(name, "cabinet", click_on(boxes[0], (left + 0.3, FRONT_Y, 0.4), 60))).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(width, abs=3e-3)  # a pixel at 1.3 m
+    assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M, abs=3e-3)
+    middle = [left + width / 2, FRONT_Y, (TOP_M + BOTTOM_M) / 2]
+    np.testing.assert_allclose(panel.world_from_front.translation, middle, atol=3e-3)
+    assert panel.handle is not None
+    assert panel.handle.is_vertical
+    assert panel.handle.protrusion_m == pytest.approx(0.036, abs=6e-3)  # a rod two depth pixels wide
+    assert np.sign(panel.handle.centre[0]) == (-1 if name == "door_b" else 1)
+
+
+@pytest.mark.parametrize("name", DRAWERS)
+def test_a_stack_is_cut_into_its_drawers(session: GeometricSession, boxes: Boxes, name: str) -> None:
+    left, width, bottom, height = DRAWERS[name]
+    panel = session.find(prompt(name, "drawer", click_on(boxes[0], (left + 0.1, FRONT_Y, bottom + 0.06), 60))).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(width, abs=3e-3)
+    assert panel.height_m == pytest.approx(height, abs=5e-3)  # a gap is a pixel: its two sides are not told apart
+    assert panel.handle is not None
+    assert not panel.handle.is_vertical
+    np.testing.assert_allclose(panel.handle.centre, (0, 0), atol=8e-3)
+
+
+def test_masks_follow_the_door_in_every_frame_and_keep_the_post_out(session: GeometricSession, boxes: Boxes) -> None:
+    capture, truth = boxes
+    track = session.track(prompt("door_b", "cabinet", click_on(capture, (0.9, FRONT_Y, 0.4), 60)))
+    for frame in capture.frames:
+        mask = session.mask_at(prompt("door_b", "cabinet", click_on(capture, (0.9, FRONT_Y, 0.4), 60)), frame.index)
+        assert mask_iou(mask, truth["door_b"][frame.index]) > 0.94
+        post = click_on(capture, (sum(POST) / 2, FRONT_Y - 0.25, 0.5), frame.index)
+        assert not mask[int(post.y), int(post.x)]
+    assert set(track.masks) == {frame.index for frame in capture.frames}
+    assert track.kind == "front"
+
+
+def test_a_double_door_is_one_object_from_one_click(session: GeometricSession, boxes: Boxes) -> None:
+    point = click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60)
+    single, double = (
+        session.find(prompt("a", "cabinet", point)).panel(),
+        session.find(prompt("a", "double-door cabinet", point)).panel(),
+    )
+    assert single is not None
+    assert double is not None
+    assert double.width_m == pytest.approx(1.003, abs=4e-3)  # doors a and b, whose handles meet
+    assert double.width_m > 1.9 * single.width_m
+
+
+def test_a_second_click_joins_and_a_negative_click_cuts(session: GeometricSession, boxes: Boxes) -> None:
+    on_a, on_b = (click_on(boxes[0], (x, FRONT_Y, 0.4), 60) for x in (0.3, 0.9))
+    joined = session.find(prompt("ab", "cabinet", on_a, on_b)).panel()
+    assert joined is not None
+    assert joined.width_m == pytest.approx(1.003, abs=4e-3)
+    off_b = click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60, label=0)
+    cut = session.find(prompt("a", "double-door cabinet", on_a, off_b)).panel()
+    assert cut is not None
+    assert cut.width_m == pytest.approx(0.5, abs=6e-3)  # cut along the middle of the seam
+
+
+@pytest.mark.parametrize("label", [1, 0])
+def test_a_click_within_pose_error_of_the_border_takes_in_no_neighbour_and_cuts_nothing(
+    session: GeometricSession, boxes: Boxes, label: int
+) -> None:
+    beside = click_on(boxes[0], (0.508 if label else 0.495, FRONT_Y, 0.3), 60, label)
+    panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60), beside)).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(0.5, abs=4e-3)
+
+
+def test_a_click_on_what_stands_in_front_leaves_the_panel_whole(session: GeometricSession, boxes: Boxes) -> None:
+    on_post = click_on(boxes[0], (0.67, FRONT_Y - 0.25, 0.5), 60, label=0)
+    panel = session.find(prompt("b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60), on_post)).panel()
+    assert panel is not None
+    assert panel.width_m == pytest.approx(0.5, abs=4e-3)
+
+
+def test_tracks_do_not_depend_on_the_order_of_objects_nor_on_the_cache(boxes: Boxes, tmp_path: Path, cache: Path) -> None:
+    capture = boxes[0]
+    first = prompt("door_a", "cabinet", click_on(capture, (0.3, FRONT_Y, 0.4), 60))
+    second = prompt("drawer", "drawer", click_on(capture, (1.6, FRONT_Y, 0.2), 80))
+    fresh, cached = open_session(capture, tmp_path), open_session(capture, cache)
+    forward = [fresh.track(first), fresh.track(second)]
+    backward = [cached.track(second), cached.track(first)]
+    for a, b in zip(forward, reversed(backward), strict=True):
+        assert a.masks == b.masks
+        assert a.confidence == b.confidence
+        assert a.front is not None
+        assert b.front is not None
+        assert dataclasses.astuple(a.front)[1:3] == dataclasses.astuple(b.front)[1:3]
+
+
+def test_the_stream_starts_at_the_click_and_spreads_outwards(session: GeometricSession, boxes: Boxes) -> None:
+    order = [index for index, _, _ in session.stream(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60)))]
+    assert order[:3] == [60, 50, 70]
+    assert len(order) == len(set(order))

@@ -1,0 +1,103 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import Cancelled
+from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.progress import Progress
+from r2c2r_core.segment.geometric import session as geometric
+from r2c2r_core.segment.geometric.cache import kept
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.stage import open_session
+from r2c2r_core.segment.surface import draw, drawn_size, parts_of
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import FRONT_Y, click_on, prompt
+
+
+def test_runs_come_back_from_disk_as_they_were(session: GeometricSession, tmp_path: Path) -> None:
+    run = session.run_of(session.planes[0])
+    kept(tmp_path / "run.noun", lambda: run)
+    back = kept(tmp_path / "run.noun", lambda: None)
+    assert _same(run, back)
+
+
+def test_a_damaged_file_is_computed_anew(tmp_path: Path) -> None:
+    path = tmp_path / "value.noun"
+    kept(path, lambda: (1, 2))
+    path.write_bytes(path.read_bytes()[:40])
+    assert kept(path, lambda: (3, 4)) == (3, 4)
+    assert kept(path, lambda: (5, 6)) == (3, 4)
+
+
+def test_all_runs_are_cut_before_the_first_click(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(geometric, "make_run", lambda *_: pytest.fail("cut at a click"))
+    for region in session.planes:
+        session.run_of(region)
+
+
+def test_other_code_never_reads_what_this_code_prepared(
+    boxes: tuple[Capture, Truth], session: GeometricSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = geometric._cache_key(boxes[0], session.config)
+    monkeypatch.setattr(geometric, "source_key", lambda *rooms: "other code")
+    assert geometric._cache_key(boxes[0], session.config) != before
+
+
+def test_preparing_reports_and_stops_when_asked(boxes: tuple[Capture, Truth], tmp_path: Path) -> None:
+    seen: list[float] = []
+    stop = Progress(lambda _, fraction, text: seen.append(fraction), lambda: len(seen) > 5)
+    with pytest.raises(Cancelled):
+        open_session(boxes[0], tmp_path, progress=stop)
+    assert seen == sorted(seen)
+    assert seen[-1] < 0.3
+
+
+def test_drawing_only_the_parts_in_view_changes_no_pixel(boxes: tuple[Capture, Truth]) -> None:
+    capture = boxes[0]
+    surface, parts = capture.surface, parts_of(capture.surface)
+    for frame in capture.frames[::6]:
+        camera = frame.rgb_camera.resized(*drawn_size(frame.rgb_camera))
+        colours = np.zeros((len(surface.vertices_world), 3), np.float32)
+        whole = rasterize(surface.vertices_world, surface.faces, colours, camera, frame.world_from_camera.inverse)
+        assert np.array_equal(draw(parts, frame), (whole.depth_m * 1000 + 0.5).astype(np.uint16))
+
+
+def test_no_face_within_reach_is_missed(boxes: tuple[Capture, Truth]) -> None:
+    surface = boxes[0].surface
+    point, reach = np.array([1.0, -0.3, 1.0]), 0.4
+    away = np.linalg.norm(surface.vertices_world[surface.faces] - point, axis=2).min(axis=1)
+    assert set(np.flatnonzero(away < reach)) <= set(parts_of(surface).faces_near(point, reach).tolist())
+
+
+def test_the_first_look_at_a_front_is_its_mask(boxes: tuple[Capture, Truth], session: GeometricSession) -> None:
+    door = prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60), click_on(boxes[0], (0.3, FRONT_Y, 0.5), 40))
+    assert session.glimpse(door) == next(session.stream(door))
+
+
+def test_the_first_look_at_a_small_thing_agrees_with_its_mask(
+    boxes: tuple[Capture, Truth], session: GeometricSession, cache: Path
+) -> None:
+    carton = prompt("c", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 70))
+    fresh = open_session(boxes[0], cache)
+    glimpsed = fresh.glimpse(carton)
+    assert glimpsed is not None
+    frame, first, _ = glimpsed
+    assert frame == 70
+    assert mask_iou(unpack_mask(first), session.mask_at(carton, 70)) > 0.8
+    assert mask_iou(unpack_mask(first), boxes[1]["carton"][70]) > 0.7
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray):
+        return isinstance(b, np.ndarray) and a.dtype == b.dtype and np.array_equal(a, b)
+    if dataclasses.is_dataclass(a):
+        return type(a) is type(b) and all(
+            _same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a) if f.init
+        )
+    if isinstance(a, tuple):
+        return isinstance(b, tuple) and len(a) == len(b) and all(map(_same, a, b))
+    return a == b

@@ -1,0 +1,184 @@
+"""Learned segmenters end to end but for the network: a model that answers with true masks, spoilt as real ones are."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.learned.sam_video import SAM2, Click, Seen
+from r2c2r_core.segment.learned.session import LearnedSession
+from r2c2r_core.segment.stage import SegmentConfig, open_session
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, prompt
+
+torch = pytest.importorskip("torch")
+from tests.core.segment.learned.tiny_models import tiny  # noqa: E402
+
+Boxes = tuple[Capture, Truth]
+Spoil = Callable[[int, np.ndarray], np.ndarray]
+
+
+@dataclass
+class TrueMasks:
+    """Stands where VideoModel stands: the true masks of one object by position, spoilt; counts what it is asked."""
+
+    masks: list[np.ndarray]
+    spoil: Spoil = lambda position, mask: mask
+    depth: Spoil = lambda position, mask: mask
+    asked: list[int] = field(default_factory=list)
+
+    def follow(
+        self, image_at: Callable[[int], np.ndarray], count: int, clicks: Mapping[int, list[Click]], *, channel: str = "rgb"
+    ) -> Iterator[Seen]:
+        start = list(clicks)[-1]
+        for position in sorted(range(count), key=lambda p: (abs(p - start), -p)):
+            assert image_at(position).dtype == np.uint8
+            self.asked.append(position)
+            change = self.depth if channel == "depth" else self.spoil
+            yield Seen(position, change(position, self.masks[position]), 0.9)
+
+
+def opened(session: GeometricSession, model: object, **settings: object) -> LearnedSession:
+    config = replace(SegmentConfig(), **settings)  # type: ignore[arg-type]
+    return LearnedSession(name="sam2", model=model, prepared=session, config=config)  # type: ignore[arg-type]
+
+
+def true_masks(boxes: Boxes, name: str) -> list[np.ndarray]:
+    return [boxes[1][name][frame.index] for frame in boxes[0].frames]
+
+
+def ious(boxes: Boxes, name: str, track_masks: Mapping[int, object]) -> list[float]:
+    empty = np.zeros_like(boxes[1][name][0])
+    return [
+        mask_iou(unpack_mask(track_masks[i]) if i in track_masks else empty, truth)  # type: ignore[arg-type]
+        for i, truth in boxes[1][name].items()
+        if np.count_nonzero(truth) >= 60
+    ]
+
+
+@pytest.fixture
+def door(boxes: Boxes) -> ObjectPrompt:
+    return prompt("door_b", "cabinet", click_on(boxes[0], (0.95, FRONT_Y, 0.4), 60))
+
+
+@pytest.fixture
+def carton(boxes: Boxes) -> ObjectPrompt:
+    return prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 60))
+
+
+def test_true_masks_of_a_front_give_its_rectangle(session: GeometricSession, boxes: Boxes, door: ObjectPrompt) -> None:
+    track = opened(session, TrueMasks(true_masks(boxes, "door_b"))).track(door)
+    assert (track.kind, track.backend, track.prompt_count) == ("front", "sam2", 1)
+    assert track.front is not None
+    left, width = DOORS["door_b"]
+    assert track.front.width_m == pytest.approx(width, abs=0.006)  # two mosaic cells
+    assert track.front.height_m == pytest.approx(0.74, abs=0.006)
+    assert track.front.world_from_front.translation[0] == pytest.approx(left + width / 2, abs=0.006)
+    assert track.front.world_from_front.translation[1] == pytest.approx(FRONT_Y, abs=0.01)
+    assert np.mean(ious(boxes, "door_b", track.masks)) > 0.97  # fusing leaves good masks alone
+
+
+def test_true_masks_of_a_thing_give_its_box(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    track = opened(session, TrueMasks(true_masks(boxes, "carton"))).track(carton)
+    assert (track.kind, track.front) == ("thing", None)
+    assert track.box is not None
+    assert track.box.support_z_m == pytest.approx(0.90, abs=0.012)  # a voxel of the fused surface
+    np.testing.assert_allclose(track.box.dimensions_m[[0, 2]], [0.12, 0.20], atol=0.015)
+    assert np.mean(ious(boxes, "carton", track.masks)) > 0.95
+
+
+def test_a_leak_over_a_depth_edge_is_cut_off(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    """In one frame of three the mask grows over what stands behind the carton."""
+
+    def leaking(position: int, mask: np.ndarray) -> np.ndarray:
+        return mask if position % 3 else _moved(mask, -30) | mask
+
+    model = TrueMasks(true_masks(boxes, "carton"), leaking)
+    raw = opened(session, model, fusion="none").track(carton)
+    fused = opened(session, model).track(carton)
+    assert min(ious(boxes, "carton", raw.masks)) < 0.75
+    assert min(ious(boxes, "carton", fused.masks)) > 0.85
+
+
+def test_a_frame_the_model_lost_is_filled_in_and_said(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    model = TrueMasks(true_masks(boxes, "carton"), lambda position, mask: mask & (position != 6))
+    fused = opened(session, model).track(carton)
+    lost = boxes[0].frames[6].index
+    assert mask_iou(unpack_mask(fused.masks[lost]), boxes[1]["carton"][lost]) > 0.8
+    assert fused.confidence[lost] < 0.5 < fused.confidence[boxes[0].frames[5].index]
+    assert any("lost it in" in line for line in fused.warnings)
+    assert lost not in opened(session, model, fusion="none").track(carton).masks
+
+
+def test_the_papers_intersection_takes_both_masks_and_falls_back(
+    session: GeometricSession, boxes: Boxes, carton: ObjectPrompt
+) -> None:
+    """Right of the carton's middle the depth mask is empty; in the first frame it is empty altogether."""
+
+    def half(position: int, mask: np.ndarray) -> np.ndarray:
+        columns = np.flatnonzero(mask.any(axis=0))
+        kept = mask.copy()
+        if len(columns):
+            kept[:, columns[0] + round(0.6 * len(columns)) :] = False
+        return kept & (position != 0)
+
+    truth = true_masks(boxes, "carton")
+    track = opened(session, TrueMasks(truth, depth=half), fusion="depth-mask").track(carton)
+    first, later = boxes[0].frames[0].index, boxes[0].frames[6].index
+    assert (unpack_mask(track.masks[later]) == half(6, truth[6])).all()
+    if first in track.masks:
+        assert (unpack_mask(track.masks[first]) == truth[0]).all()
+    assert any("disagreed in" in line for line in track.warnings)
+
+
+def test_stream_gives_the_clicked_frame_first_and_nothing_is_computed_twice(
+    session: GeometricSession, boxes: Boxes, carton: ObjectPrompt
+) -> None:
+    model = TrueMasks(true_masks(boxes, "carton"))
+    learned = opened(session, model)
+    first = next(learned.stream(carton))
+    assert first[0] == 60
+    assert model.asked == [6]
+    assert (learned.mask_at(carton, 60) == boxes[1]["carton"][60]).all()
+    assert model.asked == [6]
+    learned.track(carton)
+    learned.track(carton)
+    assert sorted(model.asked) == list(range(len(boxes[0].frames)))
+
+
+def test_an_object_the_model_never_sees_is_an_error(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    model = TrueMasks([np.zeros_like(mask) for mask in true_masks(boxes, "carton")])
+    with pytest.raises(ObjectNotSeen, match="carton: sam2 sees it in 0 of 14 frames"):
+        opened(session, model).track(carton)
+
+
+def test_a_frame_that_does_not_exist_is_refused(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    with pytest.raises(PromptError, match="frame 7 found"):
+        opened(session, TrueMasks(true_masks(boxes, "carton"))).mask_at(carton, 7)
+
+
+def test_the_real_class_with_random_weights_runs_through(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+    """Random masks say nothing, but every call is the real one: RGB-sized masks, one a frame, in the protocol's order."""
+    learned = opened(session, tiny(SAM2), least_area_px=0)
+    found = list(learned.stream(carton))
+    assert [frame for frame, _, _ in found][:5] == [60, 70, 50, 80, 40]
+    assert len(found) == len(boxes[0].frames)
+    assert {(packed.width, packed.height) for _, packed, _ in found} == {(480, 360)}
+
+
+def test_a_session_opens_by_name_from_a_folder_of_weights(boxes: Boxes, cache: Path, tmp_path: Path) -> None:
+    tiny(SAM2).model.save_pretrained(tmp_path)
+    learned = open_session(boxes[0], cache, "sam2", SegmentConfig(weights=str(tmp_path), least_area_px=0))
+    two = prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 60), click_on(boxes[0], (1.3, -0.36, 1.0), 90, 0))
+    assert [frame for (frame, _, _), _ in zip(learned.stream(two), range(3), strict=False)] == [90, 60, 100]
+
+
+def _moved(mask: np.ndarray, rows: int) -> np.ndarray:
+    return np.roll(mask, rows, axis=0)

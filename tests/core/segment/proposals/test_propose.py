@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.proposals.naming import FrontLook, name_front, name_thing
+from r2c2r_core.segment.proposals.propose import is_taken
+from r2c2r_core.segment.runs.handles import GridHandle
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import DOORS, DRAWERS
+
+Boxes = tuple[Capture, Truth]
+
+
+@pytest.fixture(scope="module")
+def steps(session: GeometricSession) -> list[tuple[float, tuple[Proposal, ...]]]:
+    return list(session.propose())
+
+
+@pytest.fixture(scope="module")
+def proposals(steps: list[tuple[float, tuple[Proposal, ...]]]) -> tuple[Proposal, ...]:
+    return steps[-1][1]
+
+
+def name_of(proposal: Proposal, truth: Truth) -> str | None:
+    """The true thing it overlaps by half."""
+    outline = unpack_mask(proposal.outline)
+    names = [name for name, masks in truth.items() if mask_iou(outline, masks[proposal.click.frame]) > 0.5]
+    return names[0] if names else None
+
+
+def test_each_front_is_proposed_once_under_its_name(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
+    fronts = [proposal for proposal in proposals if proposal.kind == "front"]
+    named = {name_of(proposal, boxes[1]): proposal.category for proposal in fronts}
+    assert named == dict.fromkeys(DOORS, "cabinet") | dict.fromkeys(DRAWERS, "drawer")
+    assert len(fronts) == len(named)
+
+
+def test_the_click_alone_gives_the_outline(proposals: tuple[Proposal, ...], session: GeometricSession) -> None:
+    for proposal in proposals:
+        prompt = ObjectPrompt(name="any", category=proposal.category, points=(proposal.click,))
+        mask = session.mask_at(prompt, proposal.click.frame)
+        np.testing.assert_array_equal(mask, unpack_mask(proposal.outline))
+        assert mask[int(proposal.click.y), int(proposal.click.x)]
+
+
+def test_handles_come_with_their_fronts_and_clicks_avoid_them(proposals: tuple[Proposal, ...]) -> None:
+    for proposal in proposals:
+        if proposal.kind != "front":
+            continue
+        u, v = np.array(proposal.handle_px).T
+        assert not (u.min() <= proposal.click.x <= u.max() and v.min() <= proposal.click.y <= v.max())
+
+
+def test_the_work_is_told_and_proposals_grow(steps: list[tuple[float, tuple[Proposal, ...]]]) -> None:
+    fractions = [fraction for fraction, _ in steps]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    counts = [len(found) for _, found in steps]
+    assert counts == sorted(counts)
+    confidences = [proposal.confidence for proposal in steps[-1][1]]
+    assert confidences == sorted(confidences, reverse=True)
+
+
+def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
+    for proposal in (proposal for proposal in proposals if proposal.kind == "front"):
+        masks = {name: masks[proposal.click.frame] for name, masks in boxes[1].items()}
+        own = name_of(proposal, boxes[1])
+        for name, mask in masks.items():
+            assert is_taken(unpack_mask(proposal.outline), [mask]) == (name == own)
+
+
+def bar(width: float, height: float) -> GridHandle:
+    return GridHandle(left=0, top=0, right=width, bottom=height, confidence=0.9)
+
+
+@pytest.mark.parametrize(
+    ("look", "category"),
+    [
+        (FrontLook(width_m=0.5, height_m=0.15, bottom_m=0.7, handle=bar(80, 8)), "drawer"),
+        (FrontLook(width_m=0.4, height_m=0.38, bottom_m=0.1, handle=bar(80, 8)), "drawer"),
+        (FrontLook(width_m=0.45, height_m=0.72, bottom_m=0.12, handle=bar(8, 80)), "cabinet"),
+        (FrontLook(width_m=0.9, height_m=0.72, bottom_m=0.12, handle=bar(8, 80), pair=True), "double_door_cabinet"),
+        (FrontLook(width_m=0.45, height_m=0.6, bottom_m=1.4, handle=bar(8, 80)), "wall_cabinet"),
+        (FrontLook(width_m=0.6, height_m=1.7, bottom_m=0.05, handle=bar(8, 200)), "refrigerator"),
+        (FrontLook(width_m=0.6, height_m=0.7, bottom_m=0.1, handle=bar(200, 8)), "dishwasher"),
+        (FrontLook(width_m=0.6, height_m=0.6, bottom_m=0.1, handle=bar(200, 8), dark=0.7), "oven"),
+    ],
+)
+def test_size_place_and_handle_name_a_front(look: FrontLook, category: str) -> None:
+    named, usual = name_front(look)
+    assert (named, usual) == (category, pytest.approx(1.0, abs=0.01))
+
+
+@pytest.mark.parametrize(("width", "height", "bottom"), [(1.9, 0.08, 0.02), (1.4, 0.9, 0.9), (0.1, 0.8, 0.1), (0.5, 1.1, 0.7)])
+def test_plinths_walls_and_fillers_are_unusual_fronts(width: float, height: float, bottom: float) -> None:
+    assert name_front(FrontLook(width_m=width, height_m=height, bottom_m=bottom, handle=None))[1] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("extent", "base", "category"),
+    [((0.08, 0.08, 0.28), 0.9, "bottle"), ((0.09, 0.11, 0.1), 0.9, "mug"), ((0.5, 0.5, 0.9), 0.0, "chair")],
+)
+def test_size_names_a_thing(extent: tuple[float, float, float], base: float, category: str) -> None:
+    assert name_thing(np.array(extent), base) == category

@@ -1,0 +1,34 @@
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.segment.things.pixel_cut import cut_pixels, learn_colours
+
+
+def disk(size: int, centre: tuple[float, float], radius: float) -> np.ndarray:
+    y, x = np.mgrid[:size, :size] + 0.5
+    return np.asarray(np.hypot(x - centre[0], y - centre[1]) < radius)
+
+
+@pytest.mark.parametrize("size", [80, 240])  # the larger one is cut at a lower resolution
+def test_the_border_follows_the_colour_edge_where_the_odds_are_a_guess(size: int) -> None:
+    truth = disk(size, (0.5 * size, 0.5 * size), 0.3 * size)
+    guess = disk(size, (0.54 * size, 0.47 * size), 0.3 * size)
+    rng = np.random.default_rng(0)
+    rgb = (np.where(truth[..., None], [200, 60, 50], [120, 110, 90]) + rng.normal(0, 4, (size, size, 3))).clip(0, 255)
+    found = cut_pixels(rgb.astype(np.uint8), np.where(guess, 0.4, -0.4))
+    assert mask_iou(guess, truth) < 0.9
+    assert mask_iou(found, truth) > 0.97
+
+
+def test_a_learned_model_tells_the_things_colours_from_those_around_it() -> None:
+    lab = np.zeros((40, 40, 3), np.uint8)
+    lab[:, :20], lab[:, 20:] = (140, 180, 160), (120, 128, 130)
+    left = np.zeros((40, 40), bool)
+    left[:, :20] = True
+    model = learn_colours([(lab, left, ~left)])
+    odds = model.odds(lab)
+    assert (odds[:, :20] > 1).all()
+    assert (odds[:, 20:] < -1).all()
+    unseen = model.odds(np.full((1, 1, 3), 20, np.uint8))
+    assert abs(float(unseen[0, 0])) < 0.1  # a colour that neither showed says nothing

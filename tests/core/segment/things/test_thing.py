@@ -1,0 +1,91 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.geometric.finders import _on_thing
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.stage import open_session
+from r2c2r_core.segment.things.thing import ThingConfig
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import FRONT_Y, Pixels, click_on, prompt
+
+Boxes = tuple[Capture, Truth]
+
+
+def test_a_carton_on_the_worktop_is_cut_from_it(session: GeometricSession, boxes: Boxes) -> None:
+    capture, truth = boxes
+    carton = prompt("carton", "box", click_on(capture, (1.06, -0.36, 1.0), 60))
+    track = session.track(carton)
+    overlap = [mask_iou(session.mask_at(carton, f.index), truth["carton"][f.index]) for f in capture.frames]
+    assert np.mean(overlap) > 0.9
+    assert track.kind == "thing"
+    assert track.front is None
+    assert track.box is not None
+    assert track.box.support_z_m == pytest.approx(0.90, abs=0.01)  # a voxel of the fused surface
+    assert track.box.dimensions_m[0] == pytest.approx(0.12, abs=0.012)
+    assert track.box.dimensions_m[2] == pytest.approx(0.20, abs=0.012)
+
+
+def test_a_category_that_hints_wrong_falls_back_with_a_warning(session: GeometricSession, boxes: Boxes) -> None:
+    found = session.find(prompt("carton", "dishwasher", click_on(boxes[0], (1.06, -0.36, 1.0), 60)))
+    assert found.kind in ("front", "thing")
+    assert np.count_nonzero(found.see(boxes[0].frame(60)).mask) > 300
+
+
+def test_a_click_on_nothing_names_the_click_and_the_next_step(boxes: Boxes, tmp_path_factory: pytest.TempPathFactory) -> None:
+    capture = boxes[0]
+    blind = Pixels(capture.images.colours, {k: np.zeros_like(v) for k, v in capture.images.depths.items()})  # type: ignore[attr-defined]
+    bare = dataclasses.replace(capture.surface, faces=capture.surface.faces[:0])
+    session = open_session(
+        dataclasses.replace(capture, images=blind, surface=bare, sha256="blind"), tmp_path_factory.mktemp("blind")
+    )
+    with pytest.raises(PromptError, match=r"mug: the click at \(240, 180\) on frame 60 hits no surface.*; click where"):
+        session.mask_at(prompt("mug", "mug", PromptPoint(frame=60, x=240.0, y=180.0, label=1)), 60)
+
+
+def test_a_second_click_on_what_has_no_depth_does_not_lose_the_object(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = (click_on(boxes[0], (1.06, -0.36, height), frame) for height, frame in ((1.0, 60), (1.05, 70)))
+    once = session.mask_at(prompt("carton", "box", first), 60)
+    seen = Scene.pick
+    monkeypatch.setattr(Scene, "pick", lambda self, frame, x, y: None if frame == 70 else seen(self, frame, x, y))
+    assert mask_iou(once, session.mask_at(prompt("carton", "box", first, second), 60)) > 0.9
+
+
+def test_a_point_is_judged_by_the_ray_of_its_own_click(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An appliance's first clicks may hit nothing; where it is cut as a thing, the others still belong to their points."""
+    blind, first, second = (click_on(boxes[0], (1.06, -0.36, 1.0), frame) for frame in (50, 60, 70))
+    pick, behind = Scene.pick, {70: np.array([1.06, -0.6, 1.4])}  # the third click shows what is behind the thing
+    monkeypatch.setattr(
+        Scene, "pick", lambda self, frame, x, y: None if frame == 50 else behind.get(frame, pick(self, frame, x, y))
+    )
+    rays = []
+    monkeypatch.setattr(Scene, "ray", lambda self, frame, x, y: rays.append(frame) or (np.zeros(3), np.array([0.0, 1.0, 0.0])))
+    _, hits, _ = session._clicked(prompt("oven_1", "microwave", blind, first, second))
+    _on_thing(session, hits, ThingConfig(radius_m=0.05))
+    assert hits.clicks == (first, second)
+    assert rays == [70]
+
+
+def test_an_object_that_no_frame_sees_is_an_error(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    door = prompt("door_a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
+    strict = dataclasses.replace(session, config=dataclasses.replace(session.config, least_area_px=10**9))
+    with pytest.raises(ObjectNotSeen, match="door_a: seen in 0 of 14 frames"):
+        strict.track(door)
+
+
+def test_a_frame_that_does_not_exist_is_refused(session: GeometricSession, boxes: Boxes) -> None:
+    door = prompt("door_a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
+    with pytest.raises(PromptError, match=r"door_a: frame 7 found, a frame of 0\.\.130 expected"):
+        session.mask_at(door, 7)

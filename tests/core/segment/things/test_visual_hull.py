@@ -1,0 +1,109 @@
+"""A small thing's visual hull and silhouettes, and the support it stands on, in a kitchen of boxes whose carton is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.silhouettes import small_mask, support_offset, usual_shift
+from r2c2r_core.segment.things.thing import Thing, ThingConfig, find_thing, support_height, thing_mask
+from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
+from tests.core.segment.conftest import Truth
+
+LOW, HIGH = np.array([1.0, -0.36, 0.90]), np.array([1.12, -0.26, 1.10])  # the carton
+ON_IT = np.array([[1.06, -0.36, 1.0]])
+NO_POINTS = np.zeros((0, 3))
+CARTON = ThingConfig(radius_m=0.12)
+Boxes = tuple[Capture, Truth]
+
+
+@pytest.fixture(scope="module")
+def scene(session: GeometricSession) -> Scene:
+    return session.scene
+
+
+@pytest.fixture(scope="module")
+def hull(scene: Scene) -> Thing:
+    found = find_small(scene, ON_IT, NO_POINTS, CARTON, ())
+    assert found is not None
+    return found
+
+
+def test_the_hull_is_the_carton_to_a_centimetre_and_stands_on_the_worktop(hull: Thing) -> None:
+    low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
+    np.testing.assert_allclose(low[[0, 2]], LOW[[0, 2]], atol=0.012)
+    np.testing.assert_allclose(high[[0, 2]], HIGH[[0, 2]], atol=0.012)
+    assert low[1] == pytest.approx(LOW[1], abs=0.03)  # carving spares 22 mm before what coarse depth shows
+    assert high[1] < LOW[1] + 1.5 * (HIGH[0] - LOW[0])  # no camera sees its back: no deeper than wide, and the slack
+    assert hull.support_z_m == pytest.approx(0.90, abs=0.005)
+
+
+def test_the_silhouettes_of_the_hull_are_the_cartons_masks(hull: Thing, scene: Scene, boxes: Boxes) -> None:
+    truth = boxes[1]["carton"]
+    overlaps = []
+    for frame in scene.frames:
+        mask, share = small_mask(hull, scene, frame)
+        assert 0.0 <= share <= 1.0
+        if truth[frame.index].sum() > 300:
+            overlaps.append(mask_iou(mask, truth[frame.index]))
+    assert len(overlaps) > 5
+    assert np.mean(overlaps) > 0.9
+
+
+def test_the_first_look_agrees_with_the_hull(hull: Thing, scene: Scene) -> None:
+    glimpsed = glimpse_small(scene, ON_IT, NO_POINTS, CARTON, ())
+    assert glimpsed is not None
+    np.testing.assert_allclose(glimpsed.vertices.mean(axis=0)[[0, 2]], hull.vertices.mean(axis=0)[[0, 2]], atol=0.02)
+
+
+def test_where_depth_shows_nothing_there_is_no_hull(scene: Scene) -> None:
+    in_the_air = np.array([[1.06, -0.80, 1.5]])
+    assert find_small(scene, in_the_air, NO_POINTS, CARTON, ()) is None
+
+
+@pytest.mark.parametrize("lift_m", [-0.02, -0.01, 0.0, 0.01, 0.02])
+def test_a_frame_whose_pose_is_off_in_height_says_by_how_much(scene: Scene, lift_m: float) -> None:
+    frame = scene.frame(70)
+    lifted = dataclasses.replace(frame, world_from_camera=Rigid3(np.eye(3), np.array([0, 0, lift_m])) @ frame.world_from_camera)
+    offset = support_offset(scene, lifted, 0.90, np.array([1.06, -0.31, 1.0]))
+    assert offset == pytest.approx(lift_m, abs=0.003)
+
+
+def test_outlines_lie_on_colour_edges_where_poses_are_right_and_off_them_where_not(hull: Thing, scene: Scene) -> None:
+    views = [frame for frame in scene.frames if 40 <= frame.index <= 100]
+    assert usual_shift(hull, scene, views) < 0.004
+
+    def aside(frame: Frame) -> Frame:
+        return dataclasses.replace(
+            frame, world_from_camera=Rigid3(np.eye(3), np.array([0.012, 0, 0])) @ frame.world_from_camera
+        )
+
+    assert usual_shift(hull, scene, [aside(frame) for frame in views]) > 0.007
+
+
+def test_a_thing_stands_on_the_highest_level_surface_around_it_or_on_the_floor(scene: Scene) -> None:
+    assert support_height(scene, ON_IT, CARTON) == pytest.approx(0.90, abs=0.005)
+    assert support_height(scene, np.add(ON_IT, [0.0, 0.05, 0.08]), CARTON) == pytest.approx(0.90, abs=0.005)
+    assert support_height(scene, ON_IT, dataclasses.replace(CARTON, on_floor=True)) == 0.0
+    below_the_floor = np.array([[1.06, -0.36, -0.5]])
+    assert support_height(scene, below_the_floor, CARTON) is None
+
+
+def test_the_surface_found_is_the_cartons_and_so_is_its_mask(scene: Scene, boxes: Boxes) -> None:
+    thing = find_thing(scene, ON_IT, NO_POINTS, CARTON)
+    assert thing is not None
+    slack = 0.02  # the fused surface has voxels of 12 mm
+    assert (thing.vertices > LOW - slack).all()
+    assert (thing.vertices < HIGH + slack).all()
+    mask, share = thing_mask(thing, scene, scene.frame(70), refine=False)
+    assert mask_iou(mask, boxes[1]["carton"][70]) > 0.8
+    assert share > 0.8
+
+
+def test_clicks_far_from_any_surface_find_no_thing(scene: Scene) -> None:
+    assert find_thing(scene, np.array([[0.9, -1.6, 1.9]]), NO_POINTS, CARTON) is None
