@@ -36,6 +36,9 @@ class Files(Protocol):
     def open(self, name: str) -> BinaryIO:
         """The content as a stream that can seek; raises CaptureError when it cannot be read."""
 
+    def place(self, name: str) -> tuple[str, ...]:
+        """Where the content lies, for another process: an absolute path, and the member's name where that is a zip."""
+
     def sha256(self, names: Iterable[str]) -> str:
         """Identity of the recording: of the zip itself, or of the named files with their sizes and content."""
 
@@ -77,13 +80,15 @@ class FolderFiles:
 
     def open(self, name: str) -> BinaryIO:
         """The content as a stream; raises CaptureError when it cannot be read."""
-        path = self.source / name
-        if not is_below(path, self.source):
-            raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
+        path = self._below(name)
         try:
             return path.open("rb")
         except OSError as problem:
             raise CaptureError(f"{path}: {problem.strerror or problem}", hint="check that the file can be read") from problem
+
+    def place(self, name: str) -> tuple[str, ...]:
+        """The file's path; raises CaptureError when it is a link that leaves the folder."""
+        return (str(self._below(name).absolute()),)
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the sorted names with sizes and content."""
@@ -94,6 +99,12 @@ class FolderFiles:
                 while chunk := stream.read(1 << 20):
                     digest.update(chunk)
         return digest.hexdigest()
+
+    def _below(self, name: str) -> Path:
+        path = self.source / name
+        if not is_below(path, self.source):
+            raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
+        return path
 
 
 class ZipFiles:
@@ -132,6 +143,10 @@ class ZipFiles:
             return cast(BinaryIO, self._zip.open(name))
         except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as problem:
             raise self._damaged(name, problem) from problem
+
+    def place(self, name: str) -> tuple[str, ...]:
+        """The zip's path and the member."""
+        return str(self.source.absolute()), name
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the zip file itself."""
@@ -186,6 +201,10 @@ class SubFiles:
     def open(self, name: str) -> BinaryIO:
         """The content as a stream."""
         return self._files.open(self._prefix + name)
+
+    def place(self, name: str) -> tuple[str, ...]:
+        """Where the content lies."""
+        return self._files.place(self._prefix + name)
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the underlying files."""

@@ -1,25 +1,30 @@
 """Frames of a video, decoded once from front to back: a film cannot be entered anywhere without decoding what precedes it.
 
-FFmpeg guesses a format from the content, and among its formats are lists of other files and descriptions of network streams,
-which it opens. So only an MP4 (ISO 14496-12) reaches it, and it is told to know no other format.
+FFmpeg never runs in this process, but in one of its own that a damaged video may end (decoder.py); it is given MP4 only (ISO
+14496-12).
 """
 
-import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
 import weakref
-from typing import Any, cast
+from contextlib import suppress
+from typing import Any
 
-import cv2
+import numpy as np
 
 from r2c2r_core.arrays import Image
-from r2c2r_core.errors import CaptureError
+from r2c2r_core.errors import CaptureError, EnvironmentProblem
 from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.decoder import DECODED, NUMBER, OPENED
 from r2c2r_core.ingest.readers.images import MAX_PIXELS
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 
-_FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # one demuxer of FFmpeg, under all its names
 _FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # QuickTime files may begin with any
-# Read by OpenCV each time it opens a video, and only from here. Its tracks may not lie in other files either
-os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"format_whitelist;{_FORMATS}|protocol_whitelist;none|enable_drefs;0"
+_AGAIN = "export the recording again, or copy it again"
+_DECODER = (sys.executable, "-m", "r2c2r_core.alone", "r2c2r_core.ingest.readers.decoder")
 
 
 class Video:
@@ -28,55 +33,98 @@ class Video:
     def __init__(self, files: Files, name: str) -> None:
         """Raises CaptureError when its first frame cannot be decoded."""
         self.name = name
-        self._files = files
-        self._release: weakref.finalize | None = None
-        self._require_mp4()
-        self._restart()
-        self.size = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(self._capture.get(cv2.CAP_PROP_FRAME_HEIGHT)))
-        if not self._capture.isOpened() or self.size[0] * self.size[1] > MAX_PIXELS:
-            raise CaptureError(
-                f"{files.source}/{name}: not a readable video", hint="export the recording again, or copy it again"
-            )
+        self._path = f"{files.source}/{name}"
+        self._require_mp4(files)
+        self._process, self._channel = _started(files, name)
+        self._answers = self._channel.makefile("rb")
+        self._end = weakref.finalize(self, _end, self._process, self._channel)
+        opened, codec, width, height = self._answer(OPENED)
+        self.size = (width, height)
+        if not opened or not 0 < width * height <= MAX_PIXELS:
+            raise CaptureError(f"{self._path}: not a readable video", hint=_AGAIN)
         try:
             self.frame(0)
         except UnreadableFrame as problem:
+            named = codec.decode("latin-1").strip("\0 ") or "unknown"
             raise CaptureError(
-                f"{files.source}/{name}: OpenCV's FFmpeg cannot decode the codec '{self._codec()}'",
+                f"{self._path}: OpenCV's FFmpeg cannot decode the codec '{named}'",
                 hint="install opencv-python-headless from PyPI, or convert the video: ffmpeg -i rgb.mp4 -c:v libx264 -crf 14",
             ) from problem
 
     def frame(self, number: int) -> Image:
-        """The frame of that number, RGB, as the sensor saw it (a rotation mark is not obeyed); raises UnreadableFrame."""
-        if number < self._next - 1:
-            self._restart()
-        while self._next <= number:
-            if not self._capture.grab():
-                raise UnreadableFrame(f"{self.name}: ends or is damaged after {self._next} frames, frame {number} was wanted")
-            self._next += 1
-        decoded, bgr = self._capture.retrieve()
-        if not decoded:
-            raise UnreadableFrame(f"{self.name}: frame {number} cannot be decoded")
-        return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+        """The frame of that number, RGB, as the sensor saw it (a rotation mark is not obeyed).
 
-    def _require_mp4(self) -> None:
-        with self._files.open(self.name) as stream:
+        Raises UnreadableFrame, and CaptureError when the decoder died of the video.
+        """
+        with suppress(OSError):  # of one that died: so will the answer say
+            self._channel.sendall(NUMBER.pack(number))
+        known, width, height = self._answer(DECODED)
+        if width * height > MAX_PIXELS:
+            self._end()
+            raise CaptureError(
+                f"{self._path}: frame {number} has {width}x{height} pixels, {self.size} were expected", hint=_AGAIN
+            )
+        if not width * height and known <= number:
+            raise UnreadableFrame(f"{self.name}: ends or is damaged after {known} frames, frame {number} was wanted")
+        if not width * height:
+            raise UnreadableFrame(f"{self.name}: frame {number} cannot be decoded")
+        pixels = np.zeros((height, width, 3), np.uint8)
+        self._receive(pixels.reshape(-1).data)
+        return pixels
+
+    def _answer(self, shape: struct.Struct) -> tuple[Any, ...]:
+        said = bytearray(shape.size)
+        self._receive(memoryview(said))
+        return shape.unpack(said)
+
+    def _receive(self, into: memoryview) -> None:
+        """Fill it with what the decoder says next; raises CaptureError when that has died."""
+        try:
+            if self._answers.readinto(into) == len(into):
+                return
+        except ConnectionError:
+            pass
+        raise self._died()
+
+    def _died(self) -> CaptureError:
+        self._channel.close()
+        code = self._process.wait()
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return CaptureError(f"{self._path}: its decoder ended with {how}, the video is damaged", hint=_AGAIN)
+
+    def _require_mp4(self, files: Files) -> None:
+        with files.open(self.name) as stream:
             head = stream.read(8)
         if head[4:] not in _FIRST_BOXES:
             raise CaptureError(
-                f"{self._files.source}/{self.name}: begins with {head!r}, an MP4 was expected",
-                hint="export the recording again, or copy it again",
+                f"{self._path}: begins with {head!r}, an MP4 was expected",
+                hint=_AGAIN,
             )
 
-    def _restart(self) -> None:
-        stream = self._files.open(self.name)
-        # Never by path: a file in a zip has none. Any io.BufferedIOBase serves, which OpenCV's stubs do not say
-        self._capture = cv2.VideoCapture(cast(Any, stream), cv2.CAP_FFMPEG, [])
-        if self._release is not None:
-            self._release()
-        self._release = weakref.finalize(self, stream.close)
-        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
-        self._next = 0
 
-    def _codec(self) -> str:
-        code = int(self._capture.get(cv2.CAP_PROP_FOURCC))
-        return "".join(chr(code >> shift & 0xFF) for shift in (0, 8, 16, 24)).strip("\0 ") or "unknown"
+def _started(files: Files, name: str) -> tuple["subprocess.Popen[bytes]", socket.socket]:
+    """A process that decodes the video, and the socket to it."""
+    ours, theirs = socket.socketpair()
+    with theirs:
+        command = (*_DECODER, str(theirs.fileno()), *files.place(name))
+        try:
+            process = subprocess.Popen(
+                command,
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        except OSError as error:
+            ours.close()
+            raise EnvironmentProblem(
+                f"no process can be started to decode {name} ({error})",
+                hint="end other programs, or raise the limit of processes",
+            ) from error
+    return process, ours
+
+
+def _end(process: "subprocess.Popen[bytes]", channel: socket.socket) -> None:
+    channel.close()
+    process.kill()
+    process.wait()

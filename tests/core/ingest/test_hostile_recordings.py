@@ -1,23 +1,30 @@
 """Recordings made to harm: what a file may make the reader open, wait for, or count."""
 
+import contextlib
 import io
 import os
 import shutil
+import signal
+import subprocess
+import sys
+import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
+import psutil
 import pytest
 
 from r2c2r_core.errors import CaptureError
-from r2c2r_core.ingest.readers import video
+from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.readers import decoder, video
 from r2c2r_core.ingest.readers.images import image_size
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 
-from .tiny import TinyRoom, jpeg, write_r3d
+from .tiny import TinyRoom, jpeg, write_r3d, zip_folder
 from .tiny_formats import HEVC, write_nerfstudio, write_stray
 
 ROOM = TinyRoom(count=3)
@@ -45,7 +52,57 @@ def test_ffmpeg_itself_knows_no_format_that_names_other_files(tmp_path: Path, mo
     }
     assert list(opened.values()) == [False, True]
     assert "format_whitelist" in os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"]
-    assert video.Video is not None
+    assert decoder.OPENED is not None
+
+
+def test_a_damaged_video_in_a_zip_ends_its_decoder_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What OpenCV reads from Python may fail there, at the end of a member with another checksum: it dereferences NULL then."""
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    scan = zip_folder(write_stray(tmp_path / "scan", ROOM), tmp_path / "scan.zip")
+    content, film = bytearray(scan.read_bytes()), HEVC.read_bytes()
+    content[content.index(film) + len(film) - 10] ^= 0xFF
+    scan.write_bytes(content)
+    with pytest.raises(CaptureError, match=r"scan\.zip/rgb\.mp4: its decoder ended with SIG") as caught:
+        open_recording(scan)
+    assert "\n" not in str(caught.value)
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_a_decoder_that_dies_in_the_middle_is_a_damaged_video() -> None:
+    before = children()
+    film = video.Video(FolderFiles(HEVC.parent), HEVC.name)
+    film.frame(3)
+    for process in children() - before:
+        process.kill()
+    with pytest.raises(CaptureError, match=rf"{HEVC.name}: its decoder ended with SIGKILL"):
+        film.frame(4)
+
+
+def children() -> set[psutil.Process]:
+    return set(psutil.Process().children(recursive=True))
+
+
+def test_a_decoder_ends_with_its_video_and_with_whoever_asked(tmp_path: Path) -> None:
+    before = children()
+    film = video.Video(FolderFiles(HEVC.parent), HEVC.name)
+    (ours,) = children() - before
+    del film
+    assert not ours.is_running()
+    asking = f"""
+import psutil, signal
+from pathlib import Path
+from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.readers.video import Video
+film = Video(FolderFiles(Path({str(HEVC.parent)!r})), {HEVC.name!r})
+print(psutil.Process().children()[0].pid, flush=True)
+signal.raise_signal(signal.SIGKILL)
+"""
+    said = subprocess.run([sys.executable, "-c", asking], capture_output=True, text=True, check=False)
+    assert said.returncode == -signal.SIGKILL, said.stderr
+    with contextlib.suppress(psutil.NoSuchProcess):
+        psutil.Process(int(said.stdout)).wait(timeout=30)
 
 
 def test_only_jpeg_and_png_reach_a_decoder() -> None:
