@@ -65,7 +65,7 @@ def measure(sample: Path, capture: Capture, cache: Path, options: argparse.Names
     if not options.warm:
         shutil.rmtree(cache, ignore_errors=True)
         with _timed() as first:
-            open_session(capture, cache)
+            open_session(capture, cache).prepare()
         numbers["prepare"] = first.seconds
     with _timed() as second:
         session = open_session(capture, cache)

@@ -208,7 +208,8 @@ def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
     progress = Progress(
         lambda _, fraction, text: _say(state="preparing", fraction=round(fraction, 3), text=text), stage="segment"
     )
-    session = open_session(capture, work.cache, segmenter, progress=progress)
+    session = open_session(capture, work.cache, segmenter, progress=progress.part(0.0, 0.4))
+    session.prepare(progress=progress.part(0.4, 1.0))
     return Desk(session, capture, width)
 
 

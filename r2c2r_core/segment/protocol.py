@@ -48,6 +48,9 @@ class SegmentSession(Protocol):
         None when `stream` brings its first mask as soon, or that frame does not show the object.
         """
 
+    def prepare(self, *, progress: Progress = SILENT) -> None:
+        """Compute and keep in the cache what a click anywhere may need: for whoever will wait at every click."""
+
     def prefetch(self) -> Iterator[None]:
         """Load what clicks will need, bit by bit, as far as memory allows; for while nobody waits."""
 

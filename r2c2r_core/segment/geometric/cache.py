@@ -1,10 +1,12 @@
 """Disk cache of a prepared capture, in the project's own codec; a damaged file counts as absent."""
 
+import fcntl
 import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from r2c2r_core.codec import decode_noun, encode_noun
 from r2c2r_core.segment.planes import PlaneRegion
@@ -16,22 +18,39 @@ from r2c2r_core.segment.runs.run import Run
 
 T = TypeVar("T")
 
+_UNREADABLE = (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile)
 _STORED = (Cell, Evidence, GridHandle, PlaneGrid, PlaneRegion, Relief, Run)
 
 
 def kept(path: Path, compute: Callable[[], T]) -> T:
-    """What `path` holds, else the computed value, stored there. The folder's name must say what it was computed from."""
-    try:
-        found: T = decode_noun(path.read_bytes(), _STORED)[0]
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile):
+    """What `path` holds, else the computed value, stored there. The folder's name must say what it was computed from.
+
+    Who else asks for it meanwhile, in this process or another, waits for it rather than computing it too.
+    """
+    with suppress(*_UNREADABLE):
+        return _read(path)
+    with _alone_at(path):
+        with suppress(*_UNREADABLE):
+            return _read(path)
         found = compute()
         _write(path, encode_noun(found, {}, _STORED))
-    return found
+        return found
+
+
+def _read(path: Path) -> Any:
+    return decode_noun(path.read_bytes(), _STORED)[0]
+
+
+@contextmanager
+def _alone_at(path: Path) -> Iterator[None]:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.with_name(f".{path.name}.lock").open("w") as handle:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
 
 
 def _write(path: Path, content: bytes) -> None:
     """Readers see the whole file or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     temporary.write_bytes(content)
     temporary.replace(path)

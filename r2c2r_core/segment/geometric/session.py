@@ -38,18 +38,16 @@ class GeometricSegmenter(Segmenter):
     """Needs no weights and no extra."""
 
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
-        """Prepare a capture: see the surface from every frame, find its vertical planes, cut the furniture runs."""
+        """Prepare a capture: see the surface from every frame, find its vertical planes."""
         folder = cache / f"geometric-{_cache_key(capture, config)}"
         _forget_others(folder)
         _import_heavy()
-        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.3))
-        progress.at(0.3, "looking for flat upright parts")
+        scene = prepare_scene(capture, folder, progress=progress.part(0.0, 0.9))
+        progress.at(0.9, "looking for flat upright parts")
         centres = np.stack([frame.world_from_camera.translation for frame in capture.frames])
         planes = kept(folder / "planes.noun", lambda: find_planes(capture.surface, centres))
-        session = GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
-        session.cut_runs(progress=progress.part(0.35, 1.0))
         progress.at(1.0, f"{len(planes)} flat upright parts found")
-        return session
+        return GeometricSession(scene=scene, planes=planes, config=config, folder=folder)
 
 
 @dataclass(slots=True, eq=False)
@@ -146,8 +144,8 @@ class GeometricSession:
             self._runs[key] = kept(path, lambda: make_run(region, self.scene, cell_m, frames, margin_m))
         return self._runs[key]
 
-    def cut_runs(self, *, progress: Progress = SILENT) -> None:
-        """Cut the runs of all planes, and those around planes that may be a part of an appliance, before any click."""
+    def prepare(self, *, progress: Progress = SILENT) -> None:
+        """Cut the runs of all planes, and those around planes that may be a part of an appliance."""
         tasks = [(region, 0.0) for region in self.planes]
         tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
         for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):

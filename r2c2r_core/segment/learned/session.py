@@ -94,6 +94,10 @@ class LearnedSession:
         """None: the model's own first mask comes first in `stream`, and the model is not for two threads."""
         return None
 
+    def prepare(self, *, progress: Progress = SILENT) -> None:
+        """What measuring and proposals need."""
+        self.prepared.prepare(progress=progress)
+
     def prefetch(self) -> Iterator[None]:
         """Decode images."""
         return self.prepared.prefetch()
