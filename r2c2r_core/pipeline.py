@@ -12,6 +12,7 @@ from r2c2r_core.errors import StageError
 from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.candidates import Plan, make_candidates, select_candidate
 from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.ingest.above import calibrations_beside
 from r2c2r_core.ingest.stage import level_scan, read_recording
 from r2c2r_core.ledger import Kept, Ledger, Reached, Shared, Stage, aside
 from r2c2r_core.model.capture import Capture
@@ -129,12 +130,18 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
 
 def read_room(request: Request, run: Ledger) -> Kept[Capture]:
     """The recording, decoded once, and levelled: what a person says of the room moves it and reads nothing again."""
-    config, source = request.config.ingest, Kept(request.source, file_key(request.source))
+    config, source = request.config.ingest, Kept(request.source, recording_key(request.source))
     frames = run.work.store(content_key(source_key("ingest"), source.key, config))
     scan = run.one("ingest", read_recording, source, aside(frames), config, name="recording", span=(0.0, 0.95))
     capture = run.one("ingest", level_scan, scan, request.overrides.room, config, span=(0.95, 1.0))
     run.work.keep_frames(frames.name)
     return capture
+
+
+def recording_key(source: Path) -> str:
+    """Key of a recording, with the calibrations beside its folder that it may borrow."""
+    beside = [file_key(path) for path in calibrations_beside(source)]
+    return content_key(file_key(source), beside) if beside else file_key(source)
 
 
 def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> dict[str, Kept[MaskTrack]]:

@@ -55,11 +55,12 @@ def open_files(source: Path) -> Files:
 
 
 class FolderFiles:
-    """The files below a folder; links that leave it are refused."""
+    """The files below a folder, or only those at its top; links that leave it are refused."""
 
-    def __init__(self, source: Path) -> None:
+    def __init__(self, source: Path, *, deep: bool = True) -> None:
         self.source = source
-        found = (path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file())
+        paths = source.rglob("*") if deep else source.glob("*")
+        found = (path.relative_to(source).as_posix() for path in paths if path.is_file())
         self._names = frozenset(islice((name for name in found if not _is_clutter(name)), _MAX_MEMBERS + 1))
         if len(self._names) > _MAX_MEMBERS:
             raise CaptureError(f"{source}: more than {_MAX_MEMBERS} files", hint="choose the folder of one recording")

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.above import WithAbove, borrowed_by, with_folder_above
 from r2c2r_core.ingest.files import Files, SubFiles, open_files, top_folders
 from r2c2r_core.ingest.readers import (
     arkitscenes,
@@ -51,16 +52,23 @@ def readers() -> tuple[Reader, ...]:
 def open_recording(source: Path) -> Recording:
     """The recording at `source`, its format recognised from what it holds; raises CaptureError."""
     files = open_files(source)
-    outer, inner = _roots(files)
+    outer, inner = _roots(with_folder_above(files, source))
     for root in outer:
         if reader := _reader_of(root):
-            return upright(plausible(reader.open(root)))
+            return _opened(reader, root)
     if matches := {folder: reader for folder, root in inner.items() if (reader := _reader_of(root))}:
         folder = next(iter(matches))
-        recording = upright(plausible(matches[folder].open(inner[folder])))
+        recording = _opened(matches[folder], inner[folder])
         choice = f"{len(matches)} recordings lie here, {folder} is read: {', '.join(list(matches)[:6])}"
         return replace(recording, notices=(choice, *recording.notices)) if len(matches) > 1 else recording
     raise _unknown(source, files, [*outer, *inner.values()])
+
+
+def _opened(reader: Reader, root: Files) -> Recording:
+    recording = upright(plausible(reader.open(root)))
+    borrowed = borrowed_by(root, recording.names)
+    told = (f"the calibration is that of {borrowed[0]}, one folder up",) if borrowed else ()
+    return replace(recording, notices=(*told, *recording.notices))
 
 
 def _reader_of(root: Files) -> Reader | None:
@@ -88,8 +96,8 @@ def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
     """The top and on down to the first fork (a zip of a folder has that on top), and the folders below the fork by name."""
     outer: list[Files] = [files]
     while len(folders := top_folders(outer[-1])) == 1 and len(outer) < _DEEPEST:
-        outer.append(SubFiles(outer[-1], folders[0]))
-    return outer, {folder: SubFiles(outer[-1], folder) for folder in folders[:_WIDEST]}
+        outer.append(WithAbove(SubFiles(outer[-1], folders[0]), outer[-1]))
+    return outer, {folder: WithAbove(SubFiles(outer[-1], folder), outer[-1]) for folder in folders[:_WIDEST]}
 
 
 def _nearest_miss(roots: list[Files]) -> tuple[Reader, tuple[str, ...]] | None:

@@ -6,6 +6,7 @@ calibration is an ORB-SLAM settings file. Clocks are associated within 20 ms, po
 
 import re
 from functools import partial
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_q
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
+_NAMED_IN = ("groundtruth.txt", "rgb.txt", "depth.txt")
 _APART_S = 0.02
 _GAP_S = 0.1  # poses farther apart than this are not interpolated
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -123,7 +125,11 @@ def _image_list(files: Files, name: str) -> tuple[dict[int, tuple[float, str]], 
 
 
 def _calibration(files: Files) -> _Calibration:
-    """From a settings file beside the images, else from the sequence's name, else the generic Kinect's, with a notice."""
+    """From a settings file beside the images, else from the sequence's name, else the generic Kinect's, with a notice.
+
+    The sequence is named in the comments that head its lists (`# file: 'rgbd_dataset_freiburg1_rpy.bag'`), often in its
+    folder's name as well; folders are renamed, so the lists are asked first.
+    """
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith((".yaml", ".yml"))):
         text = files.read(name).decode("utf-8", errors="replace")
         found = {k: float(v) for k, v in re.findall(rf"^\s*(?:Camera1?\.)?(fx|fy|cx|cy)\s*:\s*({_NUMBER})", text, re.MULTILINE)}
@@ -131,11 +137,17 @@ def _calibration(files: Files) -> _Calibration:
             factor = re.search(rf"^\s*(?:RGBD\.)?Dep[t]?h?MapFactor\s*:\s*({_NUMBER})", text, re.MULTILINE)
             units = float(factor.group(1)) if factor and float(factor.group(1)) > 1.0 else 5000.0
             return _Calibration((found["fx"], found["fy"], found["cx"], found["cy"]), units, None, name)
-    for name, camera in _KNOWN_CAMERAS.items():
-        if name in str(files.source).lower():
-            notice = None if name == "freiburg3" else f"{name}'s colour images are distorted; the lens is treated as ideal"
-            return _Calibration(camera, 5000.0, notice, None)
+    told = (*(_heading(files, name) for name in _NAMED_IN if name in files.names()), str(files.source))
+    for name in (name for text in told for name in _KNOWN_CAMERAS if name in text.lower()):
+        notice = None if name == "freiburg3" else f"{name}'s colour images are distorted; the lens is treated as ideal"
+        return _Calibration(_KNOWN_CAMERAS[name], 5000.0, notice, None)
     return _Calibration(_GENERIC_CAMERA, 5000.0, "no calibration was found: the generic Kinect's 525 px is assumed", None)
+
+
+def _heading(files: Files, name: str) -> str:
+    """The comments before a list's first line."""
+    lines = files.read(name).decode("utf-8", errors="replace").splitlines()
+    return "\n".join(takewhile(lambda line: not line.strip() or line.lstrip().startswith("#"), lines))
 
 
 READER = Reader(

@@ -339,7 +339,62 @@ def test_nerfstudio_fisheyes_are_refused_and_colmaps_world_has_no_up(tmp_path):
     assert open_recording(folder).up_capture is None
 
 
+# TUM RGB-D
+
+
+def test_tums_sequence_is_known_by_the_comments_that_head_its_lists(tmp_path):
+    folder = write_tum(tmp_path / "t", replace(SMALL, rgb_size=(640, 480), focal=535.0))
+    (folder / "settings.yaml").unlink()
+    assert told(open_recording(folder), "generic Kinect")
+    for name, heading in (("rgb.txt", "color images"), ("groundtruth.txt", "ground truth trajectory")):
+        lists = (folder / name).read_text()
+        (folder / name).write_text(f"# {heading}\n# file: 'rgbd_dataset_freiburg3_cabinet.bag'\n{lists}")
+        recording = open_recording(folder)
+        assert recording.frames[0].rgb_camera.fx == 535.4
+        assert not told(recording, "generic Kinect")
+        (folder / name).write_text(lists)
+    renamed = folder.rename(tmp_path / "freiburg1_kitchen")
+    lists = (renamed / "rgb.txt").read_text()
+    assert open_recording(renamed).frames[0].rgb_camera.fx == 517.3
+    (renamed / "rgb.txt").write_text(f"# file: 'rgbd_dataset_freiburg2_desk.bag'\n{lists}")
+    assert open_recording(renamed).frames[0].rgb_camera.fx == 520.9  # what the recording says, before its folder's name
+
+
 # All of them
+
+
+@pytest.mark.parametrize(
+    ("write", "name", "top"),
+    [
+        (write_tum, "settings.yaml", ""),
+        (write_seven_scenes, "intrinsics_color.txt", ""),
+        (write_threedmatch, "camera-intrinsics.txt", "seq-01"),
+    ],
+)
+def test_a_calibration_one_folder_up_is_taken_and_told(write, name, top, tmp_path):
+    folder = write(tmp_path / "scene" / "made", SMALL)
+    (folder / name).rename(tmp_path / "scene" / name)
+    source = folder / top
+    if top:  # of 3DMatch, the sequence alone: its scene's calibration is then one folder up
+        source = (folder / top).rename(tmp_path / "scene" / top)
+    recording = open_recording(source)
+    assert recording.frames[0].rgb_camera == ROOM.camera
+    assert told(recording, f"the calibration is that of {name}, one folder up")
+    digest = recording.files.sha256(recording.names)
+    calibration = tmp_path / "scene" / name
+    calibration.write_text(calibration.read_text() + "\n")
+    assert open_recording(source).files.sha256(recording.names) != digest  # another calibration is another recording
+    if not top:
+        (folder / "made.txt").write_text("")
+        zipped = zip_folder(tmp_path / "scene", tmp_path / "scene.zip", top="scene/")
+        assert open_recording(zipped).frames[0].rgb_camera == ROOM.camera
+
+
+def test_of_two_calibrations_one_folder_up_none_is_taken(tmp_path):
+    folder = write_tum(tmp_path / "scene" / "made", replace(SMALL, rgb_size=(640, 480), focal=535.0))
+    (folder / "settings.yaml").rename(tmp_path / "scene" / "TUM1.yaml")
+    (tmp_path / "scene" / "TUM3.yaml").write_bytes((tmp_path / "scene" / "TUM1.yaml").read_bytes())
+    assert told(open_recording(folder), "generic Kinect")
 
 
 @pytest.mark.parametrize(
