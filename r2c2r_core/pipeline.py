@@ -1,5 +1,6 @@
 """READ FIRST: one recording and a few clicks in, an articulated scene out."""
 
+import logging
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -25,6 +26,7 @@ from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.overrides import NO_OVERRIDES
 from r2c2r_core.pool import Pool, usual_workers
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.contradictions import find_contradictions
 from r2c2r_core.segment.prompts import check_prompts
 from r2c2r_core.segment.stage import SEGMENTERS, open_session, track_object
 from r2c2r_core.sources import source_key
@@ -32,6 +34,8 @@ from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
 from r2c2r_core.synthesize.stage import build_scene
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace, content_key, file_key
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +101,10 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
     if run.until != "ingest":  # a recording may be looked at before anyone clicked
         check_prompts(capture.value, request.prompts)
     tracks = segment_objects(request, run, capture)
+    masks = {name: track.value for name, track in tracks.items()}
+    contradictions = find_contradictions(masks, request.prompts.objects, capture.value.room.walls)
+    for found in contradictions:  # now, not after minutes of computing
+        _log.warning("%s", found.line)
     candidates = generate_objects(request, run, capture, tracks)
     corrections = {name: said.of(name) for name in candidates}
     choices = run.decide("generate", select_candidate, candidates, corrections, config.generate.rule)
@@ -120,6 +128,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
         scene=fitted.value,
         stages=_stage_runs(request, tuple(run.seconds)),
         failures=dict(run.failures),
+        contradictions=contradictions,
     )
     if not work.bundle.exists():
         work.forget("export", "scene")

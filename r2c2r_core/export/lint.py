@@ -10,6 +10,7 @@ from r2c2r_core.export.rules.agreement import check_agreement
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.inertia import check_inertia
 from r2c2r_core.export.rules.joints import check_joints
+from r2c2r_core.export.rules.likeness import check_likeness
 from r2c2r_core.export.rules.meshes import check_meshes
 from r2c2r_core.export.rules.structure import check_structure
 from r2c2r_core.model.report import Finding
@@ -25,5 +26,6 @@ def lint(folder: Path) -> tuple[Finding, ...]:
         *check_inertia(urdf, files),
         *check_meshes(urdf, files),
         *check_agreement(urdf, files),
+        *check_likeness(files),
     ]
     return tuple(sorted(findings, key=lambda f: f.severity))

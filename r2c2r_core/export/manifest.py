@@ -39,6 +39,10 @@ def manifest_of(
         "objects": [
             _object_entry(reconstruction, plan, item, (fits or {}).get(item.name)) for item in reconstruction.scene.objects
         ],
+        "contradictions": [
+            {"rule": found.rule, "objects": list(found.objects), "message": found.message, "mend": found.mend}
+            for found in reconstruction.contradictions
+        ],
         "stages": [{"name": run.name, "backend": run.backend, "config": _plain(run.config)} for run in reconstruction.stages],
     }
 
@@ -110,6 +114,7 @@ def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
         "origin": _plain(item.world_from_object.apply(joint.origin_object[None])[0]),
         "lower": _plain(joint.lower),
         "upper": _plain(joint.upper),
+        "uncut": _plain(joint.uncut),
         "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
         "confidence": _plain(joint.confidence),
     }

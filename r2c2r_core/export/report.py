@@ -8,7 +8,7 @@ from typing import Any
 from r2c2r_core.export.alone import ALLOWED_DRIFT_M
 from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
-from r2c2r_core.export.rules.table import RULES, SIMULATION_RULES
+from r2c2r_core.export.rules.table import EVERY_RULE
 from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import formats
 from r2c2r_core.model.report import Certificate
@@ -118,14 +118,13 @@ def _headline(manifest: dict[str, Any], certificate: dict[str, Any]) -> str:
 def _findings(findings: list[dict[str, Any]]) -> str:
     if not findings:
         return "<h2>Findings</h2><p>The linter and the simulation found nothing to complain about.</p>"
-    protects = RULES | SIMULATION_RULES
     by_rule: dict[str, list[dict[str, Any]]] = {}
     for found in findings:
         by_rule.setdefault(found["rule"], []).append(found)
     rows = [
         [
             _severity(hits[0]["severity"]),
-            f'<strong>{_text(rule)}</strong><br><span class="quiet">{_text(protects[rule].protects)}</span>',
+            f'<strong>{_text(rule)}</strong><br><span class="quiet">{_text(EVERY_RULE[rule].protects)}</span>',
             "<ul>" + "".join(f"<li>{_name(hit['where'])} {_text(hit['message'])}</li>" for hit in hits) + "</ul>",
         ]
         for rule, hits in by_rule.items()

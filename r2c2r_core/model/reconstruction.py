@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import Overrides, Prompts
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.placement import Placement
@@ -32,3 +33,4 @@ class Reconstruction:
     scene: ArticulatedScene
     stages: tuple[StageRun, ...]
     failures: dict[str, str]  # object name -> one line
+    contradictions: tuple[Contradiction, ...] = ()

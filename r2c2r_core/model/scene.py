@@ -75,6 +75,7 @@ class Joint:
     damping: float
     friction: float
     sources: dict[str, Source]  # axis, origin, limits
+    uncut: float | None = None  # the upper limit before an obstacle cut it short; None where nothing did
     confidence: float | None = None  # in the side it is hinged on, 0..1; None where the category leaves no choice
 
 

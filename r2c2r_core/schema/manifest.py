@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, Strict
 
+from r2c2r_core.model.contradiction import ContradictionRule
 from r2c2r_core.model.scene import Source
 from r2c2r_core.schema.document import Document
 from r2c2r_core.schema.prompts import PromptsFilePoint, Version
@@ -49,6 +50,9 @@ class ManifestJoint(Document):
     origin: _Three = Field(description="a point on the axis, in m, in the world")
     lower: float = Field(description="rad or m")
     upper: float = Field(description="rad or m")
+    uncut: float | None = Field(
+        default=None, description="the upper end before an obstacle cut it short; null where nothing did"
+    )
     source: ManifestJointSource = Field(description="where its numbers come from")
     confidence: float | None = Field(description="of the hinge's side, 0 to 1; null where there is no choice")
     blocked_by: list[ManifestBlocker] = Field(default_factory=list, description="what is in its way when it opens")
@@ -150,6 +154,15 @@ class ManifestObject(Document):
     warnings: list[str] = Field(description="what every stage said about it")
 
 
+class ManifestContradiction(Document):
+    """What cannot be true at once of what was clicked."""
+
+    rule: ContradictionRule = Field(description="what kind of contradiction")
+    objects: list[str] = Field(min_length=1, description="names of those concerned")
+    message: str = Field(description="what contradicts what, at which clicks")
+    mend: str = Field(description="what a person can do")
+
+
 class ManifestStage(Document):
     """How a stage was run."""
 
@@ -168,4 +181,7 @@ class Manifest(Document):
     capture: ManifestCapture = Field(description="the recording")
     world_from_capture: _Pose = Field(description="4x4: the levelled world from the recording's own")
     objects: list[ManifestObject] = Field(description="what the scene holds")
+    contradictions: list[ManifestContradiction] = Field(
+        default_factory=list, description="what the segmenter's masks, sizes and places contradict"
+    )
     stages: list[ManifestStage] = Field(description="how each stage was run")

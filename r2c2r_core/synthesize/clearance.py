@@ -43,7 +43,7 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
             if blocker is None:
                 joints.append(joint)
                 continue
-            joints.append(replace(joint, upper=free, sources={**joint.sources, "limits": "inferred"}))
+            joints.append(replace(joint, upper=free, uncut=joint.upper, sources={**joint.sources, "limits": "inferred"}))
             warnings.append(
                 f"{joint.name} opens to {_amount(joint, free)} of {_amount(joint, joint.upper)}: {blocker} is in the way"
             )

@@ -1,4 +1,4 @@
-"""Every rule of the linter, the simulation and the checksums: its name, how bad a hit is, what it protects from."""
+"""Every rule of linter, simulation, likeness to the scan and checksums: its name, how bad a hit is, what it protects from."""
 
 from typing import Literal, NamedTuple
 
@@ -77,6 +77,18 @@ SIMULATION_RULES: dict[str, Rule] = {
     "blocked-by": Rule("warning", "a free-standing thing is in a joint's way"),
 }
 
+LIKENESS_RULES: dict[str, Rule] = {
+    "same-thing": Rule("error", "one thing built twice, each in the other's place"),
+    "masks-overlap": Rule("warning", "two objects of which each was given a part of the other"),
+    "click-disobeyed": Rule("warning", "a mask that is not what a person clicked"),
+    "size-unlikely": Rule("warning", "two doors built as one, or a part of one as a whole"),
+    "in-the-air": Rule("warning", "the upper part of what stands on the floor, built as a whole"),
+    "in-a-wall": Rule("warning", "a drawer that slides out of a bare wall"),
+    "travel-cut": Rule(
+        "warning", "a joint that opens to less than half of what its kind does: something is in the wrong place"
+    ),
+}
+
 SEAL_RULES: dict[str, Rule] = {
     "file-changed": Rule("error", "a file that is not the one that was certified"),
     "file-lost": Rule("error", "a file of the bundle that is gone"),
@@ -88,6 +100,9 @@ UNSAFE = ("mesh-path", "mjcf-path", "usd-path")
 """With one of these, no loader is given the bundle: it would read files of this machine."""
 
 
+EVERY_RULE = RULES | SIMULATION_RULES | LIKENESS_RULES | SEAL_RULES
+
+
 def finding(rule: str, where: str, message: str) -> Finding:
     """A hit of a rule of any table."""
-    return Finding(rule=rule, severity=(RULES | SIMULATION_RULES | SEAL_RULES)[rule].severity, where=where, message=message)
+    return Finding(rule=rule, severity=EVERY_RULE[rule].severity, where=where, message=message)

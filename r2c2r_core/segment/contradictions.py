@@ -1,0 +1,185 @@
+"""Contradictions among the objects' masks, clicks, sizes and places: found in a second, before minutes of computing.
+
+Masks are of what is visible, so a pixel belongs to one object: two that share many claim the same surface.
+Each finding names the clicks and what would mend it; nothing is changed here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from r2c2r_core.arrays import Mask
+from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.kitchen.category import Category, Size
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.kitchen.walls import distances_behind
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.contradiction import Contradiction
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.track import MaskTrack
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as a contradiction."""
+
+    frames: int = 12  # of those both are seen in, spread over the recording, in which two objects' masks are compared
+    overlap: float = 0.1  # of the smaller mask: of the sample kitchens' right masks neighbours share at most 0.02
+    same: float = 0.5  # of the smaller mask, from which two objects are one
+    near_click: float = 0.01  # of the image's width: a click this near to a mask is on it, as fingers and borders go
+    unlikely: float = 0.37  # Size.fit below which a size is none of its category's: a tenth beyond what is sold
+    floor_m: float = 0.15  # above the floor, that what stands on it may seem to be: 0.03 m is the worst seen on the samples
+    in_wall_m: float = 0.04  # of a front from a wall's plane: the shallowest wall unit sold is 0.2 m deep
+
+
+PARAMS = Params()
+
+
+def find_contradictions(
+    tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], walls: Sequence[Wall], params: Params = PARAMS
+) -> tuple[Contradiction, ...]:
+    """All of them, those between two objects first; objects without a track are left out."""
+    known = [prompt for prompt in prompts if prompt.name in tracks]
+    found = list(_between(tracks, known, params))
+    for prompt in known:
+        track, category = tracks[prompt.name], category_of(prompt.category)
+        found += _disobeyed(track, prompt, params)
+        found += _unlikely_sizes(track, category, params)
+        found += _misplaced(track, category, walls, params)
+    return tuple(found)
+
+
+def _between(tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], params: Params) -> Iterator[Contradiction]:
+    for first, second in combinations(prompts, 2):
+        share, frame = _overlap(tracks[first.name], tracks[second.name], params.frames)
+        if share < params.overlap:
+            continue
+        where = f"{_clicks(first)} and {_clicks(second)}"
+        if share >= params.same:
+            yield Contradiction(
+                rule="same-thing",
+                objects=(first.name, second.name),
+                message=f"{where} are on the same thing: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
+                mend="delete one, or click off each of them (right click) on the other",
+            )
+        else:
+            yield Contradiction(
+                rule="masks-overlap",
+                objects=(first.name, second.name),
+                message=f"{where} claim the same surface: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
+                mend=f"click off one of them (right click) where the other is, in frame {frame}",
+            )
+
+
+def _overlap(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int]:
+    """The share of the smaller mask that is in both, over frames that see both, and the frame with the most of it.
+
+    Frames in which a front is open are left out: what is behind it is seen then.
+    """
+    shared = sorted((set(first.masks) & set(second.masks)) - first.opened_frames - second.opened_frames)
+    frames = [shared[i] for i in np.unique(np.linspace(0, len(shared) - 1, most).round().astype(int))] if shared else []
+    both = [_shared_px(first.masks[frame], second.masks[frame]) for frame in frames]
+    smaller = sum(min(first.masks[frame].area_px, second.masks[frame].area_px) for frame in frames)
+    return (sum(both) / smaller, frames[int(np.argmax(both))]) if smaller else (0.0, -1)
+
+
+def _shared_px(a: PackedMask, b: PackedMask) -> int:
+    """Pixels in both; masks whose boxes do not meet are not unpacked."""
+    apart_x = a.left >= b.left + b.box_width or b.left >= a.left + a.box_width
+    apart_y = a.top >= b.top + b.box_height or b.top >= a.top + a.box_height
+    return 0 if apart_x or apart_y else int(np.count_nonzero(unpack_mask(a) & unpack_mask(b)))
+
+
+def _disobeyed(track: MaskTrack, prompt: ObjectPrompt, params: Params) -> Iterator[Contradiction]:
+    """Clicks on it that its mask leaves out, and clicks off it that its mask takes in."""
+    for point in prompt.points:
+        packed = track.masks.get(point.frame)
+        if packed is None:
+            continue
+        mask, reach = unpack_mask(packed), params.near_click * packed.width
+        if point.label == 1 and not _near(mask, point, reach):
+            said, mend = "is on it, and its mask leaves that out", "take it away, or click nearer to its middle"
+        elif point.label == 0 and _within(mask, point):
+            said, mend = "is off it, and its mask takes that in", "click off it in a second place there"
+        else:
+            continue
+        yield Contradiction(
+            rule="click-disobeyed", objects=(prompt.name,), message=f"{prompt.name}: the click {_at(point)} {said}", mend=mend
+        )
+
+
+def _near(mask: Mask, point: PromptPoint, reach_px: float) -> bool:
+    rows, columns = np.nonzero(mask)
+    return bool(len(rows)) and float(np.hypot(columns + 0.5 - point.x, rows + 0.5 - point.y).min()) <= reach_px
+
+
+def _within(mask: Mask, point: PromptPoint) -> bool:
+    return bool(mask[int(point.y), int(point.x)])
+
+
+def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Iterator[Contradiction]:
+    """Measured sizes that nothing of its category has; depths are left out, for they are seldom seen."""
+    if track.front is not None:
+        sizes = {"wide": (track.front.width_m, category.width), "high": (track.front.height_m, category.height)}
+    elif track.box is not None:
+        width, depth, height = track.box.dimensions_m
+        sizes = {"wide": (max(width, depth), category.width), "high": (height, category.height)}
+    else:
+        return
+    if category.name == "object":  # a name the table does not know
+        return
+    for word, (size_m, usual) in sizes.items():
+        if usual.fit(float(size_m)) >= params.unlikely:
+            continue
+        yield Contradiction(
+            rule="size-unlikely",
+            objects=(track.name,),
+            message=f"{track.name} is {size_m:.2f} m {word}, {_range(usual)} is usual for '{category.label}'",
+            mend=_size_mend(float(size_m) > usual.high, category),
+        )
+
+
+def _size_mend(too_large: bool, category: Category) -> str:
+    if too_large and category.kind == "front":
+        return "where it is several, click each as an object of its own; else correct its category"
+    if too_large:
+        return "click off it (right click) where its mask goes too far; else correct its category"
+    return "click on it where its mask stops short; else correct its category"
+
+
+def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], params: Params) -> Iterator[Contradiction]:
+    """What stands on the floor and is in the air, and fronts in the plane of a wall."""
+    if category.on_floor and track.box is not None and track.box.support_z_m > params.floor_m:
+        yield Contradiction(
+            rule="in-the-air",
+            objects=(track.name,),
+            message=f"{track.name} stands {track.box.support_z_m:.2f} m above the floor, a '{category.label}' stands on it",
+            mend="click on its lower part too; else correct its category",
+        )
+    if track.front is None or category.opens in ("fixed", "rigid"):
+        return
+    pose = track.front.world_from_front
+    behind = distances_behind(walls, pose.translation, -pose.rotation[:, 1])
+    if any(abs(distance) < params.in_wall_m for distance in behind):
+        yield Contradiction(
+            rule="in-a-wall",
+            objects=(track.name,),
+            message=f"{track.name} lies in the plane of a wall, where no '{category.label}' has room behind its front",
+            mend="delete it if it is the bare wall; set its depth if it is let into the wall",
+        )
+
+
+def _range(size: Size) -> str:
+    return f"{size.low:.2f} to {size.high:.2f} m"
+
+
+def _clicks(prompt: ObjectPrompt) -> str:
+    """The object and where it was clicked first."""
+    first = next(point for point in prompt.points if point.label == 1)
+    return f"{prompt.name} (clicked {_at(first)})"
+
+
+def _at(point: PromptPoint) -> str:
+    return f"at ({point.x:.0f}, {point.y:.0f}) in frame {point.frame}"

@@ -1,0 +1,64 @@
+"""The certificate judges whether the scene can be what was filmed, from the manifest alone."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from r2c2r_core.export.lint import lint
+from r2c2r_core.export.manifest import manifest_of
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.model.contradiction import Contradiction
+from r2c2r_core.model.report import Finding
+from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.synthesize.clearance import open_freely
+from tests.core.export.kitchen import cabinet, kitchen, reconstruction
+from tests.core.export.kitchen import counter as counter_at
+
+SAID = Contradiction(
+    rule="same-thing", objects=("cabinet_1", "drawer_1"), message="both are on the same thing", mend="delete one"
+)
+
+
+def findings(folder: Path, document: dict[str, Any]) -> list[Finding]:
+    (folder / "manifest.json").write_text(json.dumps(document))
+    return [found for found in lint(folder) if found.rule in ("same-thing", "travel-cut", "manifest-schema")]
+
+
+def document(scene: ArticulatedScene, *said: Contradiction) -> dict[str, Any]:
+    return manifest_of(replace(reconstruction(scene), contradictions=said), plan_bundle(scene), None)
+
+
+def test_a_contradiction_of_the_segmenter_is_a_finding(good_folder: Path) -> None:
+    assert findings(good_folder, document(kitchen())) == []
+    (found,) = findings(good_folder, document(kitchen(), SAID))
+    assert (found.rule, found.severity, found.where) == ("same-thing", "error", "cabinet_1, drawer_1")
+    assert found.message == "both are on the same thing; delete one"
+
+
+def test_a_door_that_something_all_but_locks_is_a_finding(good_folder: Path) -> None:
+    scene = kitchen()
+    for share, count in ((0.6, 0), (0.4, 1)):
+        cut = replace(scene, objects=tuple(_cut(item, share) for item in scene.objects))
+        assert len(findings(good_folder, document(cut))) == count
+
+
+def test_what_the_clearance_takes_from_a_joint_is_known() -> None:
+    door = cabinet("cabinet_1")
+    blocked = replace(counter_at("counter_1"), world_from_object=replace(door.world_from_object, translation=_before(door)))
+    free, _ = open_freely([door, blocked], (), frozenset())
+    assert free.joints[0].uncut == door.joints[0].upper > free.joints[0].upper
+    (alone,) = open_freely([door], (), frozenset())
+    assert alone.joints[0].uncut is None
+
+
+def _cut(item: SceneObject, share: float) -> SceneObject:
+    if item.name != "cabinet_1":
+        return item
+    return replace(item, joints=tuple(replace(j, upper=share * j.upper, uncut=j.upper) for j in item.joints))
+
+
+def _before(door: SceneObject) -> Any:
+    centre = door.world_from_object.translation.copy()
+    centre[1] -= door.dimensions_m[1] / 2 + 0.62
+    return centre

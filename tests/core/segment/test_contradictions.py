@@ -1,0 +1,116 @@
+"""Every rule finds what it is for, and a right kitchen contradicts nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.contradiction import Contradiction
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing, ThingBox
+from r2c2r_core.segment.contradictions import find_contradictions
+
+WALL = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)  # the room lies at y < 0
+FRAMES = range(0, 40, 2)
+
+
+def track(
+    name: str, category: str, columns: slice, *, width_m: float = 0.5, height_m: float = 0.7, y: float = -0.58
+) -> MaskTrack:
+    """A front whose mask is these columns of every frame."""
+    mask = np.zeros((120, 160), bool)
+    mask[20:100, columns] = True
+    pose = Rigid3(np.eye(3), np.array([0.0, y, 0.45]))
+    front = FrontPanel(world_from_front=pose, width_m=width_m, height_m=height_m, handle=None, confidence=0.9)
+    return MaskTrack(
+        name=name,
+        category=category,
+        masks={frame: pack_mask(mask) for frame in FRAMES},
+        confidence=dict.fromkeys(FRAMES, 0.9),
+        front=front,
+        box=None,
+        kind="front",
+        backend="geometric",
+        prompt_count=1,
+        warnings=(),
+    )
+
+
+def thing(name: str, category: str, size: tuple[float, float, float], support_z_m: float = 0.0) -> MaskTrack:
+    box = ThingBox(world_from_object=Rigid3(), dimensions_m=np.array(size), support_z_m=support_z_m)
+    return replace(track(name, category, slice(0, 20)), front=None, box=box, kind="thing")
+
+
+def prompt(name: str, category: str, x: float, label: int = 1, frame: int = 4) -> ObjectPrompt:
+    points = [PromptPoint(frame=frame, x=x, y=60.5, label=1 if label else 0)]
+    if not label:
+        points.append(PromptPoint(frame=frame, x=10.5, y=60.5, label=1))
+    return ObjectPrompt(name=name, category=category, points=tuple(points))
+
+
+def found(*pairs: tuple[MaskTrack, ObjectPrompt]) -> tuple[Contradiction, ...]:
+    return find_contradictions({track.name: track for track, _ in pairs}, [said for _, said in pairs], (WALL,))
+
+
+def test_neighbours_that_share_a_border_contradict_nothing() -> None:
+    left = (track("door_1", "cabinet", slice(0, 81)), prompt("door_1", "cabinet", 40.5))
+    right = (track("door_2", "cabinet", slice(79, 160)), prompt("door_2", "cabinet", 120.5))
+    assert found(left, right) == ()
+
+
+@pytest.mark.parametrize(("begins", "rule"), [(0, "same-thing"), (40, "same-thing"), (60, "masks-overlap")])
+def test_masks_that_share_many_pixels_name_both_clicks(begins: int, rule: str) -> None:
+    left = (track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5))
+    right = (track("door_2", "cabinet", slice(begins, begins + 80)), prompt("door_2", "cabinet", 70.5))
+    (said,) = found(left, right)
+    assert (said.rule, said.objects) == (rule, ("door_1", "door_2"))
+    assert "door_1 (clicked at (40, 60) in frame 4) and door_2 (clicked at (70, 60) in frame 4)" in said.message
+    assert "\n" not in said.line
+
+
+def test_what_is_behind_an_open_door_is_not_the_door() -> None:
+    left, right = track("door_1", "cabinet", slice(0, 80)), track("door_2", "cabinet", slice(0, 80))
+    opened = replace(left, swung=dict.fromkeys(FRAMES, Swing(hinge="left", angle_rad=1.0)))
+    said = (prompt("door_1", "cabinet", 40.5), prompt("door_2", "cabinet", 40.5))
+    assert found((left, said[0]), (right, said[1]))
+    assert found((opened, said[0]), (right, said[1])) == ()
+
+
+def test_clicks_that_the_mask_disobeys() -> None:
+    door = track("door_1", "cabinet", slice(0, 80))
+    (left_out,) = found((door, prompt("door_1", "cabinet", 120.5)))
+    assert left_out.message == "door_1: the click at (120, 60) in frame 4 is on it, and its mask leaves that out"
+    (taken_in,) = found((door, prompt("door_1", "cabinet", 40.5, label=0)))
+    assert taken_in.message == "door_1: the click at (40, 60) in frame 4 is off it, and its mask takes that in"
+    assert found((door, prompt("door_1", "cabinet", 81.0))) == ()  # on its border, as fingers go
+    assert found((door, prompt("door_1", "cabinet", 120.5, frame=5))) == ()  # a frame that does not show it
+
+
+def test_sizes_outside_their_category() -> None:
+    wide = track("door_1", "cabinet", slice(0, 80), width_m=1.17)
+    (said,) = found((wide, prompt("door_1", "cabinet", 40.5)))
+    assert said.rule == "size-unlikely"
+    assert said.message.startswith("door_1 is 1.17 m wide, ")
+    assert "click each as an object of its own" in said.mend
+    vase = thing("vase_1", "vase", (0.13, 0.01, 0.72))
+    (tall,) = found((vase, prompt("vase_1", "vase", 10.5)))
+    assert tall.message.startswith("vase_1 is 0.72 m high, ")
+    unknown = thing("lathe_1", "lathe", (0.9, 0.9, 0.9))
+    assert found((unknown, prompt("lathe_1", "lathe", 10.5))) == ()
+
+
+def test_what_stands_on_the_floor_is_not_in_the_air() -> None:
+    chair = ("chair_1", "chair", (0.45, 0.5, 0.9))
+    assert found((thing(*chair), prompt("chair_1", "chair", 10.5))) == ()
+    (said,) = found((thing(*chair, support_z_m=0.45), prompt("chair_1", "chair", 10.5)))
+    assert said.message == "chair_1 stands 0.45 m above the floor, a 'chair' stands on it"
+
+
+def test_a_front_on_the_bare_wall() -> None:
+    drawer = track("drawer_1", "drawer", slice(0, 80), height_m=0.2)
+    assert found((drawer, prompt("drawer_1", "drawer", 40.5))) == ()
+    (said,) = found((track("drawer_1", "drawer", slice(0, 80), height_m=0.2, y=-0.01), prompt("drawer_1", "drawer", 40.5)))
+    assert said.rule == "in-a-wall"
