@@ -41,12 +41,16 @@ export class ObjectsPane extends EventTarget {
     this.#category.value = name;
   }
 
-  /** @param {SceneObjects} objects */
-  draw(objects) {
+  /**
+   * @param {SceneObjects} objects
+   * @param {(object: number) => string[]} contradicted what its masks contradict
+   */
+  draw(objects, contradicted) {
     this.list.setObjects(objects.sorted, {
       current: objects.current,
       isHidden: (object) => objects.isHidden(object.id),
       colourOf: (object) => objects.colour(object),
+      contradicted: (object) => contradicted(object.id),
     });
   }
 

@@ -8,7 +8,7 @@ import { inkOn } from "../lib/colour.js";
 import { counted } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
-/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string }} View */
+/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => string[] }} View */
 
 export class ObjectList extends LiveElement {
   #list = h("ul", { class: "object-list" });
@@ -45,7 +45,7 @@ export class ObjectList extends LiveElement {
       return;
     }
     this.#new.setAttribute("aria-pressed", String(current === null));
-    const state = JSON.stringify([objects, current, objects.map(isHidden)]);
+    const state = JSON.stringify([objects, current, objects.map(isHidden), objects.map(view.contradicted)]);
     if (state === this.#drawn) return;
     this.#drawn = state;
     const none = h("li", { class: "muted none" }, "Click a drawer, a door or a thing in the picture.");
@@ -68,7 +68,7 @@ export class ObjectList extends LiveElement {
    * @param {number} number
    * @param {View} view
    */
-  #item(object, number, { current: chosen, isHidden, colourOf }) {
+  #item(object, number, { current: chosen, isHidden, colourOf, contradicted }) {
     const { id, name } = object;
     const [current, hidden] = [id === chosen, isHidden(object)];
     const pick = h("button", { class: "pick", "aria-pressed": String(current), title: name }, name);
@@ -92,6 +92,7 @@ export class ObjectList extends LiveElement {
       h("div", { class: "head" }, badge, pick, eye, remove),
       h("div", { class: "row muted state" }, state(object, current), this.#stop(object)),
       current ? this.#fields(object) : null,
+      ...contradicted(object).map((line) => h("div", { class: "contradicted", role: "status" }, line)),
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colourOf(object));

@@ -3,6 +3,7 @@
 import * as api from "../api.js";
 import { actionsOf, offers, ONE_A_PRESS } from "../annotate/commands.js";
 import { crosshairKey } from "../annotate/crosshair.js";
+import { Contradictions } from "../annotate/contradictions.js";
 import { Edits } from "../annotate/edits.js";
 import { EvidencePane } from "../annotate/evidence-pane.js";
 import { LiveMasks } from "../annotate/live-masks.js";
@@ -32,6 +33,7 @@ export class AnnotatePage extends LiveElement {
   // What is known
   #objects = new SceneObjects();
   #masks = new LiveMasks();
+  #contradictions = new Contradictions(this.#objects, this.#masks.stored);
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
   #categories = [];
@@ -96,7 +98,9 @@ export class AnnotatePage extends LiveElement {
     const { signal } = this;
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
     document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
-    signal.addEventListener("abort", () => [this.#player, this.#picture].forEach((part) => part.stop()));
+    signal.addEventListener("abort", () =>
+      [this.#player, this.#picture, this.#contradictions].forEach((part) => part.stop()),
+    );
   }
 
   #listenToThePicture() {
@@ -110,7 +114,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#presses, "pin", (pin) => this.#comment(pin));
     this.#on(this.#player, "frame", () => (this.#picture.drawFrame(), this.#drawTip()));
     this.#on(this.#player, "settled", () => this.#settled());
-    this.#on(this.#masks, "masks", ({ frame }) => !signal.aborted && this.#picture.drawMasks(frame));
+    this.#on(this.#masks, "masks", ({ frame }) => !signal.aborted && this.#drawMasks(frame));
     this.#on(this.#masks, "grown", ({ object }) => this.#grown(object));
     this.#on(this.#strip, "seek", (position) => this.#player.seek(position));
     this.#on(this.#strip, "play", () => this.#player.play());
@@ -145,6 +149,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#objects, "change", () => this.#drawObjects());
     this.#on(this.#objects, "choose", () => this.#chosen());
     this.#on(this.#objects, "gone", ({ id }) => this.#masks.forget(id));
+    this.#on(this.#contradictions, "change", () => this.#pane.draw(this.#objects, this.#contradicted));
     this.#on(this.#edits, "object", ({ object }) => this.#objects.answered(object));
     this.#on(this.#edits, "made", ({ object }) => (this.#objects.answered(object), this.#objects.choose(object.id)));
     this.#on(this.#edits, "clicks", () => this.#picture.drawMarkers());
@@ -257,9 +262,19 @@ export class AnnotatePage extends LiveElement {
     if (comment) say(comment.text, { hint: comment.who });
   }
 
+  /** @param {number | null} of the frame whose masks changed; null: of many */
+  #drawMasks(of) {
+    this.#picture.drawMasks(of);
+    const { frame } = this.#player;
+    if (frame && (of ?? frame.index) === frame.index) this.#contradictions.lookSoon(frame);
+  }
+
+  #contradicted = (/** @type {number} */ object) => this.#contradictions.about(object);
+
   #drawObjects() {
-    this.#pane.draw(this.#objects);
+    this.#pane.draw(this.#objects, this.#contradicted);
     this.#picture.drawObjects();
+    if (this.#player.frame) this.#contradictions.lookSoon(this.#player.frame);
     this.#drawTip();
   }
 

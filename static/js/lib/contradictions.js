@@ -1,0 +1,103 @@
+/**
+ * Which masks of one frame contradict each other or their clicks. Masks are of what is visible, so that a pixel belongs to one
+ * object. The run judges the same over many frames (r2c2r_core/segment/contradictions.py, where the figures come from).
+ */
+
+/** @typedef {import("../api-types").MaskBits} MaskBits */
+/** @typedef {{ x: number, y: number, label: number }} Click in pixels of the mask */
+/** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the mask's box */
+/** @typedef {{ object: number, text: string }} Said */
+
+const OVERLAP = 0.1; // of the smaller mask
+const SAME = 0.5;
+const NEAR = 0.01; // of the image's width: a click this near to a mask is on it
+
+/**
+ * @param {Shown[]} shown on one frame
+ * @returns {Said[]} each line about one object
+ */
+export function contradictionsOn(shown) {
+  const pairs = shown.flatMap((first, k) => shown.slice(k + 1).flatMap((second) => between(first, second)));
+  return [...pairs, ...shown.flatMap(disobeyed)];
+}
+
+/**
+ * @param {Shown} first
+ * @param {Shown} second
+ * @returns {Said[]}
+ */
+function between(first, second) {
+  const smaller = Math.min(count(first.pixels), count(second.pixels));
+  const share = smaller ? shared(first, second) / smaller : 0;
+  if (share < OVERLAP) return [];
+  const percent = Math.round(100 * share);
+  /** @type {(one: Shown, other: Shown) => Said} */
+  const said = (one, other) => ({
+    object: one.object,
+    text:
+      share >= SAME
+        ? `On the same thing as ${other.name} (${percent} % shared): delete one, or right-click on the other`
+        : `Shares ${percent} % with ${other.name} here: right-click where ${other.name} is`,
+  });
+  return [said(first, second), said(second, first)];
+}
+
+/**
+ * @param {Shown} shown
+ * @returns {Said[]}
+ */
+function disobeyed({ object, mask, pixels, clicks }) {
+  const reach = Math.ceil(NEAR * mask.width);
+  const missed = clicks.some((click) => click.label === 1 && !near(mask, pixels, click, reach));
+  const taken = clicks.some((click) => click.label === 0 && near(mask, pixels, click, 0));
+  return [
+    ...(missed
+      ? [{ object, text: "Its mask leaves out a click on it: take that away, or click nearer to its middle" }]
+      : []),
+    ...(taken ? [{ object, text: "Its mask takes in a click off it: click off it in a second place there" }] : []),
+  ];
+}
+
+/** @param {Uint8Array} pixels */
+const count = (pixels) => pixels.reduce((sum, pixel) => sum + pixel, 0);
+
+/**
+ * Pixels in both.
+ * @param {Shown} first
+ * @param {Shown} second
+ */
+function shared({ mask: a, pixels }, { mask: b, pixels: others }) {
+  const [left, top] = [Math.max(a.left, b.left), Math.max(a.top, b.top)];
+  const right = Math.min(a.left + a.box_width, b.left + b.box_width);
+  const bottom = Math.min(a.top + a.box_height, b.top + b.box_height);
+  let sum = 0;
+  for (let y = top; y < bottom; y += 1)
+    for (let x = left; x < right; x += 1) if (at(a, pixels, x, y) && at(b, others, x, y)) sum += 1;
+  return sum;
+}
+
+/**
+ * Whether the mask has a pixel within `reach` of the click.
+ * @param {MaskBits} mask
+ * @param {Uint8Array} pixels
+ * @param {Click} click
+ * @param {number} reach
+ */
+function near(mask, pixels, { x, y }, reach) {
+  const [column, row] = [Math.floor(x), Math.floor(y)];
+  for (let dy = -reach; dy <= reach; dy += 1)
+    for (let dx = -reach; dx <= reach; dx += 1)
+      if (dx * dx + dy * dy <= reach * reach && at(mask, pixels, column + dx, row + dy)) return true;
+  return false;
+}
+
+/**
+ * @param {MaskBits} mask
+ * @param {Uint8Array} pixels
+ * @param {number} x
+ * @param {number} y
+ */
+function at({ left, top, box_width: width, box_height: height }, pixels, x, y) {
+  const [column, row] = [x - left, y - top];
+  return column >= 0 && row >= 0 && column < width && row < height && pixels[row * width + column] === 1;
+}
