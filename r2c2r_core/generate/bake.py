@@ -1,14 +1,15 @@
 """Photographs onto a mesh: each texel is a robust blend of the sharp, frontal, unhidden frames that see it."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Colours, Faces, Image, Points
+from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points
 from r2c2r_core.generate.charts import Atlas
-from r2c2r_core.generate.consistency import render_depth, sensor_depth
+from r2c2r_core.generate.consistency import VIEWS_KEPT, render_depth, sensor_depth
 from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.unseen import fill_unseen, own_texels, spread_colours
 from r2c2r_core.geometry.camera import project, sample_nearest
@@ -47,16 +48,34 @@ def bake(
     """
     eyes = world_from_local.inverse.apply(np.array([view.eye_world for view in views]))
     wanted = np.ones((len(views), 6), dtype=bool) if front_y_m is None else _best_views(atlas, eyes, views)
-    used: np.ndarray = np.asarray(wanted.any(axis=1))
-    frames = [view for view, is_used in zip(views, used, strict=True) if is_used]
-    samples, weights = _gather(atlas, vertices_world, faces, world_from_local, frames, wanted[used])
+    sides = _gather(atlas, vertices_world, faces, world_from_local, views, wanted)
     if front_y_m is not None:
-        _prefer_best(weights, atlas.chart)
-    colours, seen = _blend(samples, weights)
+        for side in sides:
+            _prefer_best(side.weights)
+    colours, seen = _blend(sides, len(views), len(atlas.points))
     seen &= own_texels(atlas, seen, front_y_m)
     texture = np.zeros((*atlas.size, 3), np.uint8)
     texture.reshape(-1, 3)[atlas.texel] = fill_unseen(colours, seen, atlas, front_y_m, eyes.mean(axis=0))
     return Baked(spread_colours(texture, atlas), float(seen.mean()) if len(seen) else 0.0)
+
+
+class _Side(NamedTuple):
+    """What the views that show one chart show of its texels."""
+
+    views: np.ndarray  # (k,) which of them
+    texels: np.ndarray  # (t,) those that a view shows
+    samples: np.ndarray  # (3, k, t) uint8, a channel at a time: numpy is slow along an axis of three
+    weights: np.ndarray  # (k, t) float32, 0 where a view does not show the texel
+
+
+class _Photo(NamedTuple):
+    """A view, as far as it does not depend on the texel asked for."""
+
+    view: View
+    camera_from_local: Rigid3
+    mask: Mask  # well inside the object
+    surface_m: DepthMetres  # depth of the mesh, small
+    sensor_m: DepthMetres  # measured depth, at the same pixels
 
 
 def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.ndarray:
@@ -73,13 +92,10 @@ def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.n
     return wanted
 
 
-def _prefer_best(weights: np.ndarray, chart: np.ndarray) -> None:
-    """Scale the weights, in place, so that the frame that shows most of a side best carries it."""
-    for side in np.unique(chart):
-        texels = np.flatnonzero(chart == side)
-        order = np.argsort(-weights[:, texels].sum(axis=1), kind="stable")
-        for rank, view in enumerate(order):
-            weights[view, texels] *= max(_NEXT_VIEW**rank, 1e-9)
+def _prefer_best(weights: np.ndarray) -> None:
+    """Scale a side's weights (k, t), in place, so that the frame that shows most of it best carries it."""
+    for rank, view in enumerate(np.argsort(-weights.sum(axis=1), kind="stable")):
+        weights[view] *= max(_NEXT_VIEW**rank, 1e-9)
 
 
 def _gather(
@@ -89,94 +105,126 @@ def _gather(
     world_from_local: Rigid3,
     views: Sequence[View],
     wanted: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Colours (k, t, 3) and weights (k, t) of the texels in the views; weight 0 where a view does not show the texel."""
-    count = len(atlas.points)
-    samples = np.zeros((len(views), count, 3), np.uint8)
-    weights = np.zeros((len(views), count), np.float32)
-    points, normals = atlas.points.astype(np.float32), atlas.normals.astype(np.float32)
-    for k, view in enumerate(views):
-        camera_from_local = view.world_from_camera.inverse @ world_from_local
-        towards = camera_from_local.inverse.translation.astype(np.float32) - points
-        cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)
-        facing = np.flatnonzero((cosine > _LEAST_COSINE) & wanted[k, atlas.chart])
-        if len(facing) == 0:
-            continue
-        in_camera = _moved(points[facing], camera_from_local)
-        depth = render_depth(vertices_world, faces, view)
-        colours, shown = _look_up(view, in_camera, depth, cosine[facing] < _GRAZING_COSINE)
-        z = np.maximum(in_camera[:, 2], 0.05)
-        weight = (cosine[facing] ** 2 * (0.3 + 0.7 * view.sharpness) / z**2) ** _POWER
-        weights[k, facing] = np.where(shown, weight, 0.0)
-        samples[k, facing] = colours
-    return samples, weights
+) -> list[_Side]:
+    """Colours and weights of each chart's texels in the views wanted for it."""
+    photos = {k: _photo(views[k], vertices_world, faces, world_from_local) for k in np.flatnonzero(wanted.any(axis=1)).tolist()}
+    sides = []
+    for chart in np.flatnonzero(np.bincount(atlas.chart, minlength=6)):
+        texels, chosen = np.flatnonzero(atlas.chart == chart), np.flatnonzero(wanted[:, chart])
+        points, normals = (np.ascontiguousarray(of[texels].T, dtype=np.float32) for of in (atlas.points, atlas.normals))
+        samples = np.zeros((3, len(chosen), len(texels)), np.uint8)
+        weights = np.zeros((len(chosen), len(texels)), np.float32)
+        for row, k in enumerate(chosen.tolist()):
+            _look(photos[k], points, normals, samples[:, row], weights[row])
+        seen = (weights > 0).any(axis=0)
+        sides.append(_Side(chosen, texels[seen], samples[:, :, seen], weights[:, seen]))
+    return sides
 
 
-def _look_up(view: View, in_camera: np.ndarray, depth: np.ndarray, grazing: np.ndarray) -> tuple[Colours, np.ndarray]:
+def _photo(view: View, vertices_world: Points, faces: Faces, world_from_local: Rigid3) -> _Photo:
+    surface = render_depth(vertices_world, faces, view)
+    camera_from_local = view.world_from_camera.inverse @ world_from_local
+    return _Photo(view, camera_from_local, _well_inside(view), surface, sensor_depth(view, surface.shape))
+
+
+@lru_cache(maxsize=VIEWS_KEPT)
+def _well_inside(view: View) -> Mask:
+    return moved_edge(view.mask, -max(1.0, _EDGE_SHARE * np.sqrt(view.mask.sum())))
+
+
+def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray) -> None:
+    """Fill in one view's colours (3, t) and weights (t,) of texels at points (3, t) with normals (3, t)."""
+    dx, dy, dz = photo.camera_from_local.inverse.translation.astype(np.float32)[:, None] - points
+    distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+    cosine = (dx * normals[0] + dy * normals[1] + dz * normals[2]) / np.maximum(distance, np.float32(1e-9))
+    facing = np.flatnonzero(cosine > _LEAST_COSINE)
+    if len(facing) == 0:
+        return
+    cosine = cosine[facing]
+    in_camera = _moved(points[:, facing], photo.camera_from_local)
+    colours, shown = _look_up(photo, in_camera, cosine < _GRAZING_COSINE)
+    z = np.maximum(in_camera[:, 2], np.float32(0.05))
+    sharpness = np.float32(0.3 + 0.7 * photo.view.sharpness)
+    weights[facing] = np.where(shown, (cosine**2 * sharpness / z**2) ** _POWER, np.float32(0))
+    samples[:, facing] = colours.T
+
+
+def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple[Colours, np.ndarray]:
     """The view's colour at each camera-frame point, and whether it shows the point.
 
     It must lie in the mask, behind nothing of the mesh, and where the sensor measured, not behind anything else. On grazing
     sides, where a mask that is a pixel too wide smears the neighbour over a hand's breadth, depth must confirm the surface.
     """
-    z = in_camera[:, 2]
-    camera = view.rgb_camera
+    z, (height, width) = in_camera[:, 2], photo.surface_m.shape
+    camera, noise = photo.view.rgb_camera, photo.view.noise
     uv = np.where(z[:, None] > 0.05, project(in_camera, camera), np.float32(np.nan))
-    in_mask, inside = sample_nearest(moved_edge(view.mask, -max(1.0, _EDGE_SHARE * np.sqrt(view.mask.sum()))), uv)
-    surface, _ = sample_nearest(depth, uv * (depth.shape[1] / camera.width, depth.shape[0] / camera.height))
-    sensor = sensor_depth(view, depth.shape)
-    measured, _ = sample_nearest(sensor, uv * (depth.shape[1] / camera.width, depth.shape[0] / camera.height))
-    hidden = view.noise.occluded(measured, z, _SENSOR_GAP_M)
-    beyond = view.noise.seen_through(measured, z, _SENSOR_GAP_M) & grazing
-    return _sample_bilinear(view.rgb, uv), inside & in_mask & (z < surface + _HIDDEN_M) & ~hidden & ~beyond
+    in_mask, inside = sample_nearest(photo.mask, uv)
+    small = np.array([width / camera.width, height / camera.height], np.float32)
+    both, _ = sample_nearest(np.stack([photo.surface_m, photo.sensor_m], axis=-1), uv * small)
+    surface, measured = both[:, 0], both[:, 1]
+    hidden = noise.occluded(measured, z, _SENSOR_GAP_M)
+    beyond = noise.seen_through(measured, z, _SENSOR_GAP_M) & grazing
+    return _sample_bilinear(photo.view.rgb, uv), inside & in_mask & (z < surface + _HIDDEN_M) & ~hidden & ~beyond
 
 
 def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:
-    """The points (n, 3) through the transform, in single precision, a column at a time."""
+    """Points given as columns (3, n) through the transform, in single precision, as rows (n, 3)."""
     r, t = transform.rotation.astype(np.float32), transform.translation.astype(np.float32)
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    return np.stack([x * r[k, 0] + y * r[k, 1] + z * r[k, 2] + t[k] for k in range(3)], axis=1)
+    x, y, z = points
+    return np.stack([x * r[k, 0] + y * r[k, 1] + z * r[k, 2] + t[k] for k in range(3)]).T
 
 
-def _blend(samples: np.ndarray, weights: np.ndarray) -> tuple[Colours, np.ndarray]:
-    """Weighted mean of the samples that agree with the median brightness, after levelling the views' exposures."""
-    seen = np.asarray((weights > 0).any(axis=0))
-    if len(samples) == 0 or not seen.any():
-        return np.zeros((weights.shape[1], 3), np.uint8), np.zeros(weights.shape[1], dtype=bool)
-    grey = np.stack([_grey(sample) for sample in samples])
-    shown = weights > 0
-    median = _median_shown(grey, shown)
-    gains = np.array([_gain(grey[k], median, shown[k]) for k in range(len(samples))], np.float32)
-    median = _median_shown(grey * gains[:, None], shown)
-    agreement = np.exp(-(((grey * gains[:, None] - median) / _OUTLIER_LEVELS) ** 2))
-    final = weights / np.maximum(weights.max(axis=0), 1e-30) * (agreement + 1e-4)
-    total = final.sum(axis=0)
-    colours = np.zeros((weights.shape[1], 3), np.float32)
-    for k in range(len(samples)):
-        colours += samples[k] * (gains[k] * final[k] / np.maximum(total, 1e-12))[:, None]
-    return np.round(colours).clip(0, 255).astype(np.uint8), seen
+def _blend(sides: Sequence[_Side], views: int, count: int) -> tuple[Colours, np.ndarray]:
+    """Each texel's weighted mean of the samples that agree with the median brightness, after levelling the views' exposures."""
+    greys = [_grey(side.samples) for side in sides]
+    gains = _gains(sides, greys, views)
+    colours, seen = np.zeros((count, 3), np.uint8), np.zeros(count, dtype=bool)
+    for side, grey in zip(sides, greys, strict=True):
+        if len(side.texels) == 0:
+            continue
+        gain = gains[side.views, None]
+        grey *= gain
+        median = _median_shown(grey, side.weights > 0)
+        agreement = np.exp(-(((grey - median) / np.float32(_OUTLIER_LEVELS)) ** 2))
+        final = side.weights / np.maximum(side.weights.max(axis=0), np.float32(1e-30)) * (agreement + np.float32(1e-4))
+        share = gain * final / np.maximum(final.sum(axis=0), np.float32(1e-12))
+        for channel, samples in enumerate(side.samples):
+            mean = (samples * share).sum(axis=0)
+            colours[side.texels, channel] = np.round(mean).clip(0, 255)
+        seen[side.texels] = True
+    return colours, seen
 
 
-def _grey(colours: Colours) -> np.ndarray:
-    """The mean of the channels, a channel at a time: numpy is slow along an axis of three."""
-    red, green, blue = (colours[:, k].astype(np.float32) for k in range(3))
-    return np.asarray((red + green + blue) / np.float32(3.0))
+def _gains(sides: Sequence[_Side], greys: Sequence[np.ndarray], views: int) -> np.ndarray:
+    """The factor that brings each view to the common exposure."""
+    ratios: list[list[np.ndarray]] = [[] for _ in range(views)]
+    for side, grey in zip(sides, greys, strict=True):
+        shown = side.weights > 0
+        median = _median_shown(grey, shown)
+        for k, its_grey, is_shown in zip(side.views, grey, shown, strict=True):
+            usable = is_shown & (its_grey > 15) & (median > 15)
+            ratios[k].append(median[usable] / its_grey[usable])
+    return np.array([_gain(np.concatenate(of_view)) if of_view else 1.0 for of_view in ratios], np.float32)
+
+
+def _gain(ratios: np.ndarray) -> float:
+    return 1.0 if len(ratios) < 50 else float(np.clip(np.median(ratios), 0.7, 1.4))
+
+
+def _grey(samples: np.ndarray) -> np.ndarray:
+    """The mean of the channels, (k, t)."""
+    red, green, blue = samples
+    return np.asarray((red.astype(np.float32) + green + blue) / np.float32(3.0))
 
 
 def _median_shown(grey: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """Lower median over the views that show each texel (highlights are bright)."""
+    if len(grey) == 0:
+        return np.zeros(grey.shape[1], np.float32)
     ordered = np.where(shown, grey, np.float32(np.inf)).T.copy()  # numpy sorts rows that lie together faster
     ordered.sort(axis=1)
     middle = np.maximum(shown.sum(axis=0) - 1, 0) // 2
-    values = ordered[np.arange(len(middle)), middle]
-    return np.asarray(np.where(np.isfinite(values), values, np.float32(0.0)))
-
-
-def _gain(grey: np.ndarray, median: np.ndarray, shown: np.ndarray) -> float:
-    """The factor that brings one view to the common exposure."""
-    usable = shown & (grey > 15) & (median > 15)
-    if usable.sum() < 50:
-        return 1.0
-    return float(np.clip(np.median(median[usable] / grey[usable]), 0.7, 1.4))
+    return np.asarray(ordered[np.arange(len(middle)), middle])
 
 
 def _sample_bilinear(image: Image, uv_px: np.ndarray) -> Colours:

@@ -1,6 +1,7 @@
 """How well a mesh, where its generator believes it is, reproduces the masks and the depth it came from."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ _OCCLUDER_GAP_M = 0.05
 _WORST_DEPTH_M = 0.2  # backends.md §2.7
 _DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
 JUDGES = 8  # views of the pool, best first, that judge every shape of an object alike
+VIEWS_KEPT = 24  # an object's pool: what is known of a view is asked for again by every candidate
 COPIED_COST = 0.05  # of IoU: carving copies the masks' errors, it has to agree with them better than a clean shape
 
 
@@ -64,12 +66,14 @@ def render_depth(vertices_world: Points, faces: Faces, view: View) -> DepthMetre
     return rasterize(vertices_world, faces, np.ones((len(vertices_world), 3)), small, view.world_from_camera.inverse).depth_m
 
 
+@lru_cache(maxsize=VIEWS_KEPT)
 def mask_at(view: View, shape: tuple[int, ...]) -> Mask:
     """The view's mask at another size of its crop."""
     small = cv2.resize(view.mask.astype(np.uint8) * 255, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
     return np.asarray(small > 127)
 
 
+@lru_cache(maxsize=VIEWS_KEPT)
 def sensor_depth(view: View, shape: tuple[int, ...]) -> DepthMetres:
     """The measured depth at the pixels of the view's colour crop resized to `shape`; 0 where unknown."""
     rgb = view.rgb_camera.resized(shape[1], shape[0])
