@@ -121,9 +121,44 @@ def running(
 
 ASKED_ON_THE_LOOP: list[tuple[URL, str]] = []
 """The database, and what asked it on the thread of an event loop, where everybody waits for the answer."""
+_COUNTED: dict[URL, list[str]] = {}  # the statements that a database is asked, while a test counts them
+_SILENT: dict[URL, Exception] = {}  # what a database answers instead
 
 
-@event.listens_for(Engine, "begin")  # of the class: an engine that threads use already takes no further listener
+@contextmanager
+def statements(engine: Engine) -> Iterator[list[str]]:
+    """What the database is asked meanwhile, by any thread."""
+    _COUNTED[engine.url] = []
+    try:
+        yield _COUNTED[engine.url]
+    finally:
+        del _COUNTED[engine.url]
+
+
+@contextmanager
+def refusing(engine: Engine, error: Exception) -> Iterator[None]:
+    """The database begins no transaction meanwhile."""
+    _SILENT[engine.url] = error
+    try:
+        yield
+    finally:
+        del _SILENT[engine.url]
+
+
+# Listeners are the class's, and there before any engine is: one that threads use takes no further listener, nor does its class
+@event.listens_for(Engine, "before_cursor_execute")
+def _note_statement(connection: Connection, _cursor: object, statement: str, *_: object) -> None:
+    if (counted := _COUNTED.get(connection.engine.url)) is not None:
+        counted.append(statement)
+
+
+@event.listens_for(Engine, "begin")
+def _refuse(connection: Connection) -> None:
+    if (error := _SILENT.get(connection.engine.url)) is not None:
+        raise error
+
+
+@event.listens_for(Engine, "begin")
 def _note_where_asked(connection: Connection) -> None:
     with suppress(RuntimeError):  # no loop runs on this thread, as it should be
         asyncio.get_running_loop()

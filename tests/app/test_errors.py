@@ -2,12 +2,11 @@ import errno
 import sqlite3
 
 import pytest
-from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
 from app.errors import KINDS, error_body, kind_of
 from r2c2r_core import errors as core
-from tests.app.conftest import Running
+from tests.app.conftest import Running, refusing
 
 SHAPE = {"kind", "message", "hint", "current"}
 
@@ -121,24 +120,19 @@ def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(
 ) -> None:
     found = sqlite3.OperationalError(said)
     found.sqlite_errorcode = code
-
-    def refuse(_: object) -> None:
-        raise OperationalError("BEGIN", None, found)
-
-    engine, marked = web.context.engine, {"Idempotency-Key": "k"}
-    event.listen(engine, "begin", refuse)
+    marked = {"Idempotency-Key": "k"}
     asked = [
         lambda: web.client.get("/api/projects"),
         lambda: web.client.post("/api/projects/sample", json={}),
         lambda: web.client.post("/api/projects/sample", json={}, headers=marked),  # by what remembers keys
         lambda: web.client.get("/media/x/thumbnail.jpg"),  # by who looks up whose session it is
     ]
-    for ask in asked:
-        web.context.people.look_again()
-        answer = ask()
-        assert (answer.status_code, answer.json()["kind"], set(answer.json())) == (status, kind, SHAPE)
-    assert web.client.get("/static/index.html").status_code == 200  # which is for everybody
-    event.remove(engine, "begin", refuse)
+    with refusing(web.context.engine, OperationalError("BEGIN", None, found)):
+        for ask in asked:
+            web.context.people.look_again()
+            answer = ask()
+            assert (answer.status_code, answer.json()["kind"], set(answer.json())) == (status, kind, SHAPE)
+        assert web.client.get("/static/index.html").status_code == 200  # which is for everybody
     assert web.get("/api/projects") == []
 
 

@@ -4,7 +4,6 @@ import json
 from typing import Any
 
 import pytest
-from sqlalchemy import event
 from sqlmodel import select
 
 from app.db import history
@@ -16,7 +15,7 @@ from app.files import project_files
 from app.jobs import mask_store
 from app.jobs.mask_store import mask_path
 from app.services import views
-from tests.app.conftest import Running
+from tests.app.conftest import Running, statements
 from tests.app.nouns import finish
 from tests.app.test_jobs import run
 
@@ -80,15 +79,11 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
 ) -> None:
     web, project, item = finished
     asked = questions(web, project, item)
-    queries: list[str] = []
-    event.listen(web.context.engine, "before_cursor_execute", lambda *said: queries.append(said[2]))
-
     web.context.runner.stop()  # what is counted is asked for by a request
     web.context.descriptions.stop()
 
     def count(path: str) -> tuple[int, int]:
-        queries.clear()
-        with web.client.stream("GET", path) as answer:
+        with statements(web.context.engine) as queries, web.client.stream("GET", path) as answer:
             size = len(b"".join(answer.iter_raw()))
         assert answer.status_code < 500, path
         return len(queries), size
@@ -110,13 +105,11 @@ MOST_OF_A_CLICK = 19  # statements, the transactions' begins aside; a row is wri
 
 def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
-    queries: list[str] = []
-    event.listen(web.context.engine, "before_cursor_execute", lambda *said: queries.append(said[2]))
 
     def click() -> int:
-        queries.clear()
         point = {"frame": 3, "x": 1.5, "y": 1.5, "label": 0}
-        web.post(f"/api/projects/{project}/objects/{item}/points?infer=false", point, 201)
+        with statements(web.context.engine) as queries:
+            web.post(f"/api/projects/{project}/objects/{item}/points?infer=false", point, 201)
         return len(queries)
 
     click()

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import event
 from sqlmodel import col, select
 from starlette.testclient import TestClient
 
@@ -21,7 +20,7 @@ from app.files import project_files
 from app.services import accounts, leftovers
 from app.services.adopting import adopt_all
 from r2c2r_core.errors import InputError
-from tests.app.conftest import ORIGIN, Running
+from tests.app.conftest import ORIGIN, Running, statements
 
 Start = Callable[..., Any]
 
@@ -213,11 +212,10 @@ def test_a_change_that_is_not_committed_is_not_told(web: Running) -> None:
 
 def test_describing_asks_the_database_the_same_number_of_times_whatever_the_project_holds(web: Running) -> None:
     project = web.sample()
-    files, engine, asked = project_files(web.settings.data_dir, project), web.context.engine, []
-    event.listen(engine, "before_cursor_execute", lambda *args: asked.append(args[2]))
+    files, engine = project_files(web.settings.data_dir, project), web.context.engine
 
     def queries() -> int:
-        with reading(engine) as session:
+        with statements(engine) as asked, reading(engine) as session:
             row = session.get(Project, project)
             asked.clear()
             describe(session, row, files)  # type: ignore[arg-type]
