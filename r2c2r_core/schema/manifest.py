@@ -185,3 +185,4 @@ class Manifest(Document):
         default_factory=list, description="what the segmenter's masks, sizes and places contradict"
     )
     stages: list[ManifestStage] = Field(description="how each stage was run")
+    files: dict[str, str] = Field(default_factory=dict, description="SHA-256 of every other file, by its path in the bundle")

@@ -3,7 +3,6 @@
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from r2c2r_core.export.rules.table import finding
 from r2c2r_core.export.writers.table import FORMATS, formats
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.report import Finding
+from r2c2r_core.schema.document import checked
+from r2c2r_core.schema.manifest import Manifest, ManifestJoint, ManifestObject
 
 REQUIRED_FILES = (*(entry.file for entry in FORMATS), "manifest.json", "preview.png", "README.txt")
-_KEYS = ("schema", "tool_version", "capture", "world_from_capture", "objects", "stages")
-_OBJECT_KEYS = ("name", "category", "dimensions_m", "world_from_object", "joint", "meshes", "mass_kg")
 _USD_ASSET = re.compile(r"@@@(.+?)@@@|@([^@\n]+)@")
 SUPPORT_SUFFIX = "_support"
 """Links of this ending hold a free-standing thing up; they belong to no object."""
@@ -66,33 +65,29 @@ def _usd(content: bytes) -> Iterator[Finding]:
 def _manifest(urdf: Urdf, content: bytes) -> Iterator[Finding]:
     try:
         document = parse_json(content, "manifest.json", BundleError, hint="")
-        missing = [key for key in _KEYS if key not in document]
-        missing += [f"objects[{k}].{key}" for k, o in enumerate(document["objects"]) for key in _OBJECT_KEYS if key not in o]
-        if missing or document["schema"] != 1:
-            what = f"lacks {', '.join(missing)}" if missing else f"schema {document['schema']}, expected 1"
-            yield finding("manifest-schema", "manifest.json", what)
-            return
-        yield from _objects(urdf, document["objects"])
-    except (BundleError, ValueError, KeyError, TypeError, AttributeError) as error:
-        yield finding("manifest-schema", "manifest.json", f"cannot be read: {error}")
+        manifest = checked(Manifest, document, "manifest.json", BundleError, hint="")
+    except BundleError as error:
+        yield finding("manifest-schema", "manifest.json", str(error).removeprefix("manifest.json: "))
+        return
+    yield from _objects(urdf, manifest.objects)
 
 
-def _objects(urdf: Urdf, objects: list[dict[str, Any]]) -> Iterator[Finding]:
+def _objects(urdf: Urdf, objects: list[ManifestObject]) -> Iterator[Finding]:
     poses = urdf.world_poses()
     joints = {joint.name: joint for joint in urdf.joints}
     claimed: set[str] = set()
     for item in objects:
-        links = _links_of(item["name"], urdf, [str(other["name"]) for other in objects])
+        links = _links_of(item.name, urdf, [other.name for other in objects])
         if not links:
-            yield finding("manifest-object", item["name"], "no link of the URDF starts with this name")
+            yield finding("manifest-object", item.name, "no link of the URDF starts with this name")
             continue
         claimed |= links
-        for entry in item.get("joints") or ([item["joint"]] if item["joint"] else []):
-            yield from _joint(entry, joints.get(entry["name"]), poses)
-        listed = {j["name"] for j in item.get("joints") or ([item["joint"]] if item["joint"] else [])}
+        for entry in item.joints:
+            yield from _joint(entry, joints.get(entry.name), poses)
+        listed = {entry.name for entry in item.joints}
         unlisted = {j.name for j in urdf.joints if j.child in links and j.type in MOVING} - listed
         if unlisted:
-            yield finding("manifest-joint", item["name"], f"joints not in the manifest: {', '.join(sorted(unlisted))}")
+            yield finding("manifest-joint", item.name, f"joints not in the manifest: {', '.join(sorted(unlisted))}")
         yield from _meshes_and_mass(item, links, urdf)
     orphans = {x.name for x in urdf.links} - claimed - {WORLD}
     orphans = {name for name in orphans if not name.endswith(SUPPORT_SUFFIX)}
@@ -112,40 +107,40 @@ def _links_of(name: str, urdf: Urdf, names: list[str]) -> set[str]:
     }
 
 
-def _joint(entry: dict[str, Any], joint: UrdfJoint | None, poses: dict[str, Rigid3]) -> Iterator[Finding]:
-    where = str(entry["name"])
+def _joint(entry: ManifestJoint, joint: UrdfJoint | None, poses: dict[str, Rigid3]) -> Iterator[Finding]:
+    where = entry.name
     if joint is None:
         yield finding("manifest-joint", where, "the URDF has no such joint")
         return
-    if joint.type != entry["type"]:
-        yield finding("manifest-joint", where, f"type {entry['type']}, the URDF says {joint.type}")
-    for key in ("lower", "upper"):
+    if joint.type != entry.type:
+        yield finding("manifest-joint", where, f"type {entry.type}, the URDF says {joint.type}")
+    for key, said in (("lower", entry.lower), ("upper", entry.upper)):
         there = (joint.limit or {}).get(key, np.nan)
-        if not abs(there - float(entry[key])) < 1e-5:
-            yield finding("manifest-joint", where, f"{key} {entry[key]}, the URDF says {there:.6g}")
+        if not abs(there - said) < 1e-5:
+            yield finding("manifest-joint", where, f"{key} {said}, the URDF says {there:.6g}")
     pose = poses.get(joint.child)
     if pose is None:
         return
-    axis = np.asarray(entry["axis"], dtype=np.float64)
+    axis = np.asarray(entry.axis, dtype=np.float64)
     turned = pose.turn(joint.axis[None])[0]
     if not float(np.linalg.norm(axis - turned)) < 1e-3:
         yield finding("manifest-joint", where, f"its axis differs from the URDF's by {np.linalg.norm(axis - turned):.3g}")
-    offset = np.asarray(entry["origin"], dtype=np.float64) - pose.translation
+    offset = np.asarray(entry.origin, dtype=np.float64) - pose.translation
     off_line = float(np.linalg.norm(offset - (offset @ turned) * turned))
     if joint.type == "revolute" and not off_line < 1e-4:
         yield finding("manifest-joint", where, f"its hinge line is {1000 * off_line:.1f} mm from the URDF's")
 
 
-def _meshes_and_mass(item: dict[str, Any], links: set[str], urdf: Urdf) -> Iterator[Finding]:
+def _meshes_and_mass(item: ManifestObject, links: set[str], urdf: Urdf) -> Iterator[Finding]:
     own = [link for link in urdf.links if link.name in links]
-    for kind in ("visual", "collision"):
+    for kind, listed in (("visual", item.meshes.visual), ("collision", item.meshes.collision)):
         there = {shape.mesh for link in own for shape in link.shapes if shape.kind == kind and shape.mesh is not None}
-        if there != set(item["meshes"][kind]):
-            differing = sorted(there ^ set(item["meshes"][kind]))
-            yield finding("manifest-mesh", item["name"], f"{kind} meshes differ: {', '.join(differing)}")
+        if there != set(listed):
+            differing = sorted(there ^ set(listed))
+            yield finding("manifest-mesh", item.name, f"{kind} meshes differ: {', '.join(differing)}")
     mass = sum(link.inertial.mass_kg for link in own if link.inertial is not None)
-    if not abs(mass - float(item["mass_kg"])) <= 1e-4 * max(mass, 0.1):
-        yield finding("manifest-mass", item["name"], f"{item['mass_kg']} kg, the URDF's links weigh {mass:.6g} kg")
+    if not abs(mass - item.mass_kg) <= 1e-4 * max(mass, 0.1):
+        yield finding("manifest-mass", item.name, f"{item.mass_kg} kg, the URDF's links weigh {mass:.6g} kg")
 
 
 def _mjcf(urdf: Urdf, content: bytes) -> Iterator[Finding]:

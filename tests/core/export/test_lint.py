@@ -247,6 +247,8 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
     ("manifest-schema", "a list", write("manifest.json", "[]"), set()),
     ("manifest-schema", "another version", manifest(lambda d: d.update(schema=2)), set()),
     ("manifest-schema", "an object without joint", manifest(lambda d: d["objects"][0].pop("joint")), set()),
+    ("manifest-schema", "a category that is no text", manifest(lambda d: d["objects"][0].update(category=3)), set()),
+    ("manifest-schema", "a key that nobody knows", manifest(lambda d: d["objects"][0].update(weight_kg=3.0)), set()),
     ("manifest-object", "an object nobody built", manifest(lambda d: d["objects"][0].update(name="elsewhere")), set()),
     ("manifest-object", "an object forgotten", manifest(lambda d: d["objects"].pop()), set()),
     ("manifest-joint", "another limit", manifest(lambda d: d["objects"][0]["joints"][0].update(upper=3.0)), set()),

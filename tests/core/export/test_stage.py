@@ -17,6 +17,7 @@ from r2c2r_core.export.stage import ExportConfig, check_bundle, write_bundle
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.progress import Progress
+from r2c2r_core.schema.manifest import Manifest
 from tests.core.export.kitchen import CREATED, cabinet, drawer, kitchen, reconstruction
 
 
@@ -79,6 +80,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
         "stages",
         "files",
     ]
+    assert Manifest.model_validate(document).files.keys() == document["files"].keys()
     assert document["created"] == CREATED
     assert document["capture"] == {"name": "hand made", "sha256": "0" * 64, "format": "record3d", "frames": 2}
     np.testing.assert_allclose(document["world_from_capture"], reconstruction().capture.world_from_capture.matrix, atol=1e-8)
