@@ -8,12 +8,13 @@ from typing import Any
 from pydantic import ValidationError
 from sqlmodel import Session, col, select
 
+from app.db import queries
 from app.db.tables import Bundle, Comment, Event, Override, Point, Project, SceneObject, Verdict
 from app.files import ProjectFiles
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
 
-_OF_ACCOUNTS = {"owner_id"}  # numbers of accounts mean others in another database
+_OF_ACCOUNTS = {"owner_id"}  # told by name: numbers of accounts mean others in another database
 _DERIVED = {"certificate"}  # it is in the bundle itself
 
 
@@ -31,10 +32,13 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
     overrides = {row.object_id: row.data for row in session.exec(select(Override).where(Override.project_id == project.id))}
     comments = session.exec(select(Comment).where(Comment.project_id == project.id).order_by(col(Comment.id)))
     bundles = session.exec(select(Bundle).where(Bundle.project_id == project.id).order_by(col(Bundle.version)))
+    owner = queries.owner(session, project)
     return Description(
         id=project.id,
         changed=changed(session, project),
         project=relative(project.model_dump(exclude=_OF_ACCOUNTS), files.root),
+        owner=owner,
+        members=sorted(queries.who_sees(session, project) - {owner}),
         objects=[
             DescribedObject(
                 **item.model_dump(include={"id", "name", "category", "colour", "deleted"}),

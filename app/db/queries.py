@@ -10,7 +10,7 @@ from sqlalchemy.orm import defer
 from sqlmodel import Session, col, select
 
 from app import schemas
-from app.db.tables import Bundle, Event, Job, Override, Point, Project, SceneObject
+from app.db.tables import Account, Bundle, Event, Job, Override, Point, Project, ProjectMember, SceneObject
 from app.errors import NotFound
 
 STAGES: dict[str, tuple[str, ...]] = {
@@ -49,6 +49,18 @@ def live_objects(session: Session, project_id: str, *, deleted: bool = False) ->
     """The project's objects, oldest first; deleted ones only when asked for."""
     query = select(SceneObject).where(SceneObject.project_id == project_id).order_by(col(SceneObject.id))
     return list(session.exec(query if deleted else query.where(col(SceneObject.deleted).is_(False))))
+
+
+def owner(session: Session, project: Project) -> str | None:
+    """The name of who made the project; None for whoever started the server, and where the account is gone."""
+    account = session.get(Account, project.owner_id) if project.owner_id is not None else None
+    return account.name if account else None
+
+
+def who_sees(session: Session, project: Project) -> set[str]:
+    """The owner and the members of the project, by name."""
+    query = select(Account.name).join(ProjectMember).where(ProjectMember.project_id == project.id)
+    return {*session.exec(query), *filter(None, [owner(session, project)])}
 
 
 class Click(NamedTuple):

@@ -39,6 +39,8 @@ class Description(Shape):
     id: str
     changed: float  # when anybody last changed what is in it
     project: dict[str, Any]
+    owner: str | None = None  # accounts go by name: another database numbers them otherwise
+    members: list[str] | None = None  # None where it was not told
     objects: list[DescribedObject]
     comments: list[dict[str, Any]] = Field(default_factory=list)
     bundles: list[dict[str, Any]] = Field(default_factory=list)

@@ -5,10 +5,11 @@ changes by the command line (`r2c2r user`) are noticed within a tidy.
 """
 
 from sqlalchemy import Engine
-from sqlmodel import Session, col, select
+from sqlmodel import col, select
 
+from app.db import queries
 from app.db.engine import reading
-from app.db.tables import Account, Job, Project, ProjectMember
+from app.db.tables import Job, Project
 from app.security import Person
 
 
@@ -39,15 +40,4 @@ class Access:
         """Members or accounts changed."""
         with reading(self._engine) as session:
             closed = session.exec(select(Project).where(col(Project.members_only).is_(True))).all()
-            self._closed = {project.id: frozenset(names(session, project)) for project in closed}
-
-
-def owner(session: Session, row: Project) -> str | None:
-    account = session.get(Account, row.owner_id) if row.owner_id is not None else None
-    return account.name if account else None
-
-
-def names(session: Session, row: Project) -> set[str]:
-    """The owner and the members, by name."""
-    query = select(Account.name).join(ProjectMember).where(ProjectMember.project_id == row.id)
-    return {*session.exec(query), *filter(None, [owner(session, row)])}
+            self._closed = {project.id: frozenset(queries.who_sees(session, project)) for project in closed}

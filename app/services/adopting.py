@@ -21,7 +21,7 @@ from app.db.description import placed, read_description
 from app.db.engine import writing
 from app.db.keys import stored_entry
 from app.db.queries import clicks_of
-from app.db.tables import Bundle, Comment, Event, Job, Point, Project, SceneObject, Verdict
+from app.db.tables import Account, Bundle, Comment, Event, Job, Point, Project, ProjectMember, SceneObject, Verdict
 from app.files import ProjectFiles, project_files
 from app.jobs.outcomes import adopt_capture, bundle_row
 from app.schemas.description import DescribedObject, DescribedPoint, Description
@@ -29,7 +29,7 @@ from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.segment.prompts import parse_prompts
 
 _log = logging.getLogger(__name__)
-CHOSEN = {"name", "segmenter", "generator", "matcher", "review_state"}  # what people chose about a project
+CHOSEN = {"name", "segmenter", "generator", "matcher", "members_only", "review_state"}  # what people chose about a project
 _ID = re.compile(r"[0-9a-f]{12}")
 
 
@@ -69,6 +69,7 @@ def adopt(session: Session, data_dir: Path, description: Description, who: str) 
     items = _adopt_objects(session, project, files, description, who, deleted_too=not known)
     _adopt_comments(session, project, description, items)
     _adopt_bundles(session, project, files, description)
+    _adopt_people(session, project, description)
     if not known:
         _read_again(session, project, files, who)
     for name in CHOSEN & row.keys():
@@ -156,6 +157,20 @@ def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, desc
             row = bundle_row(project, kept, int(number))
             row.sqlmodel_update({key: told[kept.name][key] for key in ("created", "inputs") if key in told.get(kept.name, {})})
             session.add(row)
+
+
+def _adopt_people(session: Session, project: Project, description: Description) -> None:
+    """Its owner and members as far as they have accounts here: whose name nobody has is not let in."""
+    if description.members is None:
+        return
+    told = {*description.members, *filter(None, [description.owner])}
+    found = {account.name: account.id for account in session.exec(select(Account).where(col(Account.name).in_(told)))}
+    if project.owner_id is None and description.owner in found:
+        project.owner_id = found[description.owner]
+    session.exec(delete(ProjectMember).where(col(ProjectMember.project_id) == project.id))
+    session.add_all(
+        ProjectMember(project_id=project.id, account_id=found[name] or 0) for name in description.members if name in found
+    )
 
 
 def _read_again(session: Session, project: Project, files: ProjectFiles, who: str) -> None:

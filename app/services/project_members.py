@@ -9,7 +9,7 @@ from app.db import queries
 from app.db.engine import reading, writing
 from app.db.tables import Account, Event, Project, ProjectMember
 from app.errors import Forbidden
-from app.services import access, projects
+from app.services import projects
 from app.services.context import Context
 from r2c2r_core.errors import InputError
 
@@ -18,12 +18,12 @@ def members(context: Context, project_id: str) -> schemas.ProjectMembers:
     """Who may see the project."""
     with reading(context.engine) as session:
         row = queries.project_row(session, project_id)
-        owner, may_change = access.owner(session, row), _may_change(context, session, row)
+        owner, may_change = queries.owner(session, row), _may_change(context, session, row)
         everybody = session.exec(select(Account.name).order_by(col(Account.name))).all() if may_change else []
         return schemas.ProjectMembers(
             members_only=row.members_only,
             owner=owner,
-            members=sorted(access.names(session, row) - {owner}),
+            members=sorted(queries.who_sees(session, row) - {owner}),
             may_change=may_change,
             accounts=[name for name in everybody if name != owner],
         )
@@ -58,4 +58,4 @@ def _sees(context: Context, session_id: str, project_id: str) -> bool:
 
 
 def _may_change(context: Context, session: Session, row: Project) -> bool:
-    return context.person.may("admin") or (context.person.account and access.owner(session, row) == context.who)
+    return context.person.may("admin") or (context.person.account and queries.owner(session, row) == context.who)

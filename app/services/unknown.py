@@ -44,6 +44,7 @@ def adopt(context: Context, entry: str) -> schemas.Project:
     if only_said:
         delete_folder(folder)  # all it said is in the database
     (files.root / LEFT).unlink(missing_ok=True)
+    context.access.look_again()
     project = projects.get_project(context, description.id)
     if project.job is not None:  # its recording is read again
         context.runner.queued(project.job.id)

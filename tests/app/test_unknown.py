@@ -120,6 +120,41 @@ def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted
         assert web.get("/api/unknown") == []
 
 
+def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(start: Start, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+
+    def signed_in(web: Running, name: str) -> TestClient:
+        client = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"})
+        assert client.post("/api/login", json={"name": name, "password": "three plain words"}).status_code == 204
+        return client
+
+    def add(web: Running, *names: str) -> None:
+        for name in names:
+            accounts.add(web.context.engine, name, "annotator", "three plain words")
+
+    with start() as web:
+        add(web, "alice", "bob", "carol")
+        project = signed_in(web, "alice").post("/api/projects/sample", json={}).json()["id"]
+        web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
+        members = f"/api/projects/{project}/members"
+        kept_to = {"members_only": True, "members": ["bob", "carol"]}
+        assert web.client.put(members, json=kept_to).status_code == 200
+    lose(data)
+    (data / "projects" / project).rename(tmp_path / project)
+    with start() as web:
+        add(web, "dave", "bob", "alice")  # other numbers than they had, and nobody is carol
+        web.settings.unknown.mkdir(exist_ok=True)
+        (tmp_path / project).rename(web.settings.unknown / project)
+        web.post(f"/api/unknown/{project}/adopt")
+        assert {name: signed_in(web, name).get(members).status_code for name in ("alice", "bob", "dave")} == {
+            "alice": 200,
+            "bob": 200,
+            "dave": 404,
+        }
+        told = signed_in(web, "alice").get(members).json()
+        assert (told["members_only"], told["owner"], told["members"], told["may_change"]) == (True, "alice", ["bob"], True)
+
+
 def test_only_an_admin_sees_what_was_set_aside(web: Running) -> None:
     accounts.add(web.context.engine, "eve", "reviewer", "three plain words")
     eve = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"})
