@@ -16,12 +16,18 @@ def list_unknown(context: AdminCtx) -> list[schemas.UnknownFolder]:
 
 
 @router.post("/{entry}/adopt", operation_id="adoptUnknown")
-def adopt_unknown(context: AdminCtx, entry: str) -> schemas.Project:
+async def adopt_unknown(context: AdminCtx, entry: str) -> schemas.Project:
     """Make it a project again, with its clicks, verdicts, corrections, comments, recording and bundles."""
-    return unknown.adopt(context, entry)
+    return await context.gates.looks.run(context.who, unknown.adopt, context, entry)
 
 
 @router.post("/{entry}/leave", operation_id="leaveUnknown")
 def leave_unknown(context: AdminCtx, entry: str) -> schemas.UnknownFolder:
     """Leave it where it is; it is shown as left."""
     return unknown.leave(context, entry)
+
+
+@router.post("/{entry}/discard", operation_id="discardUnknown", status_code=204)
+def discard_unknown(context: AdminCtx, entry: str) -> None:
+    """Delete the bytes of an upload."""
+    unknown.discard(context, entry)

@@ -47,7 +47,7 @@ from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, Overrid
 from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
 from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
 from app.schemas.system import Backend, BundleFormat, Category, FolderEntry, FolderListing, SystemInfo
-from app.schemas.unknown import UnknownFolder
+from app.schemas.unknown import UnknownFolder, UnknownKind
 from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
 from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject, PromptsFilePoint
@@ -135,6 +135,7 @@ __all__ = [
     "UndoRequest",
     "Undone",
     "UnknownFolder",
+    "UnknownKind",
     "Upload",
     "UploadIn",
     "VerdictIn",

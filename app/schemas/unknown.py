@@ -4,12 +4,15 @@ from typing import Literal
 
 from app.schemas.base import Shape
 
+UnknownKind = Literal["project", "newer", "upload", "other"]
+"""newer: what a project's folder said before an older database was restored; upload: bytes of one, maybe not all of them."""
+
 
 class UnknownFolder(Shape):
     """One file or folder that was set aside, and what is in it."""
 
     entry: str  # its name in the folder unknown/
-    kind: Literal["project", "newer", "other"]  # newer: what a project's folder said before an older database was restored
+    kind: UnknownKind
     name: str  # the project's, where it is one
     path: str
     size_bytes: int

@@ -1,19 +1,25 @@
-"""What was set aside, for an admin: what is in it, adopting it, leaving it."""
+"""What was set aside, for an admin: what is in it, adopting it, leaving it, discarding the bytes of an upload."""
 
+import logging
+import secrets
 import shutil
+import time
 from pathlib import Path
 
 from app import schemas
 from app.db.engine import reading, writing
-from app.db.tables import Project
+from app.db.tables import Project, Upload
 from app.errors import Conflict, NotFound
 from app.files import ProjectFiles, delete_folder, folder_bytes, project_files
 from app.schemas.description import Description
-from app.services import adopting, projects
+from app.services import adopting, imports, projects, uploads
 from app.services.context import Context
 from r2c2r_core.errors import InputError
 
+_log = logging.getLogger(__name__)
+
 LEFT = "left"  # a mark in the folder
+_RECORDING = "Recovered.zip"  # what the file was called was in the row alone; an .r3d is a zip as well
 
 
 def everything(context: Context) -> list[schemas.UnknownFolder]:
@@ -22,10 +28,13 @@ def everything(context: Context) -> list[schemas.UnknownFolder]:
 
 
 def adopt(context: Context, entry: str) -> schemas.Project:
-    """Make it a project again, or give the project that is there what it says beyond the database."""
+    """Make it a project again, or give the project that is there what it says beyond the database.
+
+    The bytes of an upload are looked at by a process, which is waited for: call it behind the gate of looks.
+    """
     folder = _found(context, entry)
     if not folder.is_dir():
-        raise InputError(f"{entry} is no project's folder", hint="import it by its path if it is a recording")
+        return _adopt_upload(context, folder)
     description = adopting.described(folder)
     files = project_files(context.settings.data_dir, description.id)
     only_said = _only_said(folder)
@@ -60,6 +69,24 @@ def leave(context: Context, entry: str) -> schemas.UnknownFolder:
     return _shape(context, folder)
 
 
+def discard(context: Context, entry: str) -> None:
+    """Delete the bytes of an upload; a project's folder is never deleted from here."""
+    path = _found(context, entry)
+    if path.is_dir():
+        raise InputError(f"{entry} is a folder, and only bytes of an upload are discarded", hint="adopt it, or leave it there")
+    path.unlink()
+    _log.warning("%s: discarded by %s", path, context.who)
+
+
+def _adopt_upload(context: Context, path: Path) -> schemas.Project:
+    """A new project from a recording of which every byte arrived."""
+    uploads.check(context, path, path.name)
+    row = Upload(id=secrets.token_hex(6), file_name=_RECORDING, size=path.stat().st_size, who=context.who, created=time.time())
+    with writing(context.engine) as session:
+        session.add(row)
+    return imports.from_finished_upload(context, row, path)
+
+
 def _found(context: Context, entry: str) -> Path:
     for path in context.settings.unknown.glob("*"):
         if path.name == entry:
@@ -76,16 +103,17 @@ def _shape(context: Context, path: Path) -> schemas.UnknownFolder:
     files, why_not = ProjectFiles(path, path / "work"), ""
     description: Description | None = None
     try:
-        if not path.is_dir():
-            raise InputError("bytes of an upload that the database does not know")
-        description = adopting.described(path)
-        why_not = _why_not(context, path, description)
+        if path.is_dir():
+            description = adopting.described(path)
+            why_not = _why_not(context, path, description)
+        else:
+            uploads.check_whole(context, path, "it")
     except InputError as error:
         why_not = str(error)
     live = [entry for entry in description.objects if not entry.deleted] if description else []
     return schemas.UnknownFolder(
         entry=path.name,
-        kind="other" if description is None else "newer" if _only_said(path) else "project",
+        kind=_kind(path, description),
         name=str(description.project["name"]) if description else path.name,
         path=str(path),
         size_bytes=folder_bytes(path) if path.is_dir() else path.stat().st_size,
@@ -93,10 +121,18 @@ def _shape(context: Context, path: Path) -> schemas.UnknownFolder:
         objects=len(live),
         clicks=sum(len(entry.points) for entry in live),
         bundles=len(list(files.bundles.glob("v*.zip"))),
-        recording=any(files.source.glob("*")),
+        recording=any(files.source.glob("*")) or not (path.is_dir() or why_not),
         why_not=why_not,
         left=(path / LEFT).exists(),
     )
+
+
+def _kind(path: Path, description: Description | None) -> schemas.UnknownKind:
+    if not path.is_dir():
+        return "upload"
+    if description is None:
+        return "other"
+    return "newer" if _only_said(path) else "project"
 
 
 def _why_not(context: Context, path: Path, description: Description) -> str:

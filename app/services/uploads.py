@@ -81,7 +81,7 @@ def finish(context: Context, upload_id: str) -> schemas.Project:
         if found.offset != row.size:
             raise Conflict(f"{found.offset} of {row.size} bytes are here", hint="send the rest first", current=found.offset)
         try:
-            _check(context, _present(context, row), row.file_name)
+            check(context, _present(context, row), row.file_name)
         except CaptureError:
             _delete(context, upload_id)
             raise
@@ -145,11 +145,17 @@ async def _store(context: Context, upload_id: str, at: int, size: int, stream: A
     return at
 
 
-def _check(context: Context, path: Path, file_name: str) -> None:
-    """Raise CaptureError, in one line, for what the import could not read."""
-    settings, name = context.settings, safe_name(file_name)
-    archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
+def check(context: Context, path: Path, file_name: str) -> None:
+    """Raise CaptureError, in one line, for what the import could not read. It waits for a process, as `finish` does."""
+    name = safe_name(file_name)
+    check_whole(context, path, name)
     probing.look_at(context, "recording", path, name)
+
+
+def check_whole(context: Context, path: Path, name: str) -> None:
+    """Raise CaptureError unless all of a zip is there, and is what may be unpacked."""
+    settings = context.settings
+    archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
 
 
 def _delete(context: Context, upload_id: str) -> None:

@@ -819,7 +819,7 @@ export interface Undone {
 /** One file or folder that was set aside, and what is in it. */
 export interface UnknownFolder {
   entry: string;
-  kind: "project" | "newer" | "other";
+  kind: "project" | "newer" | "upload" | "other";
   name: string;
   path: string;
   size_bytes: number;
@@ -1066,6 +1066,8 @@ export interface Operations {
   listUnknown: { parameters: Record<string, never>; body: undefined; answer: UnknownFolder[] };
   /** POST /api/unknown/{entry}/adopt */
   adoptUnknown: { parameters: { entry: string }; body: undefined; answer: Project };
+  /** POST /api/unknown/{entry}/discard */
+  discardUnknown: { parameters: { entry: string }; body: undefined; answer: unknown };
   /** POST /api/unknown/{entry}/leave */
   leaveUnknown: { parameters: { entry: string }; body: undefined; answer: UnknownFolder };
   /** GET /api/uploads */

@@ -169,6 +169,8 @@ export const listUnknown = () => get("/api/unknown");
 export const adoptUnknown = (entry) => send("POST", `/api/unknown/${encodeURIComponent(entry)}/adopt`);
 /** @param {string} entry @returns {Promise<UnknownFolder>} */
 export const leaveUnknown = (entry) => send("POST", `/api/unknown/${encodeURIComponent(entry)}/leave`);
+/** @param {string} entry @returns {Promise<void>} */
+export const discardUnknown = (entry) => send("POST", `/api/unknown/${encodeURIComponent(entry)}/discard`);
 
 /** @returns {Promise<Upload[]>} */
 export const listUploads = () => get("/api/uploads");

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -162,6 +163,7 @@ def test_only_an_admin_sees_what_was_set_aside(web: Running) -> None:
     assert eve.get("/api/unknown").status_code == 403
     assert eve.post("/api/unknown/x/adopt").status_code == 403
     assert eve.post("/api/unknown/x/leave").status_code == 403
+    assert eve.post("/api/unknown/x/discard").status_code == 403
 
 
 def test_what_is_no_project_is_shown_and_not_adopted(web: Running) -> None:
@@ -170,12 +172,34 @@ def test_what_is_no_project_is_shown_and_not_adopted(web: Running) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     shown = {entry["entry"]: entry for entry in web.get("/api/unknown")}
-    assert {entry["kind"] for entry in shown.values()} == {"other"}
+    assert {name: entry["kind"] for name, entry in shown.items()} == {"a": "other", "b": "other", "c.part": "upload"}
     assert "version" in shown["a"]["why_not"]
     assert "neither project.json nor a recording" in shown["b"]["why_not"]
+    assert "not a zip" in shown["c.part"]["why_not"]
     for name in shown:
-        assert web.post(f"/api/unknown/{name}/adopt", status=422)["kind"] == "input"
+        assert web.post(f"/api/unknown/{name}/adopt", status=422)["kind"] in ("input", "capture")
     assert (folder / "a" / "project.json").exists()
+    assert (folder / "c.part").exists()
+
+
+def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_are_discarded(web: Running) -> None:
+    folder = web.settings.unknown
+    folder.mkdir()
+    with zipfile.ZipFile(folder / "whole.part", "w") as recording:
+        recording.writestr("metadata", "{}")
+    content = (folder / "whole.part").read_bytes()
+    (folder / "half.part").write_bytes(content[: len(content) // 2])
+    (folder / "project").mkdir()
+    half, whole = sorted((entry for entry in web.get("/api/unknown") if entry["kind"] == "upload"), key=lambda e: e["entry"])
+    assert ("cut short" in half["why_not"], half["recording"]) == (True, False)
+    assert (whole["why_not"], whole["recording"]) == ("", True)
+    project = web.post("/api/unknown/whole.part/adopt")["id"]
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
+    assert (project_files(web.settings.data_dir, project).source / "Recovered.zip").read_bytes() == content
+    assert web.get("/api/uploads") == []
+    assert web.client.post("/api/unknown/half.part/discard").status_code == 204
+    assert web.post("/api/unknown/project/discard", status=422)["kind"] == "input"
+    assert {path.name for path in folder.iterdir()} == {"project"}
 
 
 def test_a_folder_of_an_older_version_is_adopted_with_the_clicks_of_its_last_run(start: Start, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
-/** What lay in the data folder without a row in the database: an admin sees what is in it and adopts or leaves it. */
+/** What lay in the data folder without a row in the database: an admin sees what is in it and adopts, leaves or discards it. */
 
-import { adoptUnknown, leaveUnknown, listUnknown } from "../api.js";
+import { adoptUnknown, discardUnknown, leaveUnknown, listUnknown } from "../api.js";
 import { h } from "../dom.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { say, sayError } from "./toasts.js";
@@ -44,9 +44,10 @@ export class UnknownList extends HTMLElement {
   /** @param {UnknownFolder} entry */
   #row(entry) {
     const when = entry.changed === null ? "" : `changed ${ago(entry.changed, Date.now() / 1000)}`;
+    const ofProject = entry.kind === "project" || entry.kind === "newer";
     const holds = [
       entry.recording ? "recording" : "",
-      entry.kind === "other" ? "" : counted(entry.objects, "object"),
+      ofProject ? counted(entry.objects, "object") : "",
       entry.clicks ? counted(entry.clicks, "click") : "",
       entry.bundles ? counted(entry.bundles, "bundle") : "",
       bytes(entry.size_bytes),
@@ -57,6 +58,12 @@ export class UnknownList extends HTMLElement {
     adopt.addEventListener("click", () => this.#do(adoptUnknown(entry.entry), `${entry.name} is adopted`));
     const leave = h("button", { type: "button", class: "quiet" }, "Leave it there");
     leave.addEventListener("click", () => this.#do(leaveUnknown(entry.entry), `${entry.name} stays where it is`));
+    const discard = h("button", { type: "button", class: "quiet" }, "Discard…");
+    discard.setAttribute("aria-label", `Discard ${entry.name}`);
+    discard.addEventListener("click", () => {
+      if (!confirm(`Delete ${entry.name}, ${bytes(entry.size_bytes)} of an upload? This cannot be undone.`)) return;
+      this.#do(discardUnknown(entry.entry), `${entry.name} is deleted`);
+    });
     return h(
       "li",
       {},
@@ -64,7 +71,7 @@ export class UnknownList extends HTMLElement {
       h("div", {}, holds.filter(Boolean).join(" · ")),
       h("div", { class: "muted" }, entry.path),
       entry.why_not ? h("div", { class: "muted" }, `Cannot be adopted: ${entry.why_not}`) : "",
-      h("div", { class: "row" }, adopt, entry.left || entry.kind === "other" ? "" : leave),
+      h("div", { class: "row" }, adopt, ofProject && !entry.left ? leave : "", entry.kind === "upload" ? discard : ""),
     );
   }
 
@@ -79,7 +86,7 @@ export class UnknownList extends HTMLElement {
 }
 
 const WHY =
-  "The database does not know these: it was lost, or an older copy was restored. Nothing of them is deleted. Adopting makes a " +
-  "project with its clicks, verdicts, corrections, comments, recording and bundles; what is newer than the database is added to " +
-  "its project, and can be undone.";
-const KINDS = { project: "project", newer: "newer than the database", other: "no project" };
+  "The database does not know these: it was lost, or an older copy was restored. Nothing of them is deleted by itself. Adopting " +
+  "makes a project with its clicks, verdicts, corrections, comments, recording and bundles; what is newer than the database is " +
+  "added to its project, and can be undone.";
+const KINDS = { project: "project", newer: "newer than the database", upload: "upload", other: "no project" };
