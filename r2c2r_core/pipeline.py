@@ -14,6 +14,7 @@ from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.candidates import Plan, make_candidates, select_candidate
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.ingest.above import calibrations_beside
+from r2c2r_core.ingest.doctor.doubts import Doubts, find_doubts
 from r2c2r_core.ingest.stage import level_scan, read_recording
 from r2c2r_core.ledger import Kept, Ledger, Reached, Shared, Stage, aside
 from r2c2r_core.model.capture import Capture
@@ -92,10 +93,9 @@ def reconstruct(
 
 
 def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
-    config, tools, said, work = request.config, request.tools, request.overrides, run.work
-    if run.until != "ingest":  # known at once, not after minutes of reading
-        SEGMENTERS.require(tools.segmenter, config.segment.weights)
-        CARCASSES.require(config.synthesize.fixtures)
+    config, said, work = request.config, request.overrides, run.work
+    if run.until != "ingest":
+        require_tools(request)
 
     capture = read_room(request, run)
     if run.until != "ingest":  # a recording may be looked at before anyone clicked
@@ -145,6 +145,22 @@ def read_room(request: Request, run: Ledger) -> Kept[Capture]:
     capture = run.one("ingest", level_scan, scan, request.overrides.room, config, span=(0.95, 1.0))
     run.work.keep_frames(frames.name)
     return capture
+
+
+def require_tools(request: Request) -> None:
+    """Raise where a chosen tool is not there: known at once, not after minutes of reading."""
+    SEGMENTERS.require(request.tools.segmenter, request.config.segment.weights)
+    CARCASSES.require(request.config.synthesize.fixtures)
+
+
+def doubts_about(request: Request, work: Workspace, *, progress: Progress = SILENT) -> Doubts:
+    """What the doctor holds against the recording, to be said before anything is computed; reads it if nobody has."""
+    require_tools(request)
+    with work.locked():
+        run = Ledger(work, progress, "ingest")
+        capture = read_room(request, run)
+        source = Kept(request.source, recording_key(request.source))
+        return Doubts(*run.one("ingest", find_doubts, source, capture, name="doubts").value)
 
 
 def recording_key(source: Path) -> str:

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from r2c2r_core.commands.options import Parsers, add_command, add_json, existing, write_json
+from r2c2r_core.commands.options import Parsers, add_command, add_json, add_reading, existing, with_reading, write_json
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.terminal import show_progress, table
 from r2c2r_core.texts import shown
@@ -17,6 +17,7 @@ def add(parsers: Parsers) -> None:
     added.add_argument("capture", type=Path)
     added.add_argument("--overrides", type=Path, help="what a person said about the room: up, floor, manhattan_yaw, walls")
     added.add_argument("--picture", type=Path, metavar="FILE.png", help="the fused scan and the camera's path, drawn")
+    add_reading(added)
     add_json(added)
 
 
@@ -28,11 +29,12 @@ def info(options: argparse.Namespace) -> int:
     from r2c2r_core.overrides import read_overrides
 
     source = existing(options.capture)
+    config = with_reading(IngestConfig(), options)
     overrides = read_overrides(options.overrides) if options.overrides else None
     with tempfile.TemporaryDirectory(prefix="r2c2r-info-") as store, show_progress() as progress:
         reading = progress.for_stage("ingest")
         try:
-            capture = read_capture(source, Path(store), IngestConfig(), overrides=overrides, progress=reading)
+            capture = read_capture(source, Path(store), config, overrides=overrides, progress=reading)
         except CaptureError as problem:
             if options.json:
                 write_json(options.json, refusal_to_json(problem))

@@ -7,16 +7,21 @@ import os
 import re
 import stat
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import InputError
 from r2c2r_core.workspace import write_atomically
 
+if TYPE_CHECKING:
+    from r2c2r_core.ingest.stage import IngestConfig
+
 Command = Callable[[argparse.Namespace], int]
 Parsers = Any  # what ArgumentParser.add_subparsers returns: argparse has no public name for it
 
+_LARGEST_FACTOR = 10_000.0
 _LEAST_SIDE_PX, _MOST_SIDE_PX = 64, 4096  # of a synthetic recording: a phone's videos end at 3840
 DATA = Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r"))
 
@@ -43,6 +48,35 @@ def add_data_folder(parser: argparse.ArgumentParser) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """--json: the same findings for a program."""
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON too")
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """--depth-scale, --register-depth: what mends a recording that `r2c2r info` finds fault with."""
+    parser.add_argument(
+        "--depth-scale", type=factor, metavar="FACTOR", help="multiply the recorded depth, such as 0.1 (`r2c2r info` names it)"
+    )
+    parser.add_argument(
+        "--register-depth", action="store_true", help="move depth onto the colour images, by the fit that `r2c2r info` names"
+    )
+
+
+def with_reading(config: "IngestConfig", options: argparse.Namespace) -> "IngestConfig":
+    """The configuration with what those options say."""
+    said: dict[str, Any] = {"register_depth": True} if options.register_depth else {}
+    if options.depth_scale is not None:
+        said["depth_scale"] = options.depth_scale
+    return replace(config, **said)
+
+
+def factor(text: str) -> float:
+    """A positive factor of length."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= _LARGEST_FACTOR:
+        raise argparse.ArgumentTypeError(f"{text[:40]}: expected a positive number, such as 0.1")
+    return value
 
 
 def whole(least: int, most: int) -> Callable[[str], int]:

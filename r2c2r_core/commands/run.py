@@ -10,13 +10,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from r2c2r_core.commands.options import Parsers, add_command, existing, seed, whole
-from r2c2r_core.errors import InputError
+from r2c2r_core.commands.options import Parsers, add_command, add_reading, existing, seed, whole, with_reading
+from r2c2r_core.errors import CaptureError, InputError
 from r2c2r_core.terminal import show_progress, table
 from r2c2r_core.texts import shown
 
 if TYPE_CHECKING:
     from r2c2r_core.config import ReconstructConfig
+    from r2c2r_core.ingest.doctor.doubts import Doubts
 
 
 def add(parsers: Parsers) -> None:
@@ -28,6 +29,7 @@ def add(parsers: Parsers) -> None:
     added.add_argument("--workdir", type=Path, help="where stages are kept (default: beside the bundle)")
     added.add_argument("--overrides", type=Path)
     added.add_argument("--config", type=Path)
+    add_reading(added)
     for seam in ("segmenter", "generator", "matcher"):
         added.add_argument(f"--{seam}")
     added.add_argument("--fixtures", help="what makes carcasses: boards (default), or scene-synthesizer, the paper's")
@@ -40,13 +42,16 @@ def add(parsers: Parsers) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Headless reconstruction: recording and prompts in, certified bundle out."""
+    from r2c2r_core.config import ReconstructConfig, read_config
+
+    settings = read_config(options.config) if options.config else ReconstructConfig()
     passed = write_bundle(
         existing(options.capture),
         options.prompts,
         options.output,
         workdir=options.workdir,
         overrides=options.overrides,
-        config=options.config,
+        config=replace(settings, ingest=with_reading(settings.ingest, options)),
         tools=_given(options, "segmenter", "generator", "matcher"),
         fixtures=options.fixtures,
         seed=options.seed,
@@ -63,7 +68,7 @@ def write_bundle(
     *,
     workdir: Path | None = None,
     overrides: Path | None = None,
-    config: Path | None = None,
+    config: "ReconstructConfig | None" = None,
     tools: Mapping[str, str] = MappingProxyType({}),
     fixtures: str | None = None,
     seed: int = 0,
@@ -74,10 +79,10 @@ def write_bundle(
 
     `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` wins over the configuration's.
     """
-    from r2c2r_core.config import ReconstructConfig, read_config
+    from r2c2r_core.config import ReconstructConfig
     from r2c2r_core.disk import explained_io
     from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
-    from r2c2r_core.pipeline import Request, Tools, reconstruct, restricted_licences
+    from r2c2r_core.pipeline import Request, Tools, doubts_about, reconstruct, restricted_licences
     from r2c2r_core.segment.prompts import read_prompts
     from r2c2r_core.workspace import Workspace
 
@@ -87,13 +92,17 @@ def write_bundle(
         source=capture,
         prompts=read_prompts(prompts),
         overrides=read_overrides(overrides) if overrides else NO_OVERRIDES,
-        config=_with_fixtures(read_config(config) if config else ReconstructConfig(), fixtures),
+        config=_with_fixtures(config or ReconstructConfig(), fixtures),
         tools=Tools(**tools),
         seed=seed,
     )
     for line in restricted_licences(request):
         print(f"r2c2r: {line}", file=sys.stderr)
     work = Workspace(workdir or destination.with_suffix(".work"))
+    with show_progress() as progress:
+        doubts = doubts_about(request, work, progress=progress)
+    if doubts.reasons:
+        _warn(capture, doubts)
     with show_progress() as progress:
         outcome = reconstruct(request, work, workers=workers, progress=progress)
     assert outcome.reconstruction is not None
@@ -111,6 +120,15 @@ def write_bundle(
         print(shown(f"r2c2r: {name} is not in the bundle: {reason}"), file=sys.stderr)
     print(f"{destination}: certificate {'passed' if outcome.certificate.passed else 'FAILED'}")
     return outcome.certificate.passed and not outcome.failures
+
+
+def _warn(capture: Path, doubts: "Doubts") -> None:
+    """One line about an unusable recording; raises CaptureError where nothing can come of it."""
+    first, *others = doubts.reasons
+    if doubts.hopeless:
+        raise CaptureError(f"{capture}: {first}", hint="see `r2c2r info`")
+    more = f" (and {len(others)} more: `r2c2r info` names them)" if others else ""
+    print(shown(f"r2c2r: {capture} is unusable: {first}{more}; going on all the same"), file=sys.stderr)
 
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, str]:

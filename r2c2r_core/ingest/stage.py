@@ -21,6 +21,7 @@ from r2c2r_core.ingest.planes import sample_surface
 from r2c2r_core.ingest.poses import SettledPoses, refine_poses
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.ingest.registering import register_depth
 from r2c2r_core.ingest.rgb import stored_jpeg
 from r2c2r_core.ingest.store import StoredImages, new_store, open_images, write_depth, write_rgb
 from r2c2r_core.model.capture import Capture, Frame, PoseEvidence, Scan, SceneSurface
@@ -52,6 +53,15 @@ class IngestConfig:
     least_valid_share: float = setting(
         0.2, "share of the median frame that depth of high confidence must leave to be used alone", ge=0, le=1
     )
+    depth_scale: float = setting(
+        1.0,
+        "factor to metres that the recorded depth lacks: 0.1 where a tenth of a millimetre was read as one",
+        gt=0,
+        le=10_000,
+    )
+    register_depth: bool = setting(
+        False, "whether depth that does not lie on the colour images is moved there, by the fit that `r2c2r info` names"
+    )
     seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
 
 
@@ -72,6 +82,11 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
     with new_store(store) as partial:
         frames, bad = _store_frames(recording, raw, partial, least_confidence, config, progress.part(0.0, 0.5))
         images = StoredImages(partial)
+        registered: tuple[str, ...] = ()
+        if config.register_depth:
+            rng = np.random.default_rng(config.seed)
+            frames, told = register_depth(frames, images, partial, rng, progress.part(0.45, 0.5))
+            images, registered = StoredImages(partial), (told,)
         settled = _settle_poses(frames, raw, images, config, progress.part(0.5, 0.65))
         drop_flying(settled.frames, images, partial, progress.part(0.65, 0.8))
     images = StoredImages(store)
@@ -99,7 +114,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         surface=SceneSurface(vertices_world=surface.vertices, faces=surface.faces, colours=surface.colours, voxel_m=voxel_m),
         images=images,
         up_capture=up_capture,
-        notices=(*recording.notices, *thinned, *unsure, *bad, *settled.notices),
+        notices=(*registered, *recording.notices, *thinned, *unsure, *bad, *settled.notices),
         poses=settled.evidence,
         depth_noise=noise,
     )
@@ -155,7 +170,7 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     jpeg, sharpness = stored_jpeg(recording.colour_of(frame), frame.rgb_name, size)
     raw = recording.depth_of(frame)
     depth = usable_depth(
-        raw.metres,
+        raw.metres * np.float32(config.depth_scale),
         raw.confidence,
         frame.depth_camera,
         least_confidence=least_confidence,

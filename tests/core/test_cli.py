@@ -6,10 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2c2r_core import cli
 from r2c2r_core.cli import main
+
+from .ingest.corruptions import Corruption, corrupt_r3d
+from .ingest.tiny import TinyRoom, write_r3d
 
 
 def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
@@ -54,6 +58,49 @@ def test_unknown_fixtures_are_refused_before_anything_is_read(tmp_path: Path, pr
     scan.write_bytes(b"not read")
     _, said = r2c2r("run", scan, "--prompts", prompts, "-o", tmp_path / "b.zip", "--fixtures", "flatpack", code=2)
     assert one_line(said).strip() == "r2c2r: unknown fixtures 'flatpack'; choose one of: boards, scene-synthesizer"
+
+
+def _tiny(folder: Path, depth_factor: float = 1.0) -> Path:
+    """A recording of a box in a corner, its depth multiplied."""
+    return corrupt_r3d(
+        Corruption(name="unit", depth=lambda depth, _: depth * np.float32(depth_factor)),
+        write_r3d(folder / "good.r3d", TinyRoom(count=6)),
+        folder / "scan.r3d",
+    )
+
+
+def test_what_nothing_can_come_of_is_refused_with_its_mend_before_anything_is_computed(tmp_path: Path, prompts: Path) -> None:
+    work = tmp_path / "work"
+    command = ("run", _tiny(tmp_path, 1000.0), "--prompts", prompts, "-o", tmp_path / "b.zip", "--workdir", work)
+    _, said = r2c2r(*command, code=2)
+    last = said.strip().splitlines()[-1]
+    assert "--depth-scale 0.001" in last
+    assert not list((work / "nouns").glob("segment/*"))
+    _, said = r2c2r(*command, "--depth-scale", "0.001", code=1)  # read; the click on nothing then ends it
+    assert "another unit" not in said
+    assert "unusable" not in said
+    _, said = r2c2r(*command, "--depth-scale", "none", code=2)
+    assert "expected a positive number" in said
+
+
+def test_an_unusable_recording_is_named_in_one_line_before_computing(
+    tmp_path: Path, prompts: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from r2c2r_core.ingest.doctor.doubts import Doubts
+
+    told = Doubts(reasons=("depth lies beside colour; read it with --register-depth", "and more"), hopeless=False)
+    said_before: list[str] = []
+
+    def reconstruct(*_: object, **__: object) -> None:
+        said_before.append(capsys.readouterr().err)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("r2c2r_core.pipeline.doubts_about", lambda *_, **__: told)
+    monkeypatch.setattr("r2c2r_core.pipeline.reconstruct", reconstruct)
+    main(["run", str(_tiny(tmp_path)), "--prompts", str(prompts), "-o", str(tmp_path / "b.zip")])
+    lines = [line for line in said_before[0].splitlines() if "unusable" in line]
+    assert len(lines) == 1
+    assert "--register-depth (and 1 more: `r2c2r info` names them); going on all the same" in lines[0]
 
 
 def test_a_foreign_zip_is_named(tmp_path: Path, prompts: Path) -> None:

@@ -8,7 +8,8 @@ from r2c2r_core.ingest.doctor.measures import measure, moments
 from r2c2r_core.ingest.doctor.pairs import far_pairs, neighbours, stack_views
 from r2c2r_core.ingest.doctor.registration import measure_registration
 from r2c2r_core.ingest.doctor.report import CaptureReport
-from r2c2r_core.ingest.doctor.verdict import judge, worst
+from r2c2r_core.ingest.doctor.unit import likely_unit
+from r2c2r_core.ingest.doctor.verdict import PLAUSIBLE_M, judge, worst
 from r2c2r_core.ingest.readers.protocol import Recording
 from r2c2r_core.model.capture import Capture
 
@@ -33,7 +34,10 @@ def examine(capture: Capture, recording: Recording | None = None) -> CaptureRepo
     registration = measure_registration([capture.frames[p] for p in spread], capture.images, rng)
     grey = grey_views(capture, views)
     figures = measure(capture, views, near, grey, recording)
-    remarks = judge(figures, convention, scale, registration)
+    recorded_m = figures.recorded_depth_m
+    odd = recording is not None and recorded_m is not None and not PLAUSIBLE_M[0] < recorded_m < PLAUSIBLE_M[1]
+    unit = likely_unit(capture, recording, recorded_m, rng) if odd and recording and recorded_m else None
+    remarks = judge(figures, convention, scale, registration, unit)
     return CaptureReport(
         verdict=worst(remarks),
         remarks=remarks,

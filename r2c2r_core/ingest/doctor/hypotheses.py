@@ -184,7 +184,12 @@ def _reordered(order: tuple[int, ...]) -> Callable[[Poses], Poses]:
 
 
 def _unit_tries(views: Views, pairs: Pairs) -> list[_Try]:
-    units = ((0.2, "1/5000 m read as 1/1000 m"), (5.0, "1/1000 m read as 1/5000 m"))
+    units = (
+        (0.1, "1/10000 m read as 1/1000 m"),
+        (0.2, "1/5000 m read as 1/1000 m"),
+        (5.0, "1/1000 m read as 1/5000 m"),
+        (10.0, "1/1000 m read as 1/10000 m"),
+    )
     return [
         _Try(
             "depth_scale",

@@ -3,18 +3,25 @@
 from r2c2r_core.ingest.doctor.hypotheses import Finding
 from r2c2r_core.ingest.doctor.registration import Registration
 from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Verdict
+from r2c2r_core.ingest.doctor.unit import Unit
 
+PLAUSIBLE_M = (0.1, 10.0)  # of a recording's median depth; else its unit is another than its format's
 _LEAST_DEPTH = 0.1  # of the median frame
 _MASKS_SUFFER_PX = 4.0  # of 640: a handle's width at 2 m; below, sizes and masks stay within their tolerances
 
+_REGISTER = "read it with --register-depth, which moves the depth there by this fit"
 _SCALE_OF_DRIFT = 0.075  # drift of 3 cm over 2.5 m of a real iPhone walk reads as 5 %
 
 
 def judge(
-    figures: CaptureFigures, convention: Finding | None, scale: Finding | None, registration: Registration | None
+    figures: CaptureFigures,
+    convention: Finding | None,
+    scale: Finding | None,
+    registration: Registration | None,
+    unit: Unit | None = None,
 ) -> tuple[Remark, ...]:
     """Remarks, worst first; among equals, the cause before its symptoms."""
-    depth, recording = _depth(figures), _recording(figures)
+    depth, recording = _depth(figures, unit), _recording(figures)
     if figures.depth_coverage < _LEAST_DEPTH:  # all else follows from that
         return (*depth, *recording)
     found = (
@@ -33,14 +40,14 @@ def worst(remarks: tuple[Remark, ...]) -> Verdict:
     return remarks[0].verdict if remarks else "good"
 
 
-def _depth(figures: CaptureFigures) -> list[Remark]:
+def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
     shares = figures.confidence_shares
     low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > 0.5 else None
     if figures.depth_coverage < _LEAST_DEPTH:
         recorded = figures.recorded_depth_m
-        if recorded is not None and not 0.1 < recorded < 10:
+        if recorded is not None and not PLAUSIBLE_M[0] < recorded < PLAUSIBLE_M[1]:
             text = f"the recorded depth is {recorded:.4g} m in the median: another unit than the format's"
-            return [_remark("unusable", "depth_unit", text, "export it again, or correct the unit")]
+            return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
         if low:
             advice = "film by more light and from 0.5 to 3 m, or check the confidence files"
             return [
@@ -58,6 +65,13 @@ def _depth(figures: CaptureFigures) -> list[Remark]:
     return []
 
 
+def _unit_advice(unit: Unit | None) -> str:
+    if unit is None:
+        return "export it again, or give the factor to metres with --depth-scale"
+    sure = "the views agree if it is" if unit.measured else "it may be"
+    return f"{sure} {unit.text}: read it with --depth-scale {unit.factor:g}"
+
+
 def _conventions(
     figures: CaptureFigures, convention: Finding | None, scale: Finding | None, registration: Registration | None
 ) -> list[Remark]:
@@ -72,9 +86,9 @@ def _conventions(
     if scale is not None:
         gain = f"views disagree by {scale.error_so_mm:.0f} mm then, {scale.error_given_mm:.0f} mm as it is"
         verdict: Verdict = "usable with care" if _may_be_drift(scale, figures) else "unusable"
-        remarks.append(
-            _remark(verdict, scale.cause, f"{scale.text}: {gain}", "correct the calibration or the unit of the depth")
-        )
+        mend = f", such as --depth-scale {scale.factor:.3g}" if scale.cause == "depth_scale" and scale.factor else ""
+        advice = f"correct the calibration or the unit of the depth{mend}"
+        remarks.append(_remark(verdict, scale.cause, f"{scale.text}: {gain}", advice))
     return remarks
 
 
@@ -82,11 +96,11 @@ def _unregistered(found: Registration) -> Remark:
     if found.focal_only:
         text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
         gain = f": depth lies {found.off_px:.0f} px of 640 beside the picture"
-        return _remark("unusable", "colour_focal_length", text + gain, "correct the colour calibration")
+        return _remark("unusable", "colour_focal_length", text + gain, f"correct the colour calibration, or {_REGISTER}")
     text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
     fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
     verdict: Verdict = "unusable" if found.off_px > _MASKS_SUFFER_PX else "usable with care"
-    return _remark(verdict, "unregistered", text + fit, "export registered depth, or give the two cameras' calibration")
+    return _remark(verdict, "unregistered", text + fit, f"export registered depth, or {_REGISTER}")
 
 
 def _recording(figures: CaptureFigures) -> list[Remark]:

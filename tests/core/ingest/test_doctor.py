@@ -111,6 +111,17 @@ def test_a_corrupted_recording_is_told_by_its_cause(name, scan, tmp_path):
     assert report.remarks[0].cause in named(name).causes, report.reasons
 
 
+@pytest.mark.parametrize("factor", [1000.0, 10.0, 0.1])
+def test_depth_in_another_unit_is_named_with_the_option_that_mends_it(factor, scan, tmp_path):
+    other = Corruption(name="unit", depth=lambda depth, _: depth * np.float32(factor))
+    bad = corrupt_r3d(other, scan, tmp_path / "unit.r3d")
+    report = examine(read_capture(bad, tmp_path / "store", CONFIG), open_recording(bad))
+    assert report.verdict == "unusable"
+    assert any(f"--depth-scale {1 / factor:g}" in reason for reason in report.reasons), report.reasons
+    mended = read_capture(bad, tmp_path / "mended", replace(CONFIG, depth_scale=1 / factor))
+    assert examine(mended).figures.median_depth_m == pytest.approx(1.9, abs=0.3)
+
+
 @pytest.mark.parametrize("name", ["all poses NaN", "all LZFSE truncated"])
 def test_a_hopeless_recording_is_refused_in_one_line(name, scan, tmp_path):
     with pytest.raises(CaptureError, match=named(name).refusal) as problem:

@@ -1,0 +1,81 @@
+"""Depth in another unit than its format's: which one, by what the frames agree on."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Image
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.doctor.pairs import compare, far_pairs, neighbours, stack_views
+from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
+from r2c2r_core.model.capture import Capture, Depth
+
+_UNITS = {  # factor to metres: what was read as something else
+    0.001: "millimetres read as metres",
+    0.01: "centimetres read as metres",
+    0.0125: "1/10000 m turned by three bits (as in APC) read as 1/1000 m",
+    0.1: "1/10000 m read as 1/1000 m",
+    0.125: "1/1000 m turned by three bits (as in SUN RGB-D), or 1/8000 m, read as 1/1000 m",
+    0.2: "1/5000 m read as 1/1000 m",
+    0.25: "1/4000 m read as 1/1000 m",
+    5.0: "1/1000 m read as 1/5000 m",
+    10.0: "centimetres read as millimetres",
+    100.0: "centimetres read as 1/10000 m",
+    1000.0: "metres read as millimetres",
+}
+_NEAREST_M, _FARTHEST_M = 0.4, 5.0  # median depth of what is filmed with a depth camera
+_USUAL_M = 1.5
+_CLEAR = 0.8  # of the second best's cost: then the frames have told, and not the usual distance
+_VIEWS, _PAIRS = 24, 16
+
+
+class Unit(NamedTuple):
+    """What the recorded depth should be multiplied by."""
+
+    factor: float
+    text: str
+    measured: bool  # by views that agree, rather than by how far off things usually are
+
+
+def likely_unit(capture: Capture, recording: Recording, median_m: float, rng: np.random.Generator) -> Unit | None:
+    """The unit under which things are as far as they are in rooms, and under which most views agree; None where none fits."""
+    fitting = [f for f in _UNITS if _NEAREST_M < f * median_m < _FARTHEST_M]
+    if not fitting:
+        return None
+    costs = {factor: cost for factor in fitting if (cost := _disagreement(capture, recording, factor, rng)) is not None}
+    ranked = sorted(costs, key=lambda factor: costs[factor])
+    if ranked and (len(ranked) == 1 or costs[ranked[0]] < _CLEAR * costs[ranked[1]]):
+        return Unit(ranked[0], _UNITS[ranked[0]], measured=len(ranked) > 1)
+    usual = min(fitting, key=lambda f: abs(np.log(f * median_m / _USUAL_M)))
+    return Unit(usual, _UNITS[usual], measured=False)
+
+
+def _disagreement(capture: Capture, recording: Recording, factor: float, rng: np.random.Generator) -> float | None:
+    """Mean disagreement of views, in what sensors are allowed, if depth were so much larger; None where none overlap."""
+    raw = {frame.index: frame for frame in recording.frames}
+    positions = [p for p, frame in enumerate(capture.frames) if frame.index in raw]
+    positions = positions[:: -(-len(positions) // _VIEWS)] if positions else []
+    try:
+        views = stack_views(capture.frames, _Rescaled(recording, raw, factor), positions, rng) if positions else None
+    except (UnreadableFrame, CaptureError):
+        return None
+    if views is None:
+        return None
+    pairs = np.concatenate([neighbours(views), far_pairs(views, _PAIRS)]) if len(positions) > 1 else np.zeros((0, 2), np.int64)
+    return float(compare(views, pairs).cost.mean()) if len(pairs) else None
+
+
+class _Rescaled:
+    """The recording's own depth, times a factor."""
+
+    def __init__(self, recording: Recording, raw: dict[int, RawFrame], factor: float) -> None:
+        self._recording, self._raw, self._factor = recording, raw, factor
+
+    def rgb(self, frame_index: int) -> Image:
+        """Never asked for."""
+        raise KeyError(frame_index)
+
+    def depth(self, frame_index: int) -> Depth:
+        """Metres under the factor; 0 where nothing was recorded."""
+        metres = np.nan_to_num(self._recording.depth_of(self._raw[frame_index]).metres, posinf=0.0, neginf=0.0) * self._factor
+        return Depth(metres, metres > 0)

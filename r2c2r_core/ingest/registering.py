@@ -1,0 +1,103 @@
+"""Depth laid onto the colour images, by the fit that the doctor finds: where a person asked for it.
+
+Frame and Capture hold one pose and treat depth as seen from the colour camera. A recording whose depth comes from a camera of
+its own is made so here: the colour camera gets the fitted focal length and principal point, poses move to its centre, and each
+depth image is drawn again as that camera would have measured it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.doctor.registration import WIDTH, Registration, measure_registration
+from r2c2r_core.ingest.store import write_depth
+from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.progress import SILENT, Progress
+
+_MEASURED = 30  # frames, as the doctor takes
+
+
+class Registered(NamedTuple):
+    """The frames as the colour camera sees them, and what to tell."""
+
+    frames: tuple[Frame, ...]
+    notice: str
+
+
+def register_depth(
+    frames: Sequence[Frame], images: FrameImages, store: Path, rng: np.random.Generator, progress: Progress = SILENT
+) -> Registered:
+    """Redraw the stored depth where the fit is clearly better than the calibration; else leave all as it is and say so."""
+    spread = frames[:: -(-len(frames) // _MEASURED)]
+    found = measure_registration(spread, images, rng)
+    if found is None:
+        return Registered(tuple(frames), "depth was not registered to the colour images: it shows too few edges to tell where")
+    if not found.wrong:
+        return Registered(
+            tuple(frames), f"depth was left as it is: it lies on the colour images within {found.off_px:.1f} px of 640"
+        )
+    registered = []
+    for position, frame in enumerate(frames):
+        progress.at(position / len(frames), f"registering depth {position + 1}/{len(frames)}")
+        changed = as_colour_sees(frame, found)
+        shift_m = frame.world_from_camera.inverse.apply(changed.world_from_camera.translation[None])[0]
+        write_depth(
+            store, frame.index, redrawn(images.depth(frame.index).metres, frame.depth_camera, changed.depth_camera, shift_m)
+        )
+        registered.append(changed)
+    right_mm, down_mm = -found.shift_mm[0], -found.shift_mm[1]
+    notice = (
+        f"depth was registered to the colour images, beside which it lay {found.off_px:.0f} px of 640: "
+        f"the colour camera has {found.focal_factor:.3f} x the focal length and lies {abs(right_mm):.0f} mm "
+        f"{'right' if right_mm > 0 else 'left'} of the depth camera, "
+        f"{abs(down_mm):.0f} mm {'below' if down_mm > 0 else 'above'}"
+    )
+    return Registered(tuple(registered), notice)
+
+
+def as_colour_sees(frame: Frame, found: Registration) -> Frame:
+    """The frame with the fitted colour camera at its own place, and a depth camera that is the same one at depth's size."""
+    rgb, depth = frame.rgb_camera, frame.depth_camera
+    by = max(rgb.width, rgb.height) / WIDTH  # the fit's pixels are those of an image 640 wide
+    camera = replace(
+        rgb,
+        fx=rgb.fx * found.focal_factor,
+        fy=rgb.fy * found.focal_factor,
+        cx=rgb.cx + found.shift_px[0] * by,
+        cy=rgb.cy + found.shift_px[1] * by,
+    )
+    # A point x of the depth camera is x + shift of the colour camera's, whose centre is at -shift
+    centre_m = -np.array([*found.shift_mm, 0.0]) / 1000.0
+    return replace(
+        frame,
+        rgb_camera=camera,
+        depth_camera=camera.resized(depth.width, depth.height),
+        world_from_camera=frame.world_from_camera @ Rigid3(np.eye(3), centre_m),
+    )
+
+
+def redrawn(depth_m: DepthMetres, source: Intrinsics, target: Intrinsics, target_at_m: np.ndarray) -> DepthMetres:
+    """The depth image as a camera at `target_at_m` in the source's frame would have measured it; where nothing falls, unknown.
+
+    Each pixel is drawn as the square it covers, in as many pieces as leave no gaps; of several, the nearest stays.
+    """
+    pieces = max(1, int(np.ceil(max(target.fx * source.width / (source.fx * target.width), 1.0) + 0.2)))
+    offsets = (np.arange(pieces) + 0.5) / pieces
+    rows, columns = np.nonzero(depth_m > 0)
+    z = depth_m[rows, columns].astype(np.float64) - target_at_m[2]
+    least = np.full(target.height * target.width, np.inf)
+    for down in offsets:
+        for across in offsets:
+            x = (columns + across - source.cx) / source.fx * depth_m[rows, columns] - target_at_m[0]
+            y = (rows + down - source.cy) / source.fy * depth_m[rows, columns] - target_at_m[1]
+            column = np.floor(x / z * target.fx + target.cx).astype(np.int64)
+            row = np.floor(y / z * target.fy + target.cy).astype(np.int64)
+            inside = (column >= 0) & (column < target.width) & (row >= 0) & (row < target.height)
+            np.minimum.at(least, row[inside] * target.width + column[inside], z[inside])
+    return np.where(np.isfinite(least), least, 0.0).astype(np.float32).reshape(target.height, target.width)
