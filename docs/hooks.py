@@ -4,6 +4,8 @@ from dataclasses import Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from r2c2r_core.tuning import modules_with_numbers, params_of
+
 _BOUNDS = {"ge": "from {}", "gt": "above {}", "le": "to {}", "lt": "below {}"}
 _MARK = "<!-- every setting -->"
 
@@ -33,6 +35,7 @@ def tables() -> str:
 def _section(config: Any, path: str) -> list[str]:
     """Heading, table and nested sections of one settings class."""
     nested = [field for field in fields(config) if is_dataclass(getattr(config, field.name))]
+    rooms = [field.metadata["room"] for field in fields(config) if "room" in field.metadata]
     lines = [
         f"### {path}",
         "",
@@ -46,7 +49,26 @@ def _section(config: Any, path: str) -> list[str]:
             cells = (f"`{field.name}`", f"`{getattr(config, field.name)!r}`", _allowed(field), field.metadata["description"])
             lines.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |")
     further = [line for field in nested for line in _section(getattr(config, field.name), f"{path}.{field.name}")]
-    return [*lines, "", *further]
+    numbers = [line for room in rooms for path in modules_with_numbers(room) for line in _numbers(path)]
+    return [*lines, "", *numbers, *further]
+
+
+def _numbers(path: str) -> list[str]:
+    """Heading and table of the tuned numbers of one module."""
+    room, _, module = path.partition(".")
+    of = params_of(path)
+    lines = [f"### {room}.params.{module}", "", *(of.__doc__ or "").split("\n\n")[:1], ""]
+    lines += ["| number | default | unit | meaning | source |", "|---|---|---|---|---|"]
+    for field in fields(of):
+        extra = field.metadata["json_schema_extra"]
+        cells = (f"`{field.name}`", _shown(field.default), extra["unit"], field.metadata["description"], extra["source"])
+        lines.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |")
+    return [*lines, ""]
+
+
+def _shown(value: Any) -> str:
+    """To four places: an angle is written in degrees where it is set."""
+    return ", ".join(f"{each:.4g}" for each in value) if isinstance(value, tuple) else f"{value:.4g}"
 
 
 def _allowed(field: Field[Any]) -> str:

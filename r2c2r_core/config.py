@@ -1,6 +1,6 @@
 """ReconstructConfig: one frozen dataclass per stage, each declared in its stage; --config reads it from JSON."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +9,25 @@ from r2c2r_core.documents import read_json
 from r2c2r_core.export.stage import ExportConfig
 from r2c2r_core.generate.stage import GenerateConfig
 from r2c2r_core.ingest.stage import IngestConfig
-from r2c2r_core.schema.settings import with_settings
+from r2c2r_core.schema.settings import tuned_numbers, with_settings
 from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.synthesize.stage import SynthesizeConfig
+from r2c2r_core.tuning import Changes
 from r2c2r_core.warp.stage import WarpConfig
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KitchenConfig:
+    """What all stages know of kitchens (r2c2r_core/kitchen)."""
+
+    params: Changes = tuned_numbers("kitchen")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeometryConfig:
+    """The geometry that all stages share (r2c2r_core/geometry)."""
+
+    params: Changes = tuned_numbers("geometry")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +41,15 @@ class ReconstructConfig:
     synthesize: SynthesizeConfig = field(default_factory=SynthesizeConfig)
     warp: WarpConfig = field(default_factory=WarpConfig)
     export: ExportConfig = field(default_factory=ExportConfig)
+    kitchen: KitchenConfig = field(default_factory=KitchenConfig)
+    geometry: GeometryConfig = field(default_factory=GeometryConfig)
+
+    @property
+    def numbers(self) -> Changes:
+        """The tuned numbers that are set, by module path."""
+        sections = {stage.name: getattr(self, stage.name) for stage in fields(self)}
+        own = {room: getattr(section, "params", {}) for room, section in sections.items()}
+        return {f"{room}.{module}": values for room, params in own.items() for module, values in params.items()}
 
 
 def read_config(path: Path) -> ReconstructConfig:

@@ -17,6 +17,7 @@ from r2c2r_core.errors import EnvironmentProblem, PromptError, R2C2RError, Stage
 from r2c2r_core.pool import Failed, Pool, Task
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.sources import source_key
+from r2c2r_core.tuning import Changes, changed, tuning
 from r2c2r_core.workspace import Workspace, content_key
 
 T = TypeVar("T")
@@ -100,6 +101,7 @@ class Ledger:
     progress: Progress
     until: Stage = "export"
     pool: Pool = field(default_factory=lambda: Pool(1))
+    numbers: Changes = field(default_factory=dict)  # tuned numbers that this run sets
     seconds: dict[str, float] = field(default_factory=dict)  # by stage: what its results took when they were computed
     failures: dict[str, str] = field(default_factory=dict)  # by object: one line
 
@@ -113,7 +115,7 @@ class Ledger:
     ) -> Kept[T]:
         """The stage's single result, computed when its inputs changed; `span` is its share of the stage's work."""
         progress = self._begin(stage).part(*span)
-        kept = self._once(_Job(self.work.root, stage, name, compute, inputs), progress)
+        kept = self._once(self._job(stage, name, compute, inputs), progress)
         progress.at(1.0, "done")
         return kept
 
@@ -125,7 +127,7 @@ class Ledger:
         Of an input that is a mapping each object is given its own. `alone`: in this process, whatever the pool.
         """
         progress = self._begin(stage)
-        jobs = {name: _Job(self.work.root, stage, name, compute, _own(name, inputs)) for name in names}
+        jobs = {name: self._job(stage, name, compute, _own(name, inputs)) for name in names}
         results = {name: kept for name, job in jobs.items() if (kept := self._found(job)) is not None}
         wanted = {name: job for name, job in jobs.items() if name not in results}
         parallel = not alone and min(len(wanted), self.pool.workers) > 1
@@ -135,7 +137,7 @@ class Ledger:
 
     def stored(self, stage: Stage, compute: Callable[..., T], name: str, *inputs: Any) -> T | None:
         """What an earlier run made of the object with these inputs, when nothing has taken its place yet."""
-        found = self.work.find(stage, name, _Job(self.work.root, stage, name, compute, _own(name, inputs)).key)
+        found = self.work.find(stage, name, self._job(stage, name, compute, _own(name, inputs)).key)
         return None if found is None else found[0]
 
     def decide(self, stage: Stage, choose: Callable[..., T], items: Mapping[str, Kept[Any]], *inputs: Any) -> dict[str, T]:
@@ -143,7 +145,8 @@ class Ledger:
         results: dict[str, T] = {}
         for name, item in items.items():
             try:
-                results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
+                with tuning(changed(self.numbers)):
+                    results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
             except _OBJECT_FAILS as error:
                 self._failed(stage, name, error)
         return results
@@ -165,7 +168,8 @@ class Ledger:
         opening, rest = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
         shared = {input.key: input for job in jobs.values() for input in job.inputs if isinstance(input, Shared)}
         for input in shared.values():
-            _open(input, opening)
+            with tuning(changed(self.numbers)):
+                _open(input, opening)
         _opened.cache_clear()
         results = {}
         tasks = {name: Task(store_noun, (job,)) for name, job in jobs.items()}
@@ -181,6 +185,9 @@ class Ledger:
                 _log.error("%s: %s", name, answer.where)
                 raise answer.error
         return results
+
+    def _job(self, stage: Stage, name: str, compute: Callable[..., Any], inputs: tuple[Any, ...]) -> "_Job":
+        return _Job(self.work.root, stage, name, compute, inputs, self.numbers)
 
     def _found(self, job: "_Job") -> Kept[Any] | None:
         found = self.work.find(job.stage, job.name, job.key)
@@ -220,12 +227,14 @@ class _Job:
     name: str
     compute: Callable[..., Any]
     inputs: tuple[Any, ...]
+    numbers: Changes  # tuned numbers that the run sets
 
     @property
     def key(self) -> str:
-        """Of the stage's source, of the geometry and nouns it stands on, and of the inputs."""
+        """Of the stage's source, of the geometry and nouns it stands on, of its tuned numbers, and of the inputs."""
         rooms = (self.stage, *_STANDS_ON.get(self.stage, ()), "kitchen", "geometry", "model")
-        return content_key(self.stage, self.name, self.compute.__name__, source_key(*rooms), _keys(self.inputs))
+        numbers = {path: values for path, values in self.numbers.items() if path.partition(".")[0] in rooms}
+        return content_key(self.stage, self.name, self.compute.__name__, source_key(*rooms), numbers, _keys(self.inputs))
 
 
 def store_noun(job: _Job, *, progress: Progress) -> None:
@@ -234,7 +243,8 @@ def store_noun(job: _Job, *, progress: Progress) -> None:
 
 
 def _compute(work: Workspace, job: _Job, progress: Progress) -> tuple[Any, float]:
-    return work.once(job.stage, job.name, job.key, lambda: job.compute(*_values(job.inputs, progress), progress=progress))
+    with tuning(changed(job.numbers)):
+        return work.once(job.stage, job.name, job.key, lambda: job.compute(*_values(job.inputs, progress), progress=progress))
 
 
 def _own(name: str, inputs: tuple[Any, ...]) -> tuple[Any, ...]:

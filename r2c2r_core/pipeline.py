@@ -80,7 +80,7 @@ def reconstruct(
     """
     reconstruction, certificate = None, None
     with work.locked(), Pool(workers or usual_workers()) as pool, suppress(Reached):
-        run = Ledger(work, progress, until, pool)
+        run = Ledger(work, progress, until, pool, request.config.numbers)
         reconstruction, certificate = _run(request, run)
         work.keep_seconds(run.seconds)
     return Outcome(

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.config import ReconstructConfig
+from r2c2r_core.tuning import modules_with_numbers, params_of
 
 ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason="pip install --group dev")
@@ -39,6 +40,9 @@ def settings_of(config: object, path: str = "") -> list[tuple[str, str]]:
     found = []
     for field in fields(config):  # type: ignore[arg-type]
         value = getattr(config, field.name)
+        if room := field.metadata.get("room"):
+            modules = modules_with_numbers(room)
+            found += [(f"{room}.params.{m.partition('.')[2]}", n.name) for m in modules for n in fields(params_of(m))]
         found += settings_of(value, f"{path}.{field.name}".strip(".")) if is_dataclass(value) else [(path, field.name)]
     return found
 

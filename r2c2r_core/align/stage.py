@@ -27,7 +27,8 @@ from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.tuning import Changes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +49,7 @@ class AlignConfig:
     weights: str = setting(
         "", "of a learned matcher: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
     )
+    params: Changes = tuned_numbers("align")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -40,7 +40,7 @@ def document_of(name: str) -> "type[BaseModel]":
     models: dict[str, type[BaseModel]] = {
         "prompts": PromptsFile,
         "overrides": OverridesFile,
-        "config": settings_model(ReconstructConfig),
+        "config": settings_model(ReconstructConfig, with_numbers=True),
         "manifest": Manifest,
     }
     return models[name]

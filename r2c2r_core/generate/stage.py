@@ -19,7 +19,8 @@ from r2c2r_core.model.mesh import CandidateSet, MeshAsset
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.tuning import Changes
 
 log = logging.getLogger(__name__)
 
@@ -84,6 +85,7 @@ class GenerateConfig:
         default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""),
         metadata={"description": "address of the remote generator; R2C2R_GENERATOR_URL unless said", "max_length": 4000},
     )
+    params: Changes = tuned_numbers("generate")
 
 
 def generate_candidates(

@@ -27,7 +27,8 @@ from r2c2r_core.ingest.store import StoredImages, new_store, open_images, write_
 from r2c2r_core.model.capture import Capture, Frame, PoseEvidence, Scan, SceneSurface
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.tuning import Changes
 
 __all__ = ["IngestConfig", "level_scan", "open_images", "read_capture", "read_recording"]
 
@@ -63,6 +64,7 @@ class IngestConfig:
         False, "whether depth that does not lie on the colour images is moved there, by the fit that `r2c2r info` names"
     )
     seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
+    params: Changes = tuned_numbers("ingest")
 
 
 def read_capture(

@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.materials import UNKNOWN_THING, Material
+from r2c2r_core.tuning import number, tuned
 
 Kind = Literal["front", "appliance", "thing"]
 """How it is looked for: a panel among lines, a box behind a front, or the part of the scan that stands on something."""
@@ -14,8 +15,19 @@ Kind = Literal["front", "appliance", "thing"]
 Opening = Literal["drawer", "side", "pair", "bottom", "fixed", "rigid"]
 """How it opens: slides out, one side-hinged door, two doors, a bottom-hinged door, not at all; or it is a loose thing."""
 
-_SLACK = 0.1  # of a size, by which what was cut may miss what is sold: a seam or a shadow on either side
-_SIGMAS = 4.0  # from the least to the greatest size: 19 of 20 lie between them where the logarithm is normal
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How strictly sizes are judged."""
+
+    slack: float = number(0.1, "log", "by which what was cut may miss what is sold: a seam or a shadow on either side", gt=0)
+    range_sigmas: float = number(
+        4.0,
+        "σ",
+        "from the least to the greatest size that is sold",
+        source="19 of 20 lie between them where the logarithm is normal",
+        gt=0,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +42,7 @@ class Size:
     @property
     def spread(self) -> float:
         """Standard deviation of the logarithm of the size."""
-        return float(np.log(self.high / self.low)) / _SIGMAS
+        return float(np.log(self.high / self.low)) / tuned(Params).range_sigmas
 
     def holds(self, value_m: float) -> bool:
         """Whether a size is possible."""
@@ -43,7 +55,7 @@ class Size:
     def fit(self, value_m: float) -> float:
         """1 for a possible size, falling smoothly to 0 over about a fifth of it outside."""
         outside = max(float(np.log(self.low / value_m)), float(np.log(value_m / self.high)), 0.0)
-        return float(np.exp(-((outside / _SLACK) ** 2)))
+        return float(np.exp(-((outside / tuned(Params).slack) ** 2)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,18 +11,25 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import number, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What a filler is."""
 
-    width_m: float = 0.05  # corner fillers of kitchen catalogues are 40-80 mm; a bar handle stands out 25-40 mm
-    faces_rad: float = float(np.deg2rad(40.0))
-    """How squarely the other run faces the edge: a diagonal corner unit (45 degrees) meets its neighbours without one."""
-
-
-PARAMS = Params()
+    width_m: float = number(
+        0.05,
+        "m",
+        "least width of a corner filler",
+        source="kitchen catalogues: fillers of 40-80 mm; a bar handle stands out 25-40 mm",
+    )
+    faces_rad: float = number(
+        float(np.deg2rad(40.0)),
+        "rad",
+        "from squarely, within which the other run faces the edge",
+        source="a diagonal corner unit (45 degrees) meets its neighbours without a filler",
+    )
 
 
 class FrontBox(NamedTuple):
@@ -32,11 +39,12 @@ class FrontBox(NamedTuple):
     dimensions_m: Vector3
 
 
-def missing_filler(unit: FrontBox, side: float, other: FrontBox, params: Params = PARAMS) -> float:
+def missing_filler(unit: FrontBox, side: float, other: FrontBox) -> float:
     """By how many metres a unit's edge (side -1 left, +1 right) comes nearer to the other's front plane than a filler.
 
     0 where the two do not meet at an inside corner.
     """
+    params = tuned(Params)
     along = side * unit.world_from_object.rotation[:, 0]
     other_outward = -other.world_from_object.rotation[:, 1]
     if float(other_outward @ -along) < np.cos(params.faces_rad):

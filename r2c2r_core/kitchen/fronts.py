@@ -10,23 +10,27 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.tuning import number, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What counts as the front of a mesh."""
 
-    looks: float = 0.7  # cosine with the front's direction, from which a face looks forwards: within 45 degrees
-    layer_m: float = 0.003  # half a layer's thickness: a phone's depth, fused, leaves a flat this even
-    step_m: float = 0.002  # between the layers that are tried
-    spans: float = 0.8  # of the forward surface's width and of its height: what a front face reaches over
-    least_share: float = 0.03  # of the forward surface: a layer of less is specks
-    least_points: int = 60  # that look forwards
-    trim: float = 0.005  # of the points at either end, when extents are compared
-
-
-PARAMS = Params()
-_AGREE_RAD = np.deg2rad([20.0, 8.0, 3.0])  # cones about the mean normal, each within the one before
+    looks: float = number(0.7, "cosine", "with the front's direction, from which a face looks forwards: within 45 degrees")
+    layer_m: float = number(
+        0.003, "m", "half a layer's thickness", source="a phone's depth, fused, leaves a flat this even", gt=0
+    )
+    step_m: float = number(0.002, "m", "between the layers that are tried", gt=0)
+    spans: float = number(0.8, "share", "of the forward surface's width and of its height that a front face reaches over")
+    least_share: float = number(0.03, "share", "of the forward surface: a layer of less is specks")
+    least_points: int = number(60, "count", "points that look forwards, for a front plane to be asked for")
+    trim: float = number(0.005, "share", "of the points at either end, when extents are compared", ge=0, lt=0.5)
+    agree_rad: tuple[float, float, float] = number(
+        (float(np.deg2rad(20.0)), float(np.deg2rad(8.0)), float(np.deg2rad(3.0))),
+        "rad",
+        "half angles of the cones about the mean normal, each within the one before",
+    )
 
 
 class FrontPlane(NamedTuple):
@@ -36,34 +40,38 @@ class FrontPlane(NamedTuple):
     offset_m: float  # outward @ x of its points
     middle: Vector3  # the mean of its points
 
-    def holds(self, points: Points, params: Params = PARAMS) -> np.ndarray:
+    def holds(self, points: Points) -> np.ndarray:
         """Which points lie on it."""
+        params = tuned(Params)
         return np.asarray(np.abs(points @ self.outward - self.offset_m) < params.layer_m)
 
 
-def front_plane(points: Points, normals: Points, params: Params = PARAMS) -> FrontPlane | None:
+def front_plane(points: Points, normals: Points) -> FrontPlane | None:
     """The front plane of surface samples (metres) whose front looks about towards -Y; None where too few of them do.
 
     Where no layer spans the front, as on a bowed one, it is the fullest.
     """
+    params = tuned(Params)
     forwards = normals[:, 1] < -params.looks
     if np.count_nonzero(forwards) < params.least_points:
         return None
     looking = points[forwards]
-    normal = _common_direction(normals[forwards], params)
-    return _refined(looking, normal, _foremost_layer(looking, normal, params), params)
+    normal = _common_direction(normals[forwards])
+    return _refined(looking, normal, _foremost_layer(looking, normal))
 
 
-def front_y(points: Points, normals: Points, params: Params = PARAMS) -> float:
+def front_y(points: Points, normals: Points) -> float:
     """Where the front face lies along y; where nothing flat looks forwards, the foremost points."""
-    plane = front_plane(points, normals, params)
+    params = tuned(Params)
+    plane = front_plane(points, normals)
     return float(np.quantile(points[:, 1], params.trim)) if plane is None else float(plane.middle[1])
 
 
-def _common_direction(normals: Points, params: Params) -> Vector3:
+def _common_direction(normals: Points) -> Vector3:
     """The direction most normals agree on: their median, thrice without those further off."""
+    params = tuned(Params)
     kept = normals
-    for cosine in np.cos(_AGREE_RAD):
+    for cosine in np.cos(params.agree_rad):
         middle = np.median(kept, axis=0)
         near = kept[kept @ (middle / np.linalg.norm(middle)) > cosine]
         kept = near if len(near) >= params.least_points else kept
@@ -71,39 +79,43 @@ def _common_direction(normals: Points, params: Params) -> Vector3:
     return np.asarray(mean / np.linalg.norm(mean))
 
 
-def _foremost_layer(points: Points, normal: Vector3, params: Params) -> float:
+def _foremost_layer(points: Points, normal: Vector3) -> float:
     """Offset along the normal of the foremost layer that spans the points; of the fullest where none does."""
+    params = tuned(Params)
     offsets = points @ normal
     across = np.array([[normal[1], 0.0], [-normal[0], 0.0], [0.0, 1.0]])  # level, and up
     flat = points @ across
-    whole = _extent(flat, params)
+    whole = _extent(flat)
     fullest, most = float(np.median(offsets)), 0
     for offset in np.arange(offsets.max(), offsets.min() - params.step_m, -params.step_m):
         layer = np.abs(offsets - offset) < params.layer_m
         count = int(np.count_nonzero(layer))
         if count < params.least_share * len(points):
             continue
-        if (_extent(flat[layer], params) >= params.spans * whole).all():
-            return _densest(offsets, float(offset), params)
+        if (_extent(flat[layer]) >= params.spans * whole).all():
+            return _densest(offsets, float(offset))
         if count > most:
             fullest, most = float(offset), count
     return fullest
 
 
-def _extent(flat: np.ndarray, params: Params) -> np.ndarray:
+def _extent(flat: np.ndarray) -> np.ndarray:
     """Width and height of points in a plane, without the outermost."""
+    params = tuned(Params)
     return np.asarray(np.ptp(np.quantile(flat, [params.trim, 1 - params.trim], axis=0), axis=0))
 
 
-def _densest(offsets: np.ndarray, offset: float, params: Params) -> float:
+def _densest(offsets: np.ndarray, offset: float) -> float:
     """Where, within a layer's thickness behind its first sight, most of the points lie."""
+    params = tuned(Params)
     near = offsets[(offsets <= offset + params.layer_m) & (offsets > offset - 2 * params.layer_m)]
     tried = np.arange(offset + params.layer_m, offset - 2 * params.layer_m, -params.step_m / 2)
     return float(max(tried, key=lambda at: int(np.count_nonzero(np.abs(near - at) < params.layer_m))))
 
 
-def _refined(points: Points, normal: Vector3, offset: float, params: Params) -> FrontPlane:
+def _refined(points: Points, normal: Vector3, offset: float) -> FrontPlane:
     """Least squares on the layer's points, three times."""
+    params = tuned(Params)
     middle = normal * offset
     for _ in range(3):
         inliers = points[np.abs(points @ normal - offset) < params.layer_m]

@@ -8,31 +8,33 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.kitchen.category import Size
 from r2c2r_core.model.capture import Wall
+from r2c2r_core.tuning import number, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What makes a wall the one behind a front."""
 
-    parallel_rad: float = float(np.deg2rad(10.0))
-    """Between their normals. Measured on the sample kitchens: built-in fronts 0.2 degrees, free-standing appliances 5."""
+    parallel_rad: float = number(
+        float(np.deg2rad(10.0)),
+        "rad",
+        "between the normals of a front and of the wall behind it",
+        source="measured on the sample kitchens: built-in fronts 0.2 degrees, free-standing appliances 5",
+    )
 
 
-PARAMS = Params()
-
-
-def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, params: Params = PARAMS) -> list[float]:
+def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -> list[float]:
     """Metres from a front back to each wall that faces the same way, nearest first; negative for walls before it.
 
     `middle` is the middle of the front and `outward` its unit normal, both in the world; distances are along that normal.
     """
-    parallel = [wall for wall in walls if float(wall.normal @ outward) > np.cos(params.parallel_rad)]
+    parallel = [wall for wall in walls if float(wall.normal @ outward) > np.cos(tuned(Params).parallel_rad)]
     return sorted(float((wall.normal @ middle - wall.offset_m) / (wall.normal @ outward)) for wall in parallel)
 
 
-def wall_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size, params: Params = PARAMS) -> float | None:
+def wall_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> float | None:
     """The distance to the nearest wall that a thing of this depth may stand against; None where there is none."""
-    return next((d for d in distances_behind(walls, middle, outward, params) if depth.holds(d)), None)
+    return next((d for d in distances_behind(walls, middle, outward) if depth.holds(d)), None)
 
 
 def depths_in(walls: Sequence[Wall], points_world: Points) -> np.ndarray:

@@ -13,7 +13,8 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.tuning import Changes
 
 Fusion = Literal["none", "depth-mask", "evidence"]
 
@@ -30,6 +31,7 @@ class SegmentConfig:
         "", "of a learned segmenter: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
     )
     fusion: Fusion = setting("evidence", "none, depth-mask (the paper's) or evidence: how depth corrects learned masks")
+    params: Changes = tuned_numbers("segment")
 
 
 Glimpse = tuple[int, PackedMask, float]

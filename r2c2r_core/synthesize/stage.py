@@ -16,7 +16,7 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
 from r2c2r_core.synthesize.fixtures.boards import Boards
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
@@ -29,6 +29,7 @@ from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces,
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
+from r2c2r_core.tuning import Changes
 
 _WOOD = (0.80, 0.76, 0.70)
 _FULLY_OPEN = 0.75  # of the usual travel: a drawer drawn out this far was drawn out to its stop
@@ -42,6 +43,7 @@ class SynthesizeConfig:
     box: BoxSearch = setting("upright", "upright, or powell (the paper's): how a box is fitted (benchmarks/boxes.json)")
     surroundings: bool = setting(True, "whether worktops and plinths that the scan shows and nobody clicked are added")
     fixtures: str = setting(CARCASSES.default, "boards, or scene-synthesizer (its extra), the paper's: what makes carcasses")
+    params: Changes = tuned_numbers("synthesize")
 
 
 def build_scene(

@@ -13,7 +13,9 @@ from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.geometry.boxes import smallest_rectangle
 from r2c2r_core.geometry.meshes import face_normals, sample_surface
 from r2c2r_core.geometry.transforms import rotation_between
-from r2c2r_core.kitchen.fronts import PARAMS, FrontPlane, front_plane
+from r2c2r_core.kitchen.fronts import FrontPlane, front_plane
+from r2c2r_core.kitchen.fronts import Params as FrontsParams
+from r2c2r_core.tuning import tuned
 
 _SAMPLES = 12000
 _EDGE_SHARE = 0.0005  # of the inliers left outside each side: specks of other faces
@@ -52,7 +54,7 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
     plane = front_plane(points, towards[chosen])
     if plane is None:
         return None
-    forward = faces[towards[:, 1] < -PARAMS.looks]
+    forward = faces[towards[:, 1] < -tuned(FrontsParams).looks]
     flat = forward[plane.holds(vertices[forward]).all(axis=1)]
     # Sampled anew, alone, where there are any: among all faces a sliver along an edge may get no sample
     inliers = sample_surface(vertices, flat, _SAMPLES, rng)[0] if len(flat) else _on(plane, points, towards[chosen])
@@ -63,7 +65,7 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
 
 def _on(plane: FrontPlane, points: Points, normals: Points) -> Points:
     """The points that look forwards and lie on a plane."""
-    return points[(normals[:, 1] < -PARAMS.looks) & plane.holds(points)]
+    return points[(normals[:, 1] < -tuned(FrontsParams).looks) & plane.holds(points)]
 
 
 def _rectangle_corners(inliers: Points, rim: Points, normal: Vector3, offset: float) -> Points:

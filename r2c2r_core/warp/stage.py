@@ -13,7 +13,8 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.schema.settings import setting
+from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.tuning import Changes
 from r2c2r_core.warp.affine import AxisMap, fit_map, fit_ranges, warp_vertices
 from r2c2r_core.warp.axes import face_outwards
 from r2c2r_core.warp.corners import FrontFace, find_front
@@ -34,6 +35,7 @@ class WarpConfig:
     depth_scale: tuple[float, float] = setting((0.2, 5.0), "[least, most] stretch in depth, which is mostly unobserved")
     method: Literal["axes", "paper"] = setting("axes", "axes, or paper: its corners and affine map (eq. 15-16) as printed")
     seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
+    params: Changes = tuned_numbers("warp")
 
 
 class _Unusable(Exception):  # not an error: the primitive stays visible and says so

@@ -32,6 +32,7 @@ from r2c2r_core.segment.runs.run import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.segment.surface import in_threads
 from r2c2r_core.sources import source_key
+from r2c2r_core.tuning import in_force
 
 
 class GeometricSegmenter(Segmenter):
@@ -220,6 +221,7 @@ def _cache_key(capture: Capture, config: SegmentConfig) -> str:
         source_key("segment", "kitchen", "geometry", "model"),
         capture.sha256,
         config,
+        in_force(),
         capture.world_from_capture.matrix.round(9).tolist(),
         len(capture.surface.vertices_world),
         len(capture.surface.faces),
