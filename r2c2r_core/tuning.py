@@ -2,7 +2,7 @@
 
     @dataclass(frozen=True, slots=True, kw_only=True)
     class Params:
-        layer_m: float = number(0.003, "m", "half a layer's thickness", source="fused depth of a phone leaves a flat this even")
+        layer_m: float = param(0.003, "m", "half a layer's thickness", source="fused depth of a phone leaves a flat this even")
 
     def front(points): ... tuned(Params).layer_m ...
 
@@ -22,7 +22,9 @@ from typing import Any, TypeVar
 CHOSEN = "chosen on the sample kitchens"
 """The source of a number that nobody measured and nobody derived."""
 
-UNITS = frozenset({"m", "m²", "m³", "m/s", "kg", "s", "rad", "px", "px²", "share", "ratio", "cosine", "log", "σ", "count"}) | {
+UNITS = frozenset(
+    {"m", "m²", "m³", "m/s", "kg", "s", "rad", "deg", "px", "px²", "share", "ratio", "cosine", "log", "σ", "count"}
+) | {
     *("bytes", "grey", "colour", "score"),
 }
 """share: 0 to 1 of something named; ratio: of two of a kind; log: difference of natural logarithms; σ: standard deviations;
@@ -37,7 +39,7 @@ P = TypeVar("P")
 _active: ContextVar[Mapping[type, Any]] = ContextVar("tuned numbers", default=MappingProxyType({}))
 
 
-def number(default: Any, unit: str, meaning: str, *, source: str = CHOSEN, **bounds: float) -> Any:
+def param(default: Any, unit: str, meaning: str, *, source: str = CHOSEN, **bounds: float) -> Any:
     """A field of a `Params`: a number (or a few in a tuple), what it is of, and where it was measured.
 
     `bounds` are gt, ge, lt, le; a share lies between 0 and 1 and a number that is not negative stays so without them.

@@ -7,6 +7,7 @@ is drawn at random but the subsets that are tried before the whole, so the work 
 and hardly with the share of wrong ones (a random triple needs (1 - share)^-3 tries: 125 000 at 98 %).
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +15,23 @@ from scipy.spatial.distance import cdist
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.registration import SimilarityFit, refit, umeyama_batch
+from r2c2r_core.tuning import param, tuned
 
-_SAMPLES = (128, 420, 1400)  # correspondences looked at; more of them only where fewer do not suffice
-_SURE = 12  # right correspondences a sample must hold for a larger agreement to be impossible to overlook in it
-_BATCH = 12  # peaks looked at together
-_MEMBERS = 64  # of a peak that are compared with each other
-_LOOK = 10  # members that decide whether a peak is worth comparing all
-_PEAK = 0.03  # half width of a peak, log of scale, where lengths are known better than that
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How far the search for the most agreeing correspondences goes."""
+
+    samples: tuple[int, int, int] = param(
+        (128, 420, 1400), "count", "correspondences looked at; more of them only where fewer do not suffice"
+    )
+    sure: int = param(
+        12, "count", "right correspondences a sample must hold for a larger agreement to be impossible to overlook in it"
+    )
+    batch: int = param(12, "count", "peaks looked at together", ge=1)
+    members: int = param(64, "count", "of a peak that are compared with each other", ge=4)
+    look: int = param(10, "count", "members that decide whether a peak is worth comparing all", ge=1)
+    peak: float = param(0.03, "log", "half width of a peak of scale, where lengths are known better than that")
 
 
 class _Lengths(NamedTuple):
@@ -48,6 +59,7 @@ def similarity_consensus(
     with an absolute threshold alone a tiny scale maps everything beside one cluster and wins. Scale, rotation and
     translation are solved together (method.md rows 3 and 5).
     """
+    params = tuned(Params)
     count = len(source)
     limit = np.broadcast_to(np.asarray(threshold, dtype=np.float64), (count,))
     if count < max(minimum_inliers, 3):
@@ -55,7 +67,7 @@ def similarity_consensus(
     relative_limit = relative_threshold * float(np.linalg.norm(np.ptp(source, axis=0)))
     order = rng.permutation(count)
     best = np.zeros(count, dtype=bool)
-    for size in _SAMPLES:
+    for size in params.samples:
         chosen = order[:size]
         for agrees in _cliques(
             source[chosen], target[chosen], limit[chosen], scale_range, relative_limit, patient=size >= count
@@ -65,7 +77,7 @@ def similarity_consensus(
             fit = refit(source, target, start, limit, relative_limit, 3)
             if fit is not None and fit.inliers.sum() > best.sum():
                 best = fit.inliers
-        if size >= count or best.sum() * size >= _SURE * count:
+        if size >= count or best.sum() * size >= params.sure * count:
             break
     return refit(source, target, best, limit, relative_limit, minimum_inliers)
 
@@ -80,10 +92,11 @@ def _cliques(
     patient: bool,
 ) -> list[np.ndarray]:
     """Up to three different sets (k,) bool of a sample's correspondences that one similarity explains, largest first."""
+    params = tuned(Params)
     lengths = _measure(source, target, limit)
     rows, log_scales = _peaks(lengths, scale_range)
     found: list[np.ndarray] = []
-    done, batch = 0, _BATCH
+    done, batch = 0, params.batch
     while done < len(rows):
         part = slice(done, done + batch)
         members, weight = _agreeing(lengths, *_promising(lengths, rows[part], log_scales[part]))
@@ -96,7 +109,7 @@ def _cliques(
             agrees &= ((scales > scale_range[0]) & (scales < scale_range[1]))[:, None]
             found = _different([*found, *agrees])
         done, batch = done + batch, 4 * batch
-        if (found and found[0].sum() >= _SURE) or (done > 4 * _BATCH and not patient):
+        if (found and found[0].sum() >= params.sure) or (done > 4 * params.batch and not patient):
             break
     return found
 
@@ -122,7 +135,7 @@ def _measure(source: Points, target: Points, limit: np.ndarray) -> _Lengths:
     usable = (of_source > 0.05 * of_source.max()) & (tolerance < 0.5)
     log_ratio[~usable] = np.inf
     typical = tolerance[::7, ::7][usable[::7, ::7]]
-    return _Lengths(log_ratio, tolerance, max(_PEAK, 0.6 * float(np.median(typical)) if len(typical) else 1.0))
+    return _Lengths(log_ratio, tolerance, max(tuned(Params).peak, 0.6 * float(np.median(typical)) if len(typical) else 1.0))
 
 
 def _peaks(lengths: _Lengths, scale_range: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -150,12 +163,13 @@ def _peaks(lengths: _Lengths, scale_range: tuple[float, float]) -> tuple[np.ndar
 
 def _promising(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The peaks of which some member agrees with many others, by a look at few members; all, where there are few."""
-    if len(rows) <= _BATCH:
+    params = tuned(Params)
+    if len(rows) <= params.batch:
         return rows, log_scales
     members, inside = _members(lengths, rows, log_scales)
-    looked_at = slice(1, 1 + _LOOK)  # the first is the peak's own, which all others agree with
+    looked_at = slice(1, 1 + params.look)  # the first is the peak's own, which all others agree with
     together = _consistent(lengths, log_scales, members[:, looked_at], members) & inside[:, looked_at, None] & inside[:, None]
-    best = np.argsort(-together.sum(axis=2).max(axis=1), kind="stable")[: 2 * _BATCH]
+    best = np.argsort(-together.sum(axis=2).max(axis=1), kind="stable")[: 2 * params.batch]
     return rows[best], log_scales[best]
 
 
@@ -175,7 +189,7 @@ def _members(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tup
     with np.errstate(invalid="ignore"):
         off = np.abs(lengths.log_ratio[rows] - log_scales[:, None].astype(np.float32)) / slack
     off[np.arange(len(rows)), rows] = 0.0
-    most = min(_MEMBERS, off.shape[1])
+    most = min(tuned(Params).members, off.shape[1])
     members = np.argpartition(off, most - 1, axis=1)[:, :most]
     value = np.take_along_axis(off, members, axis=1)
     order = np.argsort(value, axis=1)

@@ -1,14 +1,21 @@
 """The hollow of a mug or a bowl: where a liquid would stay."""
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.tuning import param, tuned
 
-_STEPS = 24  # of the grid, along the longest side
-_ROUND = 8  # horizontal directions looked into from a point
-_LEAST_SHARE = 0.03  # of the bounding box: a smaller hollow is a dent
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as the hollow of a vessel."""
+
+    steps: int = param(24, "count", "of the grid along the longest side", ge=4)
+    round: int = param(8, "count", "horizontal directions looked into from a point", ge=3)
+    least_share: float = param(0.03, "share", "of the bounding box: a smaller hollow is a dent")
 
 
 class Hollow(NamedTuple):
@@ -23,20 +30,21 @@ def find_hollow(vertices: Points, faces: Faces) -> Hollow | None:
 
     A point belongs to the hollow when it lies outside the solid, open upwards, with solid below it and all round it.
     """
+    params = tuned(Params)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    step = max(float((high - low).max()) / _STEPS, 1e-6)
+    step = max(float((high - low).max()) / params.steps, 1e-6)
     ranges = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
     if not len(points):
         return None
     surface = _castable(vertices, faces)
-    angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
-    walls = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_ROUND)])
+    angles = 2 * np.pi * np.arange(params.round) / params.round
+    walls = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(params.round)])
     down = np.array([0.0, 0.0, -1.0])
     kept = points[np.isinf(_distances(surface, points, -down)) & np.isfinite(_distances(surface, points, down))]
     for direction in walls:
         kept = kept[np.isfinite(_distances(surface, kept, direction))]
-    if len(kept) <= _LEAST_SHARE * len(points):
+    if len(kept) <= params.least_share * len(points):
         return None
     return Hollow(kept, float(np.quantile(kept[:, 2] - _distances(surface, kept, down), 0.25)))
 

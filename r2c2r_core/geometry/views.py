@@ -11,13 +11,27 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.tuning import param, tuned
 
-INTERVALS = 20  # the paper's, and at least two for every view asked for
-_BORDER_PX = 2
-_FULL_TURN_RAD = 1.0  # views this far apart share nothing worth having both for
-_SAME_PLACE = 0.02  # worth of a view from where another one stands, beside one from a full turn away
-_STANDS_OUT_M = 0.06  # handles stand out by up to 5 cm
-_STANDS_OUT_SHARE = 0.2
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which views of an object are worth having."""
+
+    intervals: int = param(
+        20,
+        "count",
+        "of the recording, of which each gives its best frame",
+        source="the paper's 20 (4.2), and at least two for every view asked for",
+        ge=1,
+    )
+    border_px: int = param(2, "px", "to the image's border: a mask that comes nearer is cut off")
+    full_turn_rad: float = param(1.0, "rad", "between two views that share nothing worth having both for", gt=0)
+    same_place: float = param(0.02, "ratio", "worth of a view from where another one stands, beside one from a full turn away")
+    stands_out_m: float = param(
+        0.06, "m", "before a front, from where what stands out is more than a handle", source="handles stand out by up to 5 cm"
+    )
+    stands_out_share: float = param(0.2, "share", "of the mask's points that stand out so, where something is open")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,11 +47,12 @@ class MaskView:
 
 def choose_views(views: list[MaskView], count: int) -> list[MaskView]:
     """Up to `count` views, in the order taken: the best one, then always the best that looks from somewhere new."""
+    params = tuned(Params)
     seen = sorted((view for view in views if view.mask.area_px > 0), key=lambda view: view.frame_index)
     if not seen:
         return []
     score = view_scores(seen)
-    winners = _interval_winners(score, max(INTERVALS, 2 * count))
+    winners = _interval_winners(score, max(params.intervals, 2 * count))
     towards = np.array([seen[k].from_object for k in winners])
     towards = towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
     worth = score[winners]
@@ -45,7 +60,7 @@ def choose_views(views: list[MaskView], count: int) -> list[MaskView]:
     gap = np.full(len(winners), np.inf)
     while len(taken) < min(count, len(winners)):
         gap = np.minimum(gap, np.arccos(np.clip(towards @ towards[taken[-1]], -1.0, 1.0)))
-        gain = worth * (_SAME_PLACE + np.minimum(gap, _FULL_TURN_RAD))
+        gain = worth * (params.same_place + np.minimum(gap, params.full_turn_rad))
         gain[taken] = -1.0
         taken.append(int(np.argmax(gain)))
     return [seen[winners[k]] for k in taken]
@@ -64,9 +79,10 @@ def view_scores(views: list[MaskView]) -> np.ndarray:
 
 def is_cropped(mask: PackedMask) -> bool:
     """Whether the mask touches the image border."""
+    params = tuned(Params)
     right, bottom = mask.left + mask.box_width, mask.top + mask.box_height
-    beyond = mask.left < _BORDER_PX or mask.top < _BORDER_PX
-    return beyond or right > mask.width - _BORDER_PX or bottom > mask.height - _BORDER_PX
+    beyond = mask.left < params.border_px or mask.top < params.border_px
+    return beyond or right > mask.width - params.border_px or bottom > mask.height - params.border_px
 
 
 def stands_open(outward_m: np.ndarray) -> bool:
@@ -74,7 +90,8 @@ def stands_open(outward_m: np.ndarray) -> bool:
 
     Only what stands out counts: seen from the side, a box shows points behind its front.
     """
-    return bool(len(outward_m) and np.quantile(outward_m, 1 - _STANDS_OUT_SHARE) > _STANDS_OUT_M)
+    params = tuned(Params)
+    return bool(len(outward_m) and np.quantile(outward_m, 1 - params.stands_out_share) > params.stands_out_m)
 
 
 def _interval_winners(score: np.ndarray, intervals: int) -> np.ndarray:

@@ -8,11 +8,27 @@ import numpy as np
 from r2c2r_core.arrays import DepthMetres, Points
 from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
 Lengths = np.ndarray | np.floating | float  # metres, one or an array of them
 
-_SURE = 3.0  # standard deviations: of normal noise 0.1 % lies further out on one side
-_NEAREST_M = 0.1  # no depth camera of a phone measures nearer (ARKit LiDAR and Kinect: 0.2 to 0.4 m)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a depth image says of a point."""
+
+    sure: float = param(
+        3.0,
+        "σ",
+        "of the depth's noise, within which two depths agree",
+        source="of normal noise 0.1 % lies further out on one side",
+    )
+    nearest_m: float = param(
+        0.1,
+        "m",
+        "least distance from a camera at which a point is looked up",
+        source="no phone's depth camera measures nearer (ARKit LiDAR and Kinect: 0.2 to 0.4 m)",
+    )
 
 
 class Sighting(NamedTuple):
@@ -27,7 +43,7 @@ def look_up(points_world: Points, world_from_camera: Rigid3, camera: Intrinsics,
     """Where world points (n, 3) lie for a camera, and the depth its image has there; `camera` has the image's size."""
     local = world_from_camera.inverse.apply(points_world)
     measured, inside = sample_nearest(depth_m, project(local, camera))
-    inside &= local[:, 2] > _NEAREST_M
+    inside &= local[:, 2] > tuned(Params).nearest_m
     return Sighting(local[:, 2], np.where(inside, measured, 0.0), inside)
 
 
@@ -46,7 +62,7 @@ class DepthNoise:
         return np.asarray(self.floor_m + self.per_m * z_m)
 
     def _reach(self, z_m: Lengths, margin_m: float) -> np.ndarray:
-        return np.asarray(margin_m + _SURE * self.sigma(z_m))
+        return np.asarray(margin_m + tuned(Params).sure * self.sigma(z_m))
 
     def agrees(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
         """Where depth was measured and lies at z, give or take a margin and the noise. Arrays (...), 0 for unknown depth."""

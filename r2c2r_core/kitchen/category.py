@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.materials import UNKNOWN_THING, Material
-from r2c2r_core.tuning import number, tuned
+from r2c2r_core.tuning import param, tuned
 
 Kind = Literal["front", "appliance", "thing"]
 """How it is looked for: a panel among lines, a box behind a front, or the part of the scan that stands on something."""
@@ -20,8 +20,8 @@ Opening = Literal["drawer", "side", "pair", "bottom", "fixed", "rigid"]
 class Params:
     """How strictly sizes are judged."""
 
-    slack: float = number(0.1, "log", "by which what was cut may miss what is sold: a seam or a shadow on either side", gt=0)
-    range_sigmas: float = number(
+    slack: float = param(0.1, "log", "by which what was cut may miss what is sold: a seam or a shadow on either side", gt=0)
+    range_sigmas: float = param(
         4.0,
         "σ",
         "from the least to the greatest size that is sold",

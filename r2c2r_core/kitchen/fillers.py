@@ -11,20 +11,20 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.tuning import number, tuned
+from r2c2r_core.tuning import param, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What a filler is."""
 
-    width_m: float = number(
+    width_m: float = param(
         0.05,
         "m",
         "least width of a corner filler",
         source="kitchen catalogues: fillers of 40-80 mm; a bar handle stands out 25-40 mm",
     )
-    faces_rad: float = number(
+    faces_rad: float = param(
         float(np.deg2rad(40.0)),
         "rad",
         "from squarely, within which the other run faces the edge",

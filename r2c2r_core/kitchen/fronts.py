@@ -10,23 +10,23 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.tuning import number, tuned
+from r2c2r_core.tuning import param, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What counts as the front of a mesh."""
 
-    looks: float = number(0.7, "cosine", "with the front's direction, from which a face looks forwards: within 45 degrees")
-    layer_m: float = number(
+    looks: float = param(0.7, "cosine", "with the front's direction, from which a face looks forwards: within 45 degrees")
+    layer_m: float = param(
         0.003, "m", "half a layer's thickness", source="a phone's depth, fused, leaves a flat this even", gt=0
     )
-    step_m: float = number(0.002, "m", "between the layers that are tried", gt=0)
-    spans: float = number(0.8, "share", "of the forward surface's width and of its height that a front face reaches over")
-    least_share: float = number(0.03, "share", "of the forward surface: a layer of less is specks")
-    least_points: int = number(60, "count", "points that look forwards, for a front plane to be asked for")
-    trim: float = number(0.005, "share", "of the points at either end, when extents are compared", ge=0, lt=0.5)
-    agree_rad: tuple[float, float, float] = number(
+    step_m: float = param(0.002, "m", "between the layers that are tried", gt=0)
+    spans: float = param(0.8, "share", "of the forward surface's width and of its height that a front face reaches over")
+    least_share: float = param(0.03, "share", "of the forward surface: a layer of less is specks")
+    least_points: int = param(60, "count", "points that look forwards, for a front plane to be asked for")
+    trim: float = param(0.005, "share", "of the points at either end, when extents are compared", ge=0, lt=0.5)
+    agree_rad: tuple[float, float, float] = param(
         (float(np.deg2rad(20.0)), float(np.deg2rad(8.0)), float(np.deg2rad(3.0))),
         "rad",
         "half angles of the cones about the mean normal, each within the one before",

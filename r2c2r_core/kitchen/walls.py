@@ -8,14 +8,14 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.kitchen.category import Size
 from r2c2r_core.model.capture import Wall
-from r2c2r_core.tuning import number, tuned
+from r2c2r_core.tuning import param, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What makes a wall the one behind a front."""
 
-    parallel_rad: float = number(
+    parallel_rad: float = param(
         float(np.deg2rad(10.0)),
         "rad",
         "between the normals of a front and of the wall behind it",

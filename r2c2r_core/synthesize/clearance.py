@@ -11,13 +11,26 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.walls import depths_in
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
+from r2c2r_core.tuning import param, tuned
 
-_TOUCH_M = 0.0005
-_WALL_TOUCH_M = 0.01  # a wall is a plane through a centimetre of uneven plaster, and a front's edge is known to 8 mm
-_STEPS = 36
-_BEHIND_M = 0.05  # a closed front further behind a wall's plane is not in front of that wall
-_SPARE = {"revolute": np.deg2rad(1.0), "prismatic": 0.003}  # kept free before the obstacle
 _LEAST = {"revolute": 1e-3, "prismatic": 1e-3}  # a jammed joint keeps a range that simulators accept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a joint is stopped by what stands still."""
+
+    touch_m: float = param(0.0005, "m", "penetration from which two objects are said to be in each other")
+    wall_touch_m: float = param(
+        0.01,
+        "m",
+        "by which an opening front may come deeper behind a wall's plane",
+        source="a wall is a plane through a centimetre of uneven plaster, and a front's edge is known to 8 mm",
+    )
+    steps: int = param(36, "count", "positions of a joint that are looked at", ge=2)
+    behind_m: float = param(0.05, "m", "behind a wall's plane: a closed front further back is not in front of that wall")
+    turn_spare_rad: float = param(float(np.deg2rad(1.0)), "rad", "of a door's travel kept free before the obstacle")
+    slide_spare_m: float = param(0.003, "m", "of a drawer's travel kept free before the obstacle")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,23 +73,24 @@ def free_travel(
     walls: Sequence[Wall],
 ) -> tuple[float, str | None]:
     """How far a joint opens with all others closed, and the name of what stops it short of its limit."""
+    params = tuned(Params)
     child_index = next(i for i, link in enumerate(item.links) if link.name == joint.child)
     child = item.links[child_index]
     others = ~((obstacles.owner == index) & (obstacles.link == child_index))
     moving = link_boxes(item, child)
     near = others & _within_reach(obstacles.boxes, item, joint, moving)
     corners = _corners(moving)
-    near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < _BEHIND_M]
+    near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < params.behind_m]
     before = np.maximum(depths_in(near_walls, corners), 0.0)
 
     def blocker_at(position: float) -> str | None:
         motion = motion_at(item, joint, position)
-        if (depths_in(near_walls, motion.apply(corners)) > before + _WALL_TOUCH_M).any():
+        if (depths_in(near_walls, motion.apply(corners)) > before + params.wall_touch_m).any():
             return "a wall"
         return _blocker(_moved(moving, motion), obstacles, near, objects)
 
     free = 0.0
-    for position in np.linspace(0.0, joint.upper, _STEPS + 1):
+    for position in np.linspace(0.0, joint.upper, params.steps + 1):
         blocker = blocker_at(position)
         if blocker is not None:
             return _shortened(_last_free(free, position, blocker_at), joint), blocker
@@ -94,7 +108,9 @@ def _last_free(free: float, blocked: float, blocker_at: Callable[[float], str | 
 
 def _shortened(free: float, joint: Joint) -> float:
     """A limit that stays clear of the obstacle, and above zero so that the joint keeps a range."""
-    return max(free - _SPARE[joint.type], 0.5 * free, _LEAST[joint.type])
+    params = tuned(Params)
+    spare = params.turn_spare_rad if joint.type == "revolute" else params.slide_spare_m
+    return max(free - spare, 0.5 * free, _LEAST[joint.type])
 
 
 def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
@@ -121,7 +137,7 @@ def _blocker(moving: Boxes, obstacles: Obstacles, near: np.ndarray, objects: Seq
     i, j = (v.ravel() for v in np.meshgrid(np.arange(len(moving.centres)), candidates, indexing="ij"))
     depth = box_penetration(Boxes(*(v[i] for v in moving)), Boxes(*(v[j] for v in obstacles.boxes)))
     worst = int(np.argmax(depth))
-    return objects[obstacles.owner[j[worst]]].name if depth[worst] > _TOUCH_M else None
+    return objects[obstacles.owner[j[worst]]].name if depth[worst] > tuned(Params).touch_m else None
 
 
 def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) -> np.ndarray:

@@ -27,19 +27,44 @@ from r2c2r_core.model.scene import Source
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
+from r2c2r_core.tuning import param, tuned
 
-_SAMPLES = 6000
-_TO_WALL_M = 0.03  # a back that ends this near the wall stands against it
-_LEVEL = 0.7  # of a unit axis: an axis that rises more is the one that points up
 BoxSearch = Literal["upright", "hull", "powell"]
 """How a mesh's own axes are found: calipers in plan, where gravity is known; the hull's faces, where it was only assumed; or
 the paper's Powell search (eq. 8-9), for comparison."""
-_SURE_SHARE, _SURE_M = 0.08, 0.004  # a depth known this well, of itself or in metres, was measured
-_LEAST_SWINGS, _AGREED = 3, 0.75  # frames that show a door open, and the share of them that must agree on its side
-_SAME_STOP_RAD = np.deg2rad(4.0)
-_AS_TIGHT = 1.03  # a square is as tight as this when turned by 0.9 degrees, a round thing however it is turned
-_EDGE_SHARE = 0.25  # of the width, from the middle: handles of two doors meet in the middle
-_TRIM = 0.004  # of the surface, at either end of an axis: less than any real face, more than a spike
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How large an object is and how it stands."""
+
+    samples: int = param(6000, "count", "points drawn on a mesh's surface", ge=100)
+    to_wall_m: float = param(0.03, "m", "between a back and the wall it is taken to stand against")
+    level: float = param(0.7, "cosine", "rise of an axis, from which on it is the one that points up")
+    sure_share: float = param(0.08, "share", "of a depth: one that is known this well was measured")
+    sure_m: float = param(0.004, "m", "of a depth: one that is known this well was measured")
+    least_swings: int = param(3, "count", "frames that show a door open, for its side to be known by them")
+    agreed: float = param(0.75, "share", "of those frames that must agree on the side")
+    same_stop_rad: float = param(float(np.deg2rad(4.0)), "rad", "from the widest, within which opened doors are at their stop")
+    as_tight: float = param(
+        1.03,
+        "ratio",
+        "of plan areas, within which two turns of a thing are as tight",
+        source="a square is as tight as this when turned by 0.9 degrees, a round thing however it is turned",
+    )
+    edge_share: float = param(
+        0.25,
+        "share",
+        "of the width, from the middle, beyond which a handle is at an edge",
+        source="handles of two doors meet in the middle",
+    )
+    trim: float = param(
+        0.004,
+        "share",
+        "of the surface left out at either end of an axis: less than any real face, more than a spike",
+        ge=0,
+        lt=0.5,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,7 +112,7 @@ def measure_object(
 ) -> MeasuredObject:
     """Size, pose and handle of one object; every axis says where its number comes from."""
     vertices_world = placement.world_from_mesh.apply(asset.mesh.vertices)
-    samples = sampled(vertices_world, asset.mesh.faces, _SAMPLES, seed)
+    samples = sampled(vertices_world, asset.mesh.faces, tuned(Params).samples, seed)
     warnings: list[str] = []
     outward, yaw_known = facing(capture, track, samples)
     if box_search == "upright" and capture.room.up_source == "assumed":
@@ -134,7 +159,7 @@ def measure_object(
 
 def _at_width(spec: Category, width_m: float, handle: FrontHandle | None) -> Category:
     """What a category is at a width: a wide refrigerator has two doors, unless its handle is at one edge."""
-    at_edge = handle is not None and abs(handle.centre[0]) > _EDGE_SHARE * width_m
+    at_edge = handle is not None and abs(handle.centre[0]) > tuned(Params).edge_share * width_m
     return category_of(spec.wider[1]) if spec.wider is not None and width_m >= spec.wider[0] and not at_edge else spec
 
 
@@ -145,15 +170,16 @@ def _drawn_out(track: MaskTrack) -> float | None:
 
 def _swung_open(track: MaskTrack) -> Swing | None:
     """The furthest its door was seen open, on the side that most frames say; one frame alone may be mistaken."""
-    if len(track.swung) < _LEAST_SWINGS:
+    params = tuned(Params)
+    if len(track.swung) < params.least_swings:
         return None
     left = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "left"]
     right = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "right"]
     hinge: Literal["left", "right"] = "left" if len(left) >= len(right) else "right"
     angles = max(left, right, key=len)
-    agreed = len(angles) >= _LEAST_SWINGS and len(angles) > _AGREED * len(track.swung)
+    agreed = len(angles) >= params.least_swings and len(angles) > params.agreed * len(track.swung)
     # Where it stood at its widest, by the middle of the frames near it: one frame's angle is a degree or two off
-    widest = [angle for angle in angles if angle > np.quantile(angles, 0.9) - _SAME_STOP_RAD]
+    widest = [angle for angle in angles if angle > np.quantile(angles, 0.9) - params.same_stop_rad]
     return Swing(hinge=hinge, angle_rad=float(np.median(widest))) if agreed else None
 
 
@@ -172,14 +198,15 @@ def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple
 
 def mesh_range(samples: SurfaceSamples, rotation: np.ndarray, *, with_front: bool) -> tuple[Vector3, Vector3]:
     """Low and high ends along the object's axes; with a front, its plane is the low end of y and the handle is left out."""
+    params = tuned(Params)
     points = samples.points @ rotation
     if with_front:
         front = front_y(points, samples.normals @ rotation)
         points = points[points[:, 1] > front - 0.004]
-        low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
+        low, high = np.quantile(points, [params.trim, 1 - params.trim], axis=0)
         low[1] = front
         return low, high
-    low, high = np.quantile(points, [_TRIM, 1 - _TRIM], axis=0)
+    low, high = np.quantile(points, [params.trim, 1 - params.trim], axis=0)
     return low, high
 
 
@@ -188,20 +215,22 @@ def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch)
 
     A round thing has no such box: any is as tight, and it faces `outward`.
     """
+    params = tuned(Params)
     if search == "upright":
-        axes = upright_box(samples.points, samples.normals, trim=_TRIM).world_from_box.rotation
+        axes = upright_box(samples.points, samples.normals, trim=params.trim).world_from_box.rotation
     else:
         free = smallest_box(samples.points) if search == "hull" else powell_box(samples.points)
         axes = free.world_from_box.rotation
-    level = [sign * axis for axis in axes.T for sign in (-1.0, 1.0) if abs(axis[2]) < _LEVEL]
+    level = [sign * axis for axis in axes.T for sign in (-1.0, 1.0) if abs(axis[2]) < params.level]
     nearest = max(level, key=lambda d: float(d @ outward), default=outward)
     facing, tightest = front_rotation(outward), front_rotation(np.array([nearest[0], nearest[1], 0.0]))
-    as_tight = _plan_area(samples.points, facing) <= _AS_TIGHT * _plan_area(samples.points, tightest)
+    as_tight = _plan_area(samples.points, facing) <= params.as_tight * _plan_area(samples.points, tightest)
     return facing if as_tight else tightest
 
 
 def _plan_area(points: Points, rotation: np.ndarray) -> float:
-    low, high = np.quantile((points @ rotation)[:, :2], [_TRIM, 1 - _TRIM], axis=0)
+    params = tuned(Params)
+    low, high = np.quantile((points @ rotation)[:, :2], [params.trim, 1 - params.trim], axis=0)
     return float(np.prod(high - low))
 
 
@@ -243,7 +272,7 @@ def _believable_depth(
     to_wall = distance_to_wall(capture, rotation, low, high, spec.depth)
     source: Source = "inferred"
     # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
-    near = _TO_WALL_M if track.kind == "front" else 0.0
+    near = tuned(Params).to_wall_m if track.kind == "front" else 0.0
     if to_wall is not None and depth > to_wall - near:
         depth = to_wall
     if not spec.depth.holds(depth):
@@ -262,10 +291,11 @@ def _depth_source(
     capture: Capture, asset: MeshAsset, low: Vector3, high: Vector3, rotation: np.ndarray, warnings: list[str]
 ) -> Source:
     """Whether a thing's depth was seen: on a face that shows it, or in outlines; a round thing's follows from its width."""
+    params = tuned(Params)
     if asset.parameters.get("revolved"):
         return "inferred"
     depth, sigma = float(high[1] - low[1]), asset.parameters.get("depth_sigma_m")
-    seen = _face_seen(capture, low, high, rotation) if sigma is None else sigma < max(_SURE_SHARE * depth, _SURE_M)
+    seen = _face_seen(capture, low, high, rotation) if sigma is None else sigma < max(params.sure_share * depth, params.sure_m)
     if not seen:
         warnings.append(f"no frame shows how deep it is: {depth:.2f} m is inferred")
     return "measured" if seen else "inferred"

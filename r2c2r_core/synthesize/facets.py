@@ -7,10 +7,16 @@ import numpy as np
 from r2c2r_core.arrays import Matrix3, Points
 from r2c2r_core.geometry.meshes import face_areas, face_normals
 from r2c2r_core.model.capture import SceneSurface
-
-BAND_M = 0.01  # surface this near to where most of it lies is one plane
+from r2c2r_core.tuning import param, tuned
 
 Colour = tuple[float, float, float]  # 0..1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which surface of the scan is one plane."""
+
+    band_m: float = param(0.01, "m", "from where most of a surface lies, within which it is one plane")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +67,14 @@ def facets_of(surface: SceneSurface) -> Facets:
 
 def most_common(values: np.ndarray, areas: np.ndarray, *, least: float) -> float | None:
     """The value with most area within BAND_M of it, as the median of that; None where that is too little."""
+    params = tuned(Params)
     if len(values) == 0:
         return None
-    edges = np.arange(values.min() - BAND_M, values.max() + BAND_M, 0.002)
-    near = np.array([areas[np.abs(values - edge) < BAND_M].sum() for edge in edges])
+    edges = np.arange(values.min() - params.band_m, values.max() + params.band_m, 0.002)
+    near = np.array([areas[np.abs(values - edge) < params.band_m].sum() for edge in edges])
     if near.max() < least:
         return None
-    chosen = np.abs(values - edges[int(np.argmax(near))]) < BAND_M
+    chosen = np.abs(values - edges[int(np.argmax(near))]) < params.band_m
     order = np.argsort(values[chosen])
     summed = np.cumsum(areas[chosen][order])
     return float(values[chosen][order][np.searchsorted(summed, summed[-1] / 2)])

@@ -1,24 +1,31 @@
 """Fillers given back: segmentation tends to count the filler at an inside corner to the door beside it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from r2c2r_core.kitchen.fillers import FrontBox, missing_filler
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import trimmed
+from r2c2r_core.tuning import param, tuned
 
-_MOST_M = 0.10
-_MOST_SHARE = 0.2  # of the width: more would be another mistake than a filler
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What may be a filler that was counted to a door."""
+
+    most_m: float = param(0.10, "m", "widest that is given back")
+    most_share: float = param(0.2, "share", "of the width that is given back: more would be another mistake than a filler")
 
 
 def leave_fillers(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
     """The objects, side edges of fronts drawn back from the front plane of a perpendicular run they run into."""
+    params = tuned(Params)
     result = []
     for item in objects:
         for sign in (-1.0, 1.0):
             for other in objects:
                 excess = _excess(item, sign, other)
-                if 0 < excess <= min(_MOST_M, _MOST_SHARE * item.dimensions_m[0]):
+                if 0 < excess <= min(params.most_m, params.most_share * item.dimensions_m[0]):
                     item = _drawn_in(item, sign, excess, other.name)
         result.append(item)
     return result

@@ -1,15 +1,28 @@
 """The handle of a placed mesh: what stands out of its front."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.synthesize.surface import SurfaceSamples
+from r2c2r_core.tuning import param, tuned
 
-_STANDS_OUT_M = (0.008, 0.10)  # nearer is the front's own relief, farther is another object
-_CELL_M = 0.02
-_FEWEST_POINTS = 12
-_LARGEST_SHARE = 0.35  # of the front
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What of a mesh is a handle."""
+
+    stands_out_m: tuple[float, float] = param(
+        (0.008, 0.10),
+        "m",
+        "nearest and farthest that a handle stands out of a front",
+        source="nearer is the front's own relief, farther is another object",
+    )
+    cell_m: float = param(0.02, "m", "side of the cells by which what stands out is parted into handles", gt=0)
+    fewest_points: int = param(12, "count", "of a handle")
+    largest_share: float = param(0.35, "share", "of the front that a handle may cover: more is a second front")
 
 
 def handle_of_mesh(samples: SurfaceSamples, world_from_axes: np.ndarray, low: Vector3, high: Vector3) -> FrontHandle | None:
@@ -24,13 +37,14 @@ def handles_of_mesh(
 
     `low` and `high` are the object's ends along the columns of `world_from_axes`, the front at low y.
     """
+    params = tuned(Params)
     points = samples.points @ world_from_axes - np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     half = (high - low) / 2
     out = -points[:, 1]
-    near = (out > _STANDS_OUT_M[0]) & (out < _STANDS_OUT_M[1])
+    near = (out > params.stands_out_m[0]) & (out < params.stands_out_m[1])
     near &= (np.abs(points[:, 0]) < half[0] + 0.01) & (np.abs(points[:, 2]) < half[2] + 0.01)
-    boxes = [_box_of(group) for group in _groups(points[near]) if len(group) >= _FEWEST_POINTS]
-    return tuple(box for box in boxes if _area(box) <= _LARGEST_SHARE * 4 * half[0] * half[2])  # else a second front
+    boxes = [_box_of(group) for group in _groups(points[near]) if len(group) >= params.fewest_points]
+    return tuple(box for box in boxes if _area(box) <= params.largest_share * 4 * half[0] * half[2])  # else a second front
 
 
 def _box_of(group: np.ndarray) -> FrontHandle:
@@ -54,7 +68,7 @@ def _groups(points: np.ndarray) -> list[np.ndarray]:
 
     if len(points) == 0:
         return []
-    cells = np.floor((points[:, [0, 2]] - points[:, [0, 2]].min(axis=0)) / _CELL_M).astype(np.int64)
+    cells = np.floor((points[:, [0, 2]] - points[:, [0, 2]].min(axis=0)) / tuned(Params).cell_m).astype(np.int64)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
     grid[tuple(cells.T)] = True
     labels, count = label(grid, structure=np.ones((3, 3)))

@@ -8,15 +8,28 @@ import numpy as np
 from r2c2r_core.model.inputs import HingeSide, Overrides
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.tuning import param, tuned
 
-_OFF_CENTRE = (
-    0.2  # of half the width: a handle nearer to the middle does not tell its side (backends.md 2.8: 0.38-0.56 did not)
-)
-_ADJACENT_M = 0.06
-_TRUSTED = 0.25
-_CERTAIN_OFF_CENTRE = 0.6  # of half the width: a handle this far out is at the door's edge
-_SEEN_OPEN = 0.98  # of a door that several frames show open
-_IN_PAIRS = 0.75  # of doors without a telling handle, how many open as pairs do: a guess, stated as one
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How the side of a hinge is told."""
+
+    off_centre: float = param(
+        0.2,
+        "share",
+        "of half the width: a handle nearer to the middle does not tell its side",
+        source="measured on handles of real fronts: 0.38-0.56 did tell it",
+    )
+    adjacent_m: float = param(0.06, "m", "between two doors that may open as a pair")
+    trusted: float = param(0.25, "score", "least confidence, 0 to 1, of a handle that tells the side")
+    certain_off_centre: float = param(
+        0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
+    )
+    seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a door that several frames show open")
+    in_pairs: float = param(
+        0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +45,7 @@ class Hinge:
 
 def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> dict[str, Hinge]:
     """The hinge of every object with a single door."""
+    params = tuned(Params)
     hinges: dict[str, Hinge] = {}
     undecided: list[MeasuredObject] = []
     for item in objects:
@@ -44,7 +58,7 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         elif item.swung is not None and item.spec.opens == "side":
             reason = f"seen open on its {item.swung.hinge} edge"
             hinges[item.name] = Hinge(
-                side=item.swung.hinge, source="measured", reason=reason, confidence=_SEEN_OPEN, by_handle=True
+                side=item.swung.hinge, source="measured", reason=reason, confidence=params.seen_open, by_handle=True
             )
         elif seen is not None:
             hinges[item.name] = seen
@@ -59,14 +73,15 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
 
 def handle_hinge(item: MeasuredObject) -> Hinge | None:
     """The hinge opposite the handle, where the handle is clearly on one side; a low centred bar on a wall flap means top."""
+    params = tuned(Params)
     handle = item.handle
-    if handle is None or handle.confidence < _TRUSTED:
+    if handle is None or handle.confidence < params.trusted:
         return None
     half = item.dimensions_m[[0, 2]] / 2
     x, z = handle.centre
-    if abs(x) >= _OFF_CENTRE * half[0]:
+    if abs(x) >= params.off_centre * half[0]:
         side: HingeSide = "left" if x > 0 else "right"
-        trust = handle.confidence * min(abs(x) / (_CERTAIN_OFF_CENTRE * half[0]), 1.0)
+        trust = handle.confidence * min(abs(x) / (params.certain_off_centre * half[0]), 1.0)
         reason = f"the handle is on the {'right' if x > 0 else 'left'}"
         return Hinge(side=side, source="inferred", reason=reason, confidence=0.5 + 0.5 * float(trust), by_handle=True)
     wide = item.dimensions_m[0] > 1.15 * item.dimensions_m[2]
@@ -78,13 +93,14 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
 
 def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hinges: dict[str, Hinge]) -> Hinge:
     """The side that makes a pair with a neighbour (pairs open outwards), else the category's."""
+    params = tuned(Params)
     left, right = _neighbour(item, objects, -1.0), _neighbour(item, objects, 1.0)
     if left is not None and _side(left, hinges) == "left" and not _paired(left, item, objects, hinges, -1.0):
-        return Hinge(side="right", source="inferred", reason=f"opens as a pair with {left.name}", confidence=_IN_PAIRS)
+        return Hinge(side="right", source="inferred", reason=f"opens as a pair with {left.name}", confidence=params.in_pairs)
     if right is not None and _side(right, hinges) == "right":
-        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
+        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=params.in_pairs)
     if left is None and right is not None and _side(right, hinges) is None:
-        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=_IN_PAIRS)
+        return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=params.in_pairs)
     assert item.spec.hinge is not None  # of every category with a single door
     return Hinge(side=item.spec.hinge, source="default", reason="nothing in the scan tells the side", confidence=0.5)
 
@@ -103,13 +119,14 @@ def _side(item: MeasuredObject, hinges: dict[str, Hinge]) -> HingeSide | None:
 
 def _neighbour(item: MeasuredObject, objects: Sequence[MeasuredObject], sign: float) -> MeasuredObject | None:
     """The single-door front that touches on one side (+1 right, -1 left): same plane, same height, within 6 cm."""
+    params = tuned(Params)
     for other in objects:
         if other is item or other.spec is not item.spec or float(other.outward @ item.outward) < 0.97:
             continue
         offset = item.world_from_object.rotation.T @ (other.front_centre - item.front_centre)
         gap = sign * offset[0] - (item.dimensions_m[0] + other.dimensions_m[0]) / 2
         level = abs(offset[2]) < 0.06 and abs(item.dimensions_m[2] - other.dimensions_m[2]) < 0.08
-        if abs(gap) < _ADJACENT_M and abs(offset[1]) < 0.05 and level:
+        if abs(gap) < params.adjacent_m and abs(offset[1]) < 0.05 and level:
             return other
     return None
 

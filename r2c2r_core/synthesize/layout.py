@@ -19,14 +19,22 @@ from r2c2r_core.synthesize.fillers import leave_fillers
 from r2c2r_core.synthesize.runs import align_runs
 from r2c2r_core.synthesize.solve import solved
 from r2c2r_core.synthesize.ties import ties_of
+from r2c2r_core.tuning import param, tuned
 
 _log = logging.getLogger(__name__)
 
-GAP_M = 0.002  # left between neighbours
-REST_GAP_M = 0.0005  # under a thing that stands on something: no contact at rest, no visible fall
-_DROP_M = 0.015
-_FAR_M = 0.035  # more than fillers and what measuring can be wrong by explain
-_ROUNDS = 6
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What stays between objects, and what is too far a move."""
+
+    gap_m: float = param(0.002, "m", "left between neighbours")
+    rest_gap_m: float = param(0.0005, "m", "under a thing that stands on something: no contact at rest, no visible fall")
+    drop_m: float = param(0.015, "m", "between a thing's underside and what it is taken to stand on")
+    far_m: float = param(
+        0.035, "m", "moved by more, an object is pointed out: more than fillers and errors of measuring explain"
+    )
+    rounds: int = param(6, "count", "of parting what overlaps", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,6 +48,7 @@ class Layout:
 
 def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floor_found: bool) -> Layout:
     """Align the runs, settle what stands, solve for shared lines without overlaps, settle again."""
+    params = tuned(Params)
     placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
@@ -52,7 +61,7 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
         for before, after in zip(objects, placed, strict=True)
     }
     warnings += [
-        f"{name} was moved by {1000 * by:.0f} mm: check its size and pose" for name, by in moves.items() if by > _FAR_M
+        f"{name} was moved by {1000 * by:.0f} mm: check its size and pose" for name, by in moves.items() if by > params.far_m
     ]
     return Layout(objects=tuple(placed), moves_m=moves, warnings=tuple(warnings))
 
@@ -65,22 +74,24 @@ def anchor(item: MeasuredObject) -> Vector3:
 
 def settled(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_found: bool) -> MeasuredObject:
     """The object lowered or raised onto its support: the top of an object below it, the scanned surface, or the floor."""
+    params = tuned(Params)
     if not item.spec.stands or item.fixed_by_person:
         return item
     bottom = item.world_from_object.translation[2] - item.dimensions_m[2] / 2
     tops = [_top(other) for other in others if other is not item and _carries(other, item)]
     if floor_found:
         tops.append(0.0)
-    near = [top for top in tops if abs(top + REST_GAP_M - bottom) <= _DROP_M]
-    if not near and item.support_z_m is not None and abs(item.support_z_m - bottom) <= _DROP_M:
+    near = [top for top in tops if abs(top + params.rest_gap_m - bottom) <= params.drop_m]
+    if not near and item.support_z_m is not None and abs(item.support_z_m - bottom) <= params.drop_m:
         near = [item.support_z_m]
     if not near:
         return item
-    return moved(item, np.array([0.0, 0.0, max(near) + REST_GAP_M - bottom]))
+    return moved(item, np.array([0.0, 0.0, max(near) + params.rest_gap_m - bottom]))
 
 
 def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject], list[str]]:
     """Objects with their ties kept and at least GAP_M between any two boxes: pairs are added until none overlaps."""
+    params = tuned(Params)
     items, warnings = list(objects), []
     try:
         items = _solved_in_rounds(objects)
@@ -88,21 +99,22 @@ def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject
         _log.warning("the layout was not solved", exc_info=error)
         warnings.append(f"the layout was not solved ({error}): everything stands where it was measured; check sizes and poses")
     for first, second, depth in overlapping_pairs(items):
-        if depth > GAP_M:
+        if depth > params.gap_m:
             names = f"{items[first].name} and {items[second].name}"
-            warnings.append(f"{names} still overlap by {1000 * (depth - GAP_M):.0f} mm: correct a size or a pose")
+            warnings.append(f"{names} still overlap by {1000 * (depth - params.gap_m):.0f} mm: correct a size or a pose")
     return items, warnings
 
 
 def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
+    params = tuned(Params)
     ties, apart = ties_of(objects), list[tuple[int, int]]()
-    items = solved(objects, ties, apart, GAP_M)
-    for _ in range(_ROUNDS):
+    items = solved(objects, ties, apart, params.gap_m)
+    for _ in range(params.rounds):
         pairs = [(i, j) for i, j, _ in overlapping_pairs(items) if (i, j) not in apart]
         if not pairs:
             break
         apart += pairs
-        items = solved(objects, ties, apart, GAP_M)
+        items = solved(objects, ties, apart, params.gap_m)
     return items
 
 
@@ -112,7 +124,7 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
         return []
     first, second = np.triu_indices(len(items), 1)
     boxes = _boxes(items)
-    grown = Boxes(boxes.centres, boxes.axes, boxes.halves + GAP_M / 2)
+    grown = Boxes(boxes.centres, boxes.axes, boxes.halves + tuned(Params).gap_m / 2)
     depth = box_penetration(Boxes(*(v[first] for v in grown)), Boxes(*(v[second] for v in grown)))
     found = []
     for i, j, d in zip(first.tolist(), second.tolist(), depth.tolist(), strict=True):
@@ -131,7 +143,7 @@ def _collides(item: MeasuredObject, others: Sequence[MeasuredObject]) -> bool:
 def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:
     """Whether `top` stands on `below` with the clearance it should have."""
     gap = top.world_from_object.translation[2] - top.dimensions_m[2] / 2 - _top(below)
-    return top.spec.stands and _carries(below, top) and abs(gap - REST_GAP_M) < 1e-4
+    return top.spec.stands and _carries(below, top) and abs(gap - tuned(Params).rest_gap_m) < 1e-4
 
 
 def _carries(below: MeasuredObject, item: MeasuredObject) -> bool:

@@ -1,15 +1,21 @@
 """Masses and inertias from panels and densities (sim-ready.md: about the centre of mass, never the identity)."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import Box, ConvexPiece, Inertial
+from r2c2r_core.tuning import param, tuned
 
-_LIGHTEST_KG = 0.01  # lighter bodies make contact solvers stiff
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Bounds of masses."""
+
+    lightest_kg: float = param(0.01, "kg", "of a body", source="lighter bodies make contact solvers stiff", gt=0)
 
 
 def inertial_of_boxes(boxes: Sequence[Box], density_kg_m3: float) -> Inertial:
@@ -54,7 +60,7 @@ def _combined(masses: np.ndarray, centres: Points, own: np.ndarray) -> Inertial:
     arms = centres - centre
     squares = (arms**2).sum(axis=1)
     steiner = np.einsum("n,nij->ij", masses, squares[:, None, None] * np.eye(3) - arms[:, :, None] * arms[:, None, :])
-    scale = max(_LIGHTEST_KG / total, 1.0)
+    scale = max(tuned(Params).lightest_kg / total, 1.0)
     inertia = (own.sum(axis=0) + steiner) * scale
     return Inertial(mass_kg=total * scale, com_link=centre, inertia=(inertia + inertia.T) / 2)
 

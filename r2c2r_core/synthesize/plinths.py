@@ -1,6 +1,7 @@
 """The plinth below a run of base units, from the floor to their undersides."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -8,18 +9,32 @@ import numpy as np
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.facets import Colour, Facets, most_common
-from r2c2r_core.synthesize.slabs import CLEAR_M, Slab
+from r2c2r_core.synthesize.slabs import Params as SlabsParams
+from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import Interval, UnitRun, grouped, heights, is_front
+from r2c2r_core.tuning import param, tuned
 
-_UNDERSIDES_M = (0.03, 0.25)  # lower there is no plinth; higher something is missing that nobody clicked
-_THICK_M = 0.016
-_SET_BACK_M = 0.05  # where the scan does not show it: kitchens leave 40-80 mm for the toes
-_SET_BACKS_M = (0.005, 0.12)
-_EVIDENCE = 0.25  # of its face
-_FACING = 0.9
-_SEAM_M = 0.03  # units this near to each other stand on one board
-_DULL = 0.6  # of the fronts' colour: a plinth that no camera saw is in the shade
-_UNSEEN = (0.8, 0.8, 0.8)  # fronts of which the scan has nothing either
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a plinth is."""
+
+    undersides_m: tuple[float, float] = param(
+        (0.03, 0.25),
+        "m",
+        "least and most height of the undersides above it",
+        source="lower there is no plinth; higher something is missing that nobody clicked",
+    )
+    thick_m: float = param(0.016, "m", "thickness of its board")
+    set_back_m: float = param(
+        0.05, "m", "behind the fronts, where the scan does not show it", source="kitchens leave 40-80 mm for the toes"
+    )
+    set_backs_m: tuple[float, float] = param((0.005, 0.12), "m", "least and most set back at which it is looked for")
+    evidence: float = param(0.25, "share", "of its face that the scan must show")
+    facing: float = param(0.9, "cosine", "with the fronts' direction, from which surface looks as it does")
+    seam_m: float = param(0.03, "m", "between units that stand on one board")
+    dull: float = param(0.6, "ratio", "of the fronts' colour: a plinth that no camera saw is in the shade")
+    unseen: tuple[float, float, float] = param((0.8, 0.8, 0.8), "colour", "of fronts of which the scan has nothing either")
 
 
 class _Face(NamedTuple):
@@ -32,13 +47,15 @@ class _Face(NamedTuple):
 
 def plinth_runs(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
     """Units that end above the floor, grouped by their front plane and their undersides."""
-    low, high = _UNDERSIDES_M
+    low, high = tuned(Params).undersides_m
     return grouped([item for item in objects if is_front(item) and low < heights(item)[0] < high], side=0)
 
 
 def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], taken: Sequence[Slab]) -> list[Slab]:
     """A board under every row of a run; `facets` are of the world."""
-    local, front, top = facets.turned(run.rotation), run.least(1), run.least(2) - CLEAR_M
+    slabs_params = tuned(SlabsParams)
+    params = tuned(Params)
+    local, front, top = facets.turned(run.rotation), run.least(1), run.least(2) - slabs_params.clear_m
     corners = [run.corners(item) for item in objects]
     clicked = [c for c, item in zip(corners, objects, strict=True) if item.spec.opens == "fixed" and c[:, 2].max() < top]
     others = [*corners, *(slab.corners(run.rotation) for slab in taken)]
@@ -48,8 +65,8 @@ def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], tak
         start = front + face.set_back_m
         board = Slab(
             run.rotation,
-            np.array([low, start, CLEAR_M / 4]),
-            np.array([high, start + _THICK_M, top]),
+            np.array([low, start, slabs_params.clear_m / 4]),
+            np.array([high, start + params.thick_m, top]),
             ("inferred", "inferred", "inferred"),
             face.colour,
             (f"set back by {1000 * face.set_back_m:.0f} mm, {face.source}",),
@@ -60,9 +77,10 @@ def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], tak
 
 def _rows(run: UnitRun) -> Iterator[Interval]:
     """Stretches of units side by side."""
+    params = tuned(Params)
     (low, high), *rest = run.stretches
     for start, end in rest:
-        if start > high + _SEAM_M:
+        if start > high + params.seam_m:
             yield low, high
             low, high = start, end
         high = max(high, end)
@@ -74,13 +92,14 @@ def _face(facets: Facets, run: UnitRun, top: float, length: float) -> _Face:
 
     `facets` are those along the row, in the run's frame.
     """
-    upright = facets.where(facets.normals[:, 1] < -_FACING)
-    nearest, farthest = _SET_BACKS_M
+    params = tuned(Params)
+    upright = facets.where(facets.normals[:, 1] < -params.facing)
+    nearest, farthest = params.set_backs_m
     front = run.least(1)
     below = upright.where(upright.within(1, front + nearest, front + farthest) & upright.within(2, 0.1 * top, 0.9 * top))
-    set_back = most_common(below.middles[:, 1] - front, below.areas, least=_EVIDENCE * 0.8 * top * length)
+    set_back = most_common(below.middles[:, 1] - front, below.areas, least=params.evidence * 0.8 * top * length)
     if set_back is not None:
         return _Face(set_back, "measured", below.colour)
     on_front = upright.where(upright.within(1, front - 2 * nearest, front + 2 * nearest) & upright.within(2, top, run.most(2)))
-    red, green, blue = on_front.colour if len(on_front.areas) else _UNSEEN
-    return _Face(_SET_BACK_M, "inferred", (_DULL * red, _DULL * green, _DULL * blue))
+    red, green, blue = on_front.colour if len(on_front.areas) else params.unseen
+    return _Face(params.set_back_m, "inferred", (params.dull * red, params.dull * green, params.dull * blue))

@@ -9,12 +9,28 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation, rotation_about_z
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
+from r2c2r_core.tuning import param, tuned
 
-_SAME_DIRECTION_RAD = np.deg2rad(7.0)
-_COPLANAR_M = 0.015
-_MANHATTAN_RAD = np.deg2rad(1.0)  # the room's right angle is measured on all walls: nearer than this it is the better word
-_PARALLEL_RAD = np.deg2rad(0.6)  # the yaw of a 0.5 m wide front, its ends known to about 5 mm
-_LONG_RUN_M = 0.8
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What makes fronts one run."""
+
+    same_direction_rad: float = param(float(np.deg2rad(7.0)), "rad", "between fronts of one direction")
+    coplanar_m: float = param(0.015, "m", "between fronts of one plane")
+    manhattan_rad: float = param(
+        float(np.deg2rad(1.0)),
+        "rad",
+        "from the room's right angle, within which that is the better word",
+        source="it is measured on all walls",
+    )
+    parallel_rad: float = param(
+        float(np.deg2rad(0.6)),
+        "rad",
+        "between a front and a known direction, within which it takes that",
+        source="the yaw of a 0.5 m wide front, its ends known to about 5 mm",
+    )
+    long_run_m: float = param(0.8, "m", "length from which a run's own line decides")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +47,7 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
     A free-standing appliance stands as someone put it: it turns only where it is parallel to within what its own narrow
     front tells.
     """
+    params = tuned(Params)
     items = list(objects)
     turned = [i for i, o in enumerate(items) if o.spec.opens != "rigid" and not o.fixed_by_person]
     known: list[float] = []
@@ -48,18 +65,19 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
                 items[i] = moved(items[i], outward * (offset - items[i].front_centre @ outward))
     known += [manhattan_yaw_rad + quarter * np.pi / 2 for quarter in range(4)]
     for i in (i for i in turned if items[i].spec.stands):
-        nearest = next((yaw for yaw in known if abs(_wrapped(yaw - _yaw(items[i]))) < _PARALLEL_RAD), None)
+        nearest = next((yaw for yaw in known if abs(_wrapped(yaw - _yaw(items[i]))) < params.parallel_rad), None)
         items[i] = items[i] if nearest is None else _facing(items[i], nearest)
     return tuple(items)
 
 
 def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[_Line]:
     """Fronts grouped by the way they face; the widest and surest front leads each group."""
+    params = tuned(Params)
     left = sorted(fronts, key=lambda i: -weight(items[i]))
     lines: list[_Line] = []
     for i in left:
         yaw = _yaw(items[i])
-        near = next((line for line in lines if abs(_wrapped(yaw - line.yaw_rad)) < _SAME_DIRECTION_RAD), None)
+        near = next((line for line in lines if abs(_wrapped(yaw - line.yaw_rad)) < params.same_direction_rad), None)
         if near is None:
             lines.append(_Line([i], yaw))
         else:
@@ -69,27 +87,29 @@ def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[
 
 def _run_yaw(items: Sequence[MeasuredObject], line: _Line, manhattan_yaw_rad: float) -> float:
     """The direction a group faces: a line through its coplanar fronts where the run is long, else their weighted mean."""
+    params = tuned(Params)
     weights = np.array([weight(items[i]) * items[i].dimensions_m[0] ** 2 for i in line.members])
     turns = np.array([_wrapped(_yaw(items[i]) - line.yaw_rad) for i in line.members])
     yaw = line.yaw_rad + float(weights @ turns / weights.sum())
     outward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     planes = _planes(items, [i for i in line.members if built_in(items[i])], outward)
     longest = max(planes, key=lambda plane: _length(items, plane, outward), default=[])
-    if len(longest) >= 3 and _length(items, longest, outward) > _LONG_RUN_M:
+    if len(longest) >= 3 and _length(items, longest, outward) > params.long_run_m:
         fitted = _line_yaw(np.array([items[i].front_centre[:2] for i in longest]), outward)
         if abs(_wrapped(fitted - yaw)) < np.deg2rad(2.0):
             yaw = fitted
     off = (yaw - manhattan_yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    return yaw - off if abs(off) < _MANHATTAN_RAD else yaw
+    return yaw - off if abs(off) < params.manhattan_rad else yaw
 
 
 def _planes(items: Sequence[MeasuredObject], members: Sequence[int], outward: Vector3) -> list[list[int]]:
     """Members whose front planes lie within 1.5 cm of their group's heaviest one."""
+    params = tuned(Params)
     left = sorted(members, key=lambda i: -weight(items[i]))
     planes: list[list[int]] = []
     for i in left:
         offset = items[i].front_centre @ outward
-        home = next((p for p in planes if abs(items[p[0]].front_centre @ outward - offset) < _COPLANAR_M), None)
+        home = next((p for p in planes if abs(items[p[0]].front_centre @ outward - offset) < params.coplanar_m), None)
         if home is None:
             planes.append([i])
         else:

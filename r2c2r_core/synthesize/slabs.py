@@ -10,9 +10,15 @@ from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.facets import Colour
 from r2c2r_core.synthesize.unit_runs import Interval
+from r2c2r_core.tuning import param, tuned
 
-CLEAR_M = 0.002  # left to what stands beside, below and on it
-_SHORTEST_M = 0.10
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Boards that follow a run."""
+
+    clear_m: float = param(0.002, "m", "left to what stands beside, below and on it")
+    shortest_m: float = param(0.10, "m", "length of a piece that is kept")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,13 +59,14 @@ class Slab:
 
     def cut(self, obstacles: Sequence[Points], replaced_by: Sequence[Points] = ()) -> list["Slab"]:
         """What is left of it along its run beside obstacles (corners in its frame), and away from what replaces it."""
+        params = tuned(Params)
         gone = [corners for corners in obstacles if self.meets(corners, 1) and self.meets(corners, 2)]
         gone += [corners for corners in replaced_by if self.meets(corners, 1)]
         pieces = [self.along]
         for corners in gone:
-            start, end = float(corners[:, 0].min()) - CLEAR_M, float(corners[:, 0].max()) + CLEAR_M
+            start, end = float(corners[:, 0].min()) - params.clear_m, float(corners[:, 0].max()) + params.clear_m
             pieces = [p for low, high in pieces for p in ((low, min(high, start)), (max(low, end), high))]
-            pieces = [(low, high) for low, high in pieces if high - low >= _SHORTEST_M]
+            pieces = [(low, high) for low, high in pieces if high - low >= params.shortest_m]
         return [
             replace(self, low=np.array([low, *self.low[1:]]), high=np.array([high, *self.high[1:]])) for low, high in pieces
         ]

@@ -15,17 +15,34 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.least_change import least_change
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.tuning import param, tuned
 
-_EDGE_M = {True: 0.005, False: 0.012}  # of a front's edges: measured over all frames, or on the mesh alone
-_PLANE_M = 0.003
-_UNSEEN_M = 0.15  # of a back that nobody saw
-_APPLIANCE_M, _THING_M = 0.05, 0.15  # of where it stands: what was put there gives way, furniture that is built in does not
-_APPLIANCE_TRIM_M = 0.004  # it moves rather than shrinks
-_TRIM_M, _TRIM_SHARE = 0.012, 0.025  # how much a size may change: an edge is measured to about 8 mm (backends.md 2.9)
-_LEAST_DEPTH_SHARE = 0.6  # of an unseen depth that must remain
 _FIXED_M = 1e-6
 _SOFT_M = 1e-5  # what a bound may give where it must
 _SPARE_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well each face is known, for the layout's least change."""
+
+    measured_edge_m: float = param(
+        0.005,
+        "m",
+        "of a front's edges, measured over all frames",
+        source="an edge is measured to about 8 mm at worst on the sample kitchens",
+    )
+    mesh_edge_m: float = param(0.012, "m", "of a front's edges, measured on the mesh alone")
+    plane_m: float = param(0.003, "m", "of a front's plane")
+    unseen_m: float = param(0.15, "m", "of a back that nobody saw")
+    appliance_m: float = param(
+        0.05, "m", "of where an appliance stands: what was put there gives way, furniture that is built in does not"
+    )
+    thing_m: float = param(0.15, "m", "of where a thing stands")
+    appliance_trim_m: float = param(0.004, "m", "by which an appliance's size may change: it moves rather than shrinks")
+    trim_m: float = param(0.012, "m", "by which a size may change", source="an edge is measured to about 8 mm")
+    trim_share: float = param(0.025, "share", "of a size by which it may change")
+    least_depth_share: float = param(0.6, "share", "of an unseen depth that must remain")
 
 
 class Face(NamedTuple):
@@ -112,15 +129,16 @@ def _with_faces(item: MeasuredObject, faces: np.ndarray) -> MeasuredObject:
 
 def _sigmas(item: MeasuredObject) -> np.ndarray:
     """What measuring each face can be wrong by, one sigma."""
+    params = tuned(Params)
     if item.fixed_by_person:
         return np.full(6, _FIXED_M)
     if item.spec.opens == "rigid":
-        return np.full(6, _THING_M)
+        return np.full(6, params.thing_m)
     if item.spec.stands:
-        return np.full(6, _APPLIANCE_M)
-    edge = _EDGE_M[item.front_measured]
-    back = _UNSEEN_M if _unseen_back(item) else edge
-    return np.array([edge, edge, _PLANE_M, back, edge, edge])
+        return np.full(6, params.appliance_m)
+    edge = params.measured_edge_m if item.front_measured else params.mesh_edge_m
+    back = params.unseen_m if _unseen_back(item) else edge
+    return np.array([edge, edge, params.plane_m, back, edge, edge])
 
 
 def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[np.ndarray, float]]:
@@ -135,16 +153,19 @@ def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[
 
 def _trim(item: MeasuredObject, axis: int) -> float:
     """How much a measured size may be wrong by."""
+    params = tuned(Params)
     if item.spec.opens == "rigid" or item.fixed_by_person:
         return 0.0
-    return min(_APPLIANCE_TRIM_M if item.spec.stands else _TRIM_M, _TRIM_SHARE * float(item.dimensions_m[axis]))
+    return min(
+        params.appliance_trim_m if item.spec.stands else params.trim_m, params.trim_share * float(item.dimensions_m[axis])
+    )
 
 
 def _shrink(item: MeasuredObject, axis: int) -> float:
     """How much a size may be given up."""
     size = float(item.dimensions_m[axis])
     if axis == 1 and _unseen_back(item):
-        return max(size - max(_LEAST_DEPTH_SHARE * size, min(item.spec.depth.low, size)), _trim(item, axis))
+        return max(size - max(tuned(Params).least_depth_share * size, min(item.spec.depth.low, size)), _trim(item, axis))
     return _trim(item, axis)
 
 

@@ -29,10 +29,16 @@ from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces,
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
-from r2c2r_core.tuning import Changes
+from r2c2r_core.tuning import Changes, param, tuned
 
 _WOOD = (0.80, 0.76, 0.70)
-_FULLY_OPEN = 0.75  # of the usual travel: a drawer drawn out this far was drawn out to its stop
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as drawn out to the stop."""
+
+    fully_open: float = param(0.75, "share", "of the usual travel: a drawer drawn out this far was drawn out to its stop")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,7 +269,7 @@ def _opening(item: MeasuredObject, motion: Motion, hinge: Hinge | None) -> tuple
     seen, most = (item.opened_m, float(item.dimensions_m[1])) if slides else (_swing_rad(item, hinge), np.pi)
     if item.spec.several_fronts or seen is None:  # of which drawer, nobody knows
         return motion.upper, "default"
-    return (seen, "measured") if _FULLY_OPEN * motion.upper <= seen <= most else (motion.upper, "default")
+    return (seen, "measured") if tuned(Params).fully_open * motion.upper <= seen <= most else (motion.upper, "default")
 
 
 def _swing_rad(item: MeasuredObject, hinge: Hinge | None) -> float | None:

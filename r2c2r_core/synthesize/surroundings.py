@@ -17,9 +17,16 @@ from r2c2r_core.synthesize.facets import facets_of
 from r2c2r_core.synthesize.plinths import plinth_runs, plinths
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.worktops import runs_of, worktop
+from r2c2r_core.tuning import param, tuned
 
 MADE = "made from the scan: nobody clicked it"
-_APART_M = 0.0004  # from all that stands still, and from every closed front
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Room that worktops and plinths leave."""
+
+    apart_m: float = param(0.0004, "m", "from all that stands still, and from every closed front")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,10 +94,11 @@ def standing_clear(
 
 def _clear(opened: Sequence[SceneObject], pieces: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> bool:
     """Whether the pieces touch nothing of the scene, and every joint opens as far beside them as without them."""
+    params = tuned(Params)
     boxes = gathered(opened).boxes
     for own in (link_boxes(piece, link) for piece in pieces for link in piece.links):
         repeated = Boxes(*(np.repeat(part, len(boxes.centres), axis=0) for part in own))
-        if (box_penetration(repeated, boxes) > -_APART_M).any():
+        if (box_penetration(repeated, boxes) > -params.apart_m).any():
             return False
     beside = open_freely([*opened, *pieces], walls, kept)[: len(opened)]
     uppers, before = ([joint.upper for item in items for joint in item.joints] for items in (beside, opened))

@@ -7,10 +7,20 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.model.scene import ConvexPiece
 from r2c2r_core.synthesize.vessels import staves
+from r2c2r_core.tuning import param, tuned
 
-_OPENNESS = 1.35  # hull volume over solid volume: above it the thing has a cavity or legs that a gripper needs
-_FLAT_M = 0.006  # what lies this near the underside belongs to it: reconstructed feet are uneven
-_MOST_PIECES = 16
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a thing is more than its hull."""
+
+    openness: float = param(
+        1.35, "ratio", "of hull volume to solid volume, above which it has a cavity or legs that a gripper needs", ge=1
+    )
+    flat_m: float = param(
+        0.006, "m", "from the underside, within which a point belongs to it", source="reconstructed feet are uneven"
+    )
+    most_pieces: int = param(16, "count", "convex pieces of a thing", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,7 +37,7 @@ def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tupl
 
     shape = Trimesh(solid.vertices, solid.faces, process=True)
     hull = shape.convex_hull
-    if shape.is_volume and float(hull.volume) > _OPENNESS * float(shape.volume):
+    if shape.is_volume and float(hull.volume) > tuned(Params).openness * float(shape.volume):
         parts = staves(solid.vertices, solid.faces) or _decomposed(shape, seed)
     else:
         parts = [np.asarray(hull.vertices)]
@@ -58,13 +68,13 @@ def _decomposed(shape: object, seed: int) -> list[Points]:
         mcts_max_depth=2,
         seed=seed,
     )
-    return [np.asarray(points, dtype=np.float64) for points, _ in parts][:_MOST_PIECES]
+    return [np.asarray(points, dtype=np.float64) for points, _ in parts][: tuned(Params).most_pieces]
 
 
 def _flat_below(points: Points, underside_m: float) -> Points:
     """The points with those near the underside put onto it."""
     flat = points.copy()
-    flat[:, 2] = np.where(points[:, 2] < underside_m + _FLAT_M, underside_m, points[:, 2])
+    flat[:, 2] = np.where(points[:, 2] < underside_m + tuned(Params).flat_m, underside_m, points[:, 2])
     return flat
 
 

@@ -5,19 +5,32 @@ from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.fixtures.carcass import FRONT_GAP_M
+from r2c2r_core.synthesize.fixtures.carcass import Params as CarcassParams
 from r2c2r_core.synthesize.runs import built_in
 from r2c2r_core.synthesize.solve import Face, Tie
+from r2c2r_core.tuning import param, tuned
 
-_LINE_M, _LINES_M = 0.02, 0.04  # tops this near to the next, and this near in all, are one line: a scan sags along a run
-_SEAM_M = (-0.012, 0.015)  # edges this far past or short of each other are one seam: gaps are 2-4 mm, end panels 16-19 mm
-_COPLANAR_M = 0.002
-_SLIT_M = 0.02  # between a unit and what closes it above or below: more is a real step
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What the fronts of a run share."""
+
+    seam_m: tuple[float, float] = param(
+        (-0.012, 0.015),
+        "m",
+        "past (negative) and short of each other, within which edges are one seam",
+        source="gaps are 2-4 mm, end panels 16-19 mm",
+    )
+    coplanar_m: float = param(0.002, "m", "between fronts of one plane")
+    line_m: float = param(0.02, "m", "to the next top of one line", source="a scan sags along a run")
+    lines_m: float = param(0.04, "m", "between all tops of one line", source="a scan sags along a run")
+    slit_m: float = param(0.02, "m", "between a unit and what closes it above or below: more is a real step")
 
 
 def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
@@ -34,19 +47,21 @@ def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
 
 def _closed(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
     """Worktops lie on the highest unit below them, and plinths end under the lowest one above: no slit in between."""
+    params = tuned(Params)
+    carcass_params = tuned(CarcassParams)
     units = [i for i, item in enumerate(items) if built_in(item) and item.spec.opens != "rigid"]
     for i, item in enumerate(items):
         if item.spec.opens != "fixed" or item.fixed_by_person:
             continue
         near = [j for j in units if _one_above_the_other(items[j], item)]
-        below = [j for j in near if abs(_edge(item, 2, -1.0) - _edge(items[j], 2, 1.0)) < _SLIT_M]
-        above = [j for j in near if abs(_edge(items[j], 2, -1.0) - _edge(item, 2, 1.0)) < _SLIT_M]
+        below = [j for j in near if abs(_edge(item, 2, -1.0) - _edge(items[j], 2, 1.0)) < params.slit_m]
+        above = [j for j in near if abs(_edge(items[j], 2, -1.0) - _edge(item, 2, 1.0)) < params.slit_m]
         if below:
             highest = max(below, key=lambda j: _edge(items[j], 2, 1.0))
-            yield Tie(first=Face(highest, 2, 1.0), second=Face(i, 2, -1.0), gap_m=FRONT_GAP_M)
+            yield Tie(first=Face(highest, 2, 1.0), second=Face(i, 2, -1.0), gap_m=carcass_params.front_gap_m)
         elif above:
             lowest = min(above, key=lambda j: _edge(items[j], 2, -1.0))
-            yield Tie(first=Face(i, 2, 1.0), second=Face(lowest, 2, -1.0), gap_m=FRONT_GAP_M)
+            yield Tie(first=Face(i, 2, 1.0), second=Face(lowest, 2, -1.0), gap_m=carcass_params.front_gap_m)
 
 
 def _one_above_the_other(a: MeasuredObject, b: MeasuredObject) -> bool:
@@ -54,7 +69,7 @@ def _one_above_the_other(a: MeasuredObject, b: MeasuredObject) -> bool:
     turn = b.world_from_object.rotation.T
     apart = np.abs(turn @ (a.world_from_object.translation - b.world_from_object.translation))
     reach = (b.dimensions_m + np.abs(turn @ a.world_from_object.rotation) @ a.dimensions_m) / 2
-    return bool((apart[:2] < reach[:2] - _SLIT_M / 2).all())
+    return bool((apart[:2] < reach[:2] - tuned(Params).slit_m / 2).all())
 
 
 def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
@@ -73,28 +88,33 @@ def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
 
 def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
     apart = float((a.front_centre - b.front_centre) @ a.outward)
-    return float(a.outward @ b.outward) > 1 - 1e-6 and abs(apart) < _COPLANAR_M
+    return float(a.outward @ b.outward) > 1 - 1e-6 and abs(apart) < tuned(Params).coplanar_m
 
 
 def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) -> Iterator[Tie]:
     """Tops (+1) or bottoms (-1) that follow each other closely are on one line."""
     left = sorted(plane, key=lambda i: _edge(items[i], 2, sign))
+    params = tuned(Params)
     while left:
         line = [left.pop(0)]
         lowest = _edge(items[line[0]], 2, sign)
-        while left and _edge(items[left[0]], 2, sign) < min(_edge(items[line[-1]], 2, sign) + _LINE_M, lowest + _LINES_M):
+        while left and _edge(items[left[0]], 2, sign) < min(
+            _edge(items[line[-1]], 2, sign) + params.line_m, lowest + params.lines_m
+        ):
             line.append(left.pop(0))
         yield from (Tie(first=Face(a, 2, sign), second=Face(b, 2, sign)) for a, b in pairwise(line))
 
 
 def _seams(items: Sequence[MeasuredObject], plane: Sequence[int], axis: int) -> Iterator[Tie]:
     """One gap of 3 mm where the edges of two neighbours nearly meet."""
+    params = tuned(Params)
+    carcass_params = tuned(CarcassParams)
     across = 2 if axis == 0 else 0
     for i in plane:
         for j in plane:
             gap = _edge(items[j], axis, -1.0) - _edge(items[i], axis, 1.0)
-            if i != j and _SEAM_M[0] < gap < _SEAM_M[1] and _beside(items[i], items[j], across):
-                yield Tie(first=Face(i, axis, 1.0), second=Face(j, axis, -1.0), gap_m=FRONT_GAP_M)
+            if i != j and params.seam_m[0] < gap < params.seam_m[1] and _beside(items[i], items[j], across):
+                yield Tie(first=Face(i, axis, 1.0), second=Face(j, axis, -1.0), gap_m=carcass_params.front_gap_m)
 
 
 def _beside(a: MeasuredObject, b: MeasuredObject, across: int) -> bool:

@@ -9,10 +9,17 @@ from r2c2r_core.arrays import Matrix3, Points
 from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.runs import built_in
-
-_FLUSH_M, _STEP_M = 0.06, 0.03  # fronts this far apart in depth, and tops in height, are under one worktop
+from r2c2r_core.tuning import param, tuned
 
 Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which units are under one worktop."""
+
+    flush_m: float = param(0.06, "m", "between their fronts, in depth")
+    step_m: float = param(0.03, "m", "between their tops")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +79,7 @@ def heights(item: MeasuredObject) -> Interval:
 def flush(a: MeasuredObject, b: MeasuredObject) -> bool:
     """Whether both fronts are about in one plane."""
     apart = float((a.front_centre - b.front_centre) @ a.outward)
-    return float(a.outward @ b.outward) > 1 - 1e-3 and abs(apart) < _FLUSH_M
+    return float(a.outward @ b.outward) > 1 - 1e-3 and abs(apart) < tuned(Params).flush_m
 
 
 def overlap(a: Interval, b: Interval) -> float:
@@ -81,4 +88,4 @@ def overlap(a: Interval, b: Interval) -> float:
 
 
 def _one_run(a: MeasuredObject, b: MeasuredObject, side: int) -> bool:
-    return flush(a, b) and abs(heights(a)[side] - heights(b)[side]) < _STEP_M
+    return flush(a, b) and abs(heights(a)[side] - heights(b)[side]) < tuned(Params).step_m

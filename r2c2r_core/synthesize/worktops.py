@@ -12,29 +12,57 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject, distance_to_wall
-from r2c2r_core.synthesize.facets import BAND_M, Colour, Facets, most_common
-from r2c2r_core.synthesize.slabs import CLEAR_M, Slab
+from r2c2r_core.synthesize.facets import Colour, Facets, most_common
+from r2c2r_core.synthesize.facets import Params as FacetsParams
+from r2c2r_core.synthesize.slabs import Params as SlabsParams
+from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import Interval, UnitRun, flush, grouped, heights, is_front, overlap
+from r2c2r_core.tuning import param, tuned
 
-_TOPS_M = (0.60, 1.15)  # heights at which base units end: sitting kitchens to bars
-_STACKED_M = 0.05
-_ABOVE_M = (-0.01, 0.11)  # of the units' tops: a worktop of 20-60 mm, on a rail or on tops that were measured low
-_LEVEL = 0.8  # of a unit normal, upwards: within 37 deg, as fused scans of dark and polished stone are uneven
-_BIN_M = 0.02
-_EVIDENCE = 0.04  # of the units' plan: sensors lose most of a dark worktop, and things hide it …
-_WIDE_M, _WIDE_SHARE, _SPECK = 0.10, 0.5, 0.01  # … but what is left lies along half of the run, not in one heap
-_SHOWN = 0.5  # of what is seen over the units: from here on a strip is worktop too
-_REACH_M = 0.70  # past the last unit: a corner, or an appliance that nobody clicked
-_OVERHANG_M, _FINE_M = 0.06, 0.005
-_EDGE_M, _HIDDEN = 0.03, 0.25
-_THINNEST_M = 0.005
-_BEHIND_M = 0.20  # a wall this near behind the units is where the worktop ends
-_STOOD_IN_M = 0.02  # what ends this little below the surface stands on it
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Where the scan shows a worktop."""
+
+    tops_m: tuple[float, float] = param(
+        (0.60, 1.15), "m", "least and most height at which base units end", source="sitting kitchens to bars"
+    )
+    stacked_m: float = param(0.05, "m", "between units that stand on each other")
+    above_m: tuple[float, float] = param(
+        (-0.01, 0.11),
+        "m",
+        "least and most height over the units' tops",
+        source="a worktop of 20-60 mm, on a rail or on tops that were measured low",
+    )
+    level: float = param(
+        0.8, "cosine", "of a normal with up: within 37 degrees", source="fused scans of dark and polished stone are uneven"
+    )
+    bin_m: float = param(0.02, "m", "width of the strips that are looked at", gt=0)
+    evidence: float = param(
+        0.04, "share", "of the units' plan that must be seen", source="sensors lose most of a dark worktop, and things hide it"
+    )
+    wide_m: float = param(0.10, "m", "length of the stretches in which the run is looked at", gt=0)
+    wide_share: float = param(
+        0.5, "share", "of those stretches that must show some of it: what is left lies along the run, not in one heap"
+    )
+    speck: float = param(0.01, "share", "of a stretch: less of it shows nothing")
+    shown: float = param(0.5, "share", "of what is seen over the units, from which on a strip is worktop too")
+    reach_m: float = param(0.70, "m", "past the last unit: a corner, or an appliance that nobody clicked")
+    overhang_m: float = param(0.06, "m", "before the fronts, at most")
+    fine_m: float = param(0.005, "m", "steps in which the front edge is looked for", gt=0)
+    edge_m: float = param(0.03, "m", "below the surface, down to which the front edge is looked for")
+    hidden: float = param(
+        0.25, "ratio", "of what is seen of the top to what is seen of the edge, below which the edge gives the colour"
+    )
+    thinnest_m: float = param(0.005, "m", "of a worktop")
+    behind_m: float = param(0.20, "m", "behind the units: a wall this near is where the worktop ends")
+    stood_in_m: float = param(0.02, "m", "below the surface: what ends so little below it stands on it")
 
 
 def runs_of(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
     """Base units on which a worktop can lie, grouped by the way they face, their plane and their top; the longest first."""
-    units = [item for item in objects if is_front(item) and _TOPS_M[0] < heights(item)[1] < _TOPS_M[1]]
+    params = tuned(Params)
+    units = [item for item in objects if is_front(item) and params.tops_m[0] < heights(item)[1] < params.tops_m[1]]
     return grouped([unit for unit in units if not any(_lies_on(other, unit) for other in units)], side=1)
 
 
@@ -45,6 +73,8 @@ def worktop(
 
     `facets` are of the world, `taken` the worktops of other runs.
     """
+    params = tuned(Params)
+    slabs_params = tuned(SlabsParams)
     top = _top_of(facets.turned(run.rotation), run)
     if top is None:
         return []
@@ -58,7 +88,7 @@ def worktop(
     for low, high in _stretches(top):
         slab = Slab(
             run.rotation,
-            np.array([low, run.least(1) - overhang, run.most(2) + CLEAR_M]),
+            np.array([low, run.least(1) - overhang, run.most(2) + slabs_params.clear_m]),
             np.array([high, rear, top.height_m]),
             ("inferred", depth, "measured"),
             top.colour,
@@ -68,7 +98,7 @@ def worktop(
     return [
         piece
         for piece in pieces
-        if piece.thickness_m >= _THINNEST_M and any(overlap(piece.along, unit) > 0 for unit in run.stretches)
+        if piece.thickness_m >= params.thinnest_m and any(overlap(piece.along, unit) > 0 for unit in run.stretches)
     ]
 
 
@@ -85,20 +115,22 @@ class _Top:
     @property
     def shown(self) -> float:
         """The share of the units' plan from which on a strip is worktop too."""
-        return _SHOWN * self.over.area_m2 / (_length(self.run) * _depth(self.run))
+        return tuned(Params).shown * self.over.area_m2 / (_length(self.run) * _depth(self.run))
 
 
 def _top_of(facets: Facets, run: UnitRun) -> _Top | None:
     """The level surface just above the units; None where there is too little, or it lies in one heap."""
+    params = tuned(Params)
+    facets_params = tuned(FacetsParams)
     front, back, top = run.least(1), run.most(1), run.most(2)
-    level = facets.where(facets.normals[:, 2] > _LEVEL)
-    level = level.where(level.within(2, top + _ABOVE_M[0], top + _ABOVE_M[1]))
-    level = level.where(level.within(1, front - _OVERHANG_M, back + _BEHIND_M))
+    level = facets.where(facets.normals[:, 2] > params.level)
+    level = level.where(level.within(2, top + params.above_m[0], top + params.above_m[1]))
+    level = level.where(level.within(1, front - params.overhang_m, back + params.behind_m))
     over = level.where(_over_any(level.middles[:, 0], run) & level.within(1, front, back))
-    height = most_common(over.middles[:, 2], over.areas, least=_EVIDENCE * _length(run) * _depth(run))
-    if height is None or height < top + CLEAR_M + _THINNEST_M:
+    height = most_common(over.middles[:, 2], over.areas, least=params.evidence * _length(run) * _depth(run))
+    if height is None or height < top + tuned(SlabsParams).clear_m + params.thinnest_m:
         return None
-    level, over = (part.where(np.abs(part.middles[:, 2] - height) < BAND_M) for part in (level, over))
+    level, over = (part.where(np.abs(part.middles[:, 2] - height) < facets_params.band_m) for part in (level, over))
     return _Top(run, height, level, over, _colour(facets, run, height, over)) if _all_along(run, over) else None
 
 
@@ -109,7 +141,7 @@ def _lies_on(upper: MeasuredObject, lower: MeasuredObject) -> bool:
     alone = UnitRun(lower.world_from_object.rotation, (lower,))
     gap = alone.interval(upper, 2)[0] - alone.interval(lower, 2)[1]
     side = alone.interval(lower, 0)
-    return abs(gap) < _STACKED_M and overlap(side, alone.interval(upper, 0)) > 0.5 * (side[1] - side[0])
+    return abs(gap) < tuned(Params).stacked_m and overlap(side, alone.interval(upper, 0)) > 0.5 * (side[1] - side[0])
 
 
 def _length(run: UnitRun) -> float:
@@ -126,74 +158,81 @@ def _over_any(along: np.ndarray, run: UnitRun) -> np.ndarray:
 
 def _all_along(run: UnitRun, over: Facets) -> bool:
     """Whether level surface is seen in most stretches of the units."""
-    edges = np.arange(run.least(0), run.most(0) + _WIDE_M, _WIDE_M)
-    seen = np.histogram(over.middles[:, 0], edges, weights=over.areas / _depth(run))[0] > _SPECK * _WIDE_M
-    return bool(seen[_over_any((edges[:-1] + edges[1:]) / 2, run)].mean() >= _WIDE_SHARE)
+    params = tuned(Params)
+    edges = np.arange(run.least(0), run.most(0) + params.wide_m, params.wide_m)
+    seen = np.histogram(over.middles[:, 0], edges, weights=over.areas / _depth(run))[0] > params.speck * params.wide_m
+    return bool(seen[_over_any((edges[:-1] + edges[1:]) / 2, run)].mean() >= params.wide_share)
 
 
 def _overhang(top: _Top) -> float:
     """How far the surface goes on before the front plane, strip by strip; 0 where it is not seen to."""
+    params = tuned(Params)
     before_m, least = top.run.least(1) - top.level.middles[:, 1], top.shown * _length(top.run)
     reached = 0.0
-    for start in np.arange(0.0, _OVERHANG_M, _FINE_M):
-        strip = (before_m >= start) & (before_m < start + _FINE_M)
-        if top.level.areas[strip].sum() < _FINE_M * least:
+    for start in np.arange(0.0, params.overhang_m, params.fine_m):
+        strip = (before_m >= start) & (before_m < start + params.fine_m)
+        if top.level.areas[strip].sum() < params.fine_m * least:
             break
-        reached = float(start + _FINE_M)
+        reached = float(start + params.fine_m)
     return reached
 
 
 def _rear(capture: Capture, top: _Top) -> tuple[float, Source]:
     """The wall close behind the units, else where the surface ends, but never before their backs."""
+    params = tuned(Params)
     run, behind = top.run, top.level.middles[:, 1]
     front, back = run.least(1), run.most(1)
     low, high = np.array([run.least(0), front, run.least(2)]), np.array([run.most(0), back, run.most(2)])
     to_wall = distance_to_wall(capture, run.rotation, low, high, category_of("counter").depth)
-    if to_wall is not None and front + to_wall < back + _BEHIND_M:
+    if to_wall is not None and front + to_wall < back + params.behind_m:
         return max(front + to_wall, back), "measured"
     least, reached = top.shown * (run.most(0) - run.least(0)), back
-    for start in np.arange(back, back + _BEHIND_M, _BIN_M):
-        strip = (behind >= start) & (behind < start + _BIN_M)
-        if top.level.areas[strip].sum() < _BIN_M * least:
+    for start in np.arange(back, back + params.behind_m, params.bin_m):
+        strip = (behind >= start) & (behind < start + params.bin_m)
+        if top.level.areas[strip].sum() < params.bin_m * least:
             break
-        reached = float(start + _BIN_M)
+        reached = float(start + params.bin_m)
     return reached, "measured" if reached > back else "inferred"
 
 
 def _colour(facets: Facets, run: UnitRun, height: float, over: Facets) -> Colour:
     """That of the surface, or of its front edge where much more of that is seen: papers and reflections hide tops."""
-    front, low, high = run.least(1), max(run.most(2), height - _EDGE_M), height - _FINE_M
-    edge = facets.where(facets.normals[:, 1] < -_LEVEL)
+    params = tuned(Params)
+    front, low, high = run.least(1), max(run.most(2), height - params.edge_m), height - params.fine_m
+    edge = facets.where(facets.normals[:, 1] < -params.level)
     edge = edge.where(edge.within(2, low, high) & edge.within(0, run.least(0), run.most(0)))
-    edge = edge.where(edge.within(1, front - _OVERHANG_M, front + _OVERHANG_M / 2))
-    edge_share = edge.area_m2 / (max(high - low, _FINE_M) * (run.most(0) - run.least(0)))
+    edge = edge.where(edge.within(1, front - params.overhang_m, front + params.overhang_m / 2))
+    edge_share = edge.area_m2 / (max(high - low, params.fine_m) * (run.most(0) - run.least(0)))
     top_share = over.area_m2 / ((run.most(0) - run.least(0)) * _depth(run))
-    return edge.colour if top_share < _HIDDEN * edge_share else over.colour
+    return edge.colour if top_share < params.hidden * edge_share else over.colour
 
 
 def _stretches(top: _Top) -> Iterator[Interval]:
     """Where the worktop lies along the run: over the units, between them and past them where the surface goes on."""
+    params = tuned(Params)
     run, units = top.run, top.run.stretches
     under = top.level.where(top.level.within(1, run.least(1), run.most(1)))
-    edges = np.arange(run.least(0) - _REACH_M, run.most(0) + _REACH_M + _BIN_M, _BIN_M)
-    shown = np.histogram(under.middles[:, 0], edges, weights=under.areas / _depth(run))[0] > top.shown * _BIN_M
+    edges = np.arange(run.least(0) - params.reach_m, run.most(0) + params.reach_m + params.bin_m, params.bin_m)
+    shown = np.histogram(under.middles[:, 0], edges, weights=under.areas / _depth(run))[0] > top.shown * params.bin_m
     strips = [(float(a), float(b)) for a, b, s in zip(edges[:-1], edges[1:], shown, strict=True) if s]
     joined: list[Interval] = []
     for low, high in sorted([*units, *strips]):
-        if joined and low <= joined[-1][1] + 2 * _BIN_M:
+        if joined and low <= joined[-1][1] + 2 * params.bin_m:
             joined[-1] = (joined[-1][0], max(joined[-1][1], high))
         else:
             joined.append((low, high))
     for low, high in joined:
         if inside := [u for u in units if overlap(u, (low, high)) > 0]:
             first, last = min(u[0] for u in inside), max(u[1] for u in inside)
-            yield low if first - low > 2 * _BIN_M else first, high if high - last > 2 * _BIN_M else last
+            yield low if first - low > 2 * params.bin_m else first, high if high - last > 2 * params.bin_m else last
 
 
 def _below_what_stands_on_it(slab: Slab, run: UnitRun, objects: Sequence[MeasuredObject]) -> Slab:
     """The slab, lowered by millimetres where objects were placed that far into its surface."""
+    params = tuned(Params)
+    slabs_params = tuned(SlabsParams)
     height = float(slab.high[2])
     over = [corners for corners in map(run.corners, objects) if slab.meets(corners, 0) and slab.meets(corners, 1)]
-    bottoms = [float(corners[:, 2].min()) - CLEAR_M / 4 for corners in over]
-    lowest = min((bottom for bottom in bottoms if height - _STOOD_IN_M < bottom < height), default=height)
+    bottoms = [float(corners[:, 2].min()) - slabs_params.clear_m / 4 for corners in over]
+    lowest = min((bottom for bottom in bottoms if height - params.stood_in_m < bottom < height), default=height)
     return replace(slab, high=np.array([*slab.high[:2], lowest]))

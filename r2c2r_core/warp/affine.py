@@ -10,9 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.tuning import param, tuned
 
-_HANDLE_M = 0.003  # further out than this from the front plane belongs to the handle
-_GROUP_M = 0.03
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What of a mesh is its front, and what its handle."""
+
+    handle_m: float = param(
+        0.003,
+        "m",
+        "out of the front plane, from where it belongs to the handle",
+        source="bar handles stand out 25-40 mm, a phone's depth leaves a flat even to 3 mm",
+    )
+    group_m: float = param(0.03, "m", "side of the cells by which what stands out is parted into handles", gt=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,7 +61,7 @@ def warp_vertices(vertices: Points, faces: Faces, axis_map: AxisMap, front_y: fl
     """Mapped vertices; what stands out of the front (at `front_y` before the map) keeps its shape."""
     warped = axis_map.apply(vertices)
     target_front = axis_map.scale[1] * front_y + axis_map.shift[1]
-    out = vertices[:, 1] < front_y - _HANDLE_M
+    out = vertices[:, 1] < front_y - tuned(Params).handle_m
     for group in handle_groups(vertices, faces, out):
         centre = (vertices[group].min(axis=0) + vertices[group].max(axis=0)) / 2
         moved = vertices[group] + (axis_map.apply(centre[None])[0] - centre)
@@ -61,6 +72,7 @@ def warp_vertices(vertices: Points, faces: Faces, axis_map: AxisMap, front_y: fl
 
 def handle_groups(vertices: Points, faces: Faces, out: np.ndarray) -> list[np.ndarray]:
     """Vertices in front of the front, grouped where their patches in the front plane lie within 3 cm."""
+    params = tuned(Params)
     from scipy.ndimage import label
 
     index = np.flatnonzero(out)
@@ -68,11 +80,11 @@ def handle_groups(vertices: Points, faces: Faces, out: np.ndarray) -> list[np.nd
         return []
     points = _with_edges(vertices, faces, out)
     low = points.min(axis=0)
-    cells = np.floor((points - low) / _GROUP_M).astype(np.int64)
+    cells = np.floor((points - low) / params.group_m).astype(np.int64)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
     grid[tuple(cells.T)] = True
     labels, count = label(grid, structure=np.ones((3, 3)))
-    own = np.floor((vertices[index][:, [0, 2]] - low) / _GROUP_M).astype(np.int64)
+    own = np.floor((vertices[index][:, [0, 2]] - low) / params.group_m).astype(np.int64)
     of_vertex = labels[tuple(own.T)]
     return [index[of_vertex == n] for n in range(1, count + 1) if (of_vertex == n).any()]
 

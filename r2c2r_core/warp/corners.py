@@ -15,12 +15,20 @@ from r2c2r_core.geometry.meshes import face_normals, sample_surface
 from r2c2r_core.geometry.transforms import rotation_between
 from r2c2r_core.kitchen.fronts import FrontPlane, front_plane
 from r2c2r_core.kitchen.fronts import Params as FrontsParams
-from r2c2r_core.tuning import tuned
+from r2c2r_core.tuning import param, tuned
 
-_SAMPLES = 12000
-_EDGE_SHARE = 0.0005  # of the inliers left outside each side: specks of other faces
-_RIM_M = 0.006
 _FORWARD = np.array([0.0, -1.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Where the corners of a mesh's front lie."""
+
+    samples: int = param(12000, "count", "points drawn on the mesh", ge=100)
+    edge_share: float = param(
+        0.0005, "share", "of the front's points left outside each side: specks of other faces", ge=0, lt=0.5
+    )
+    rim_m: float = param(0.006, "m", "about the front's outline, within which the mesh's own vertices say where it ends")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,8 +56,9 @@ class FrontFace:
 
 def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | None:
     """The foremost large flat of the faces that look towards -Y; None when there is none."""
+    params = tuned(Params)
     rng = np.random.default_rng(seed)
-    points, chosen = sample_surface(vertices, faces, _SAMPLES, rng)
+    points, chosen = sample_surface(vertices, faces, params.samples, rng)
     towards = face_normals(vertices, faces)
     plane = front_plane(points, towards[chosen])
     if plane is None:
@@ -57,7 +66,7 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
     forward = faces[towards[:, 1] < -tuned(FrontsParams).looks]
     flat = forward[plane.holds(vertices[forward]).all(axis=1)]
     # Sampled anew, alone, where there are any: among all faces a sliver along an edge may get no sample
-    inliers = sample_surface(vertices, flat, _SAMPLES, rng)[0] if len(flat) else _on(plane, points, towards[chosen])
+    inliers = sample_surface(vertices, flat, params.samples, rng)[0] if len(flat) else _on(plane, points, towards[chosen])
     rim = vertices[np.unique(forward)]
     corners = _rectangle_corners(inliers, rim[plane.holds(rim)], plane.outward, plane.offset_m)
     return FrontFace(corners=corners, outward=plane.outward, inliers=len(inliers))
@@ -73,16 +82,17 @@ def _rectangle_corners(inliers: Points, rim: Points, normal: Vector3, offset: fl
 
     Specks are trimmed first; the sides then go out to the plane's own vertices, which samples fall short of.
     """
+    params = tuned(Params)
     level = rotation_between(normal, _FORWARD)
     flat, rim_flat = (inliers @ level.T)[:, [0, 2]], (rim @ level.T)[:, [0, 2]]
-    beside = ((rim_flat > flat.min(axis=0) - _RIM_M) & (rim_flat < flat.max(axis=0) + _RIM_M)).all(axis=1)
+    beside = ((rim_flat > flat.min(axis=0) - params.rim_m) & (rim_flat < flat.max(axis=0) + params.rim_m)).all(axis=1)
     axes = smallest_rectangle(np.concatenate([flat, rim_flat[beside]])).axes
     if abs(axes[0, 0]) < np.cos(np.pi / 4):
         axes = axes[:, ::-1] * [1, -1]
     axes = axes * np.sign(axes[0, 0])
-    low, high = np.quantile(flat @ axes, [_EDGE_SHARE, 1 - _EDGE_SHARE], axis=0)
+    low, high = np.quantile(flat @ axes, [params.edge_share, 1 - params.edge_share], axis=0)
     vertices = rim_flat @ axes
-    near = vertices[((vertices > low - _RIM_M) & (vertices < high + _RIM_M)).all(axis=1)]
+    near = vertices[((vertices > low - params.rim_m) & (vertices < high + params.rim_m)).all(axis=1)]
     if len(near):
         low, high = np.minimum(low, near.min(axis=0)), np.maximum(high, near.max(axis=0))
     signs = np.array([[1, 1], [0, 1], [0, 0], [1, 0]])

@@ -13,12 +13,19 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.model.scene import Box, Link, SceneObject
+from r2c2r_core.tuning import param, tuned
 from r2c2r_core.warp.solids import Paint, box_solid, joined, mesh_of, plain_box, solid_of
 
 _FAR_M = 10.0
 _TOUCH_M = 1e-4  # a board this near an outer face is at it
-_BESIDE_M = 0.0015  # between a moving front and what stays beside it
-_BEHIND_M = 0.002  # between a moving front and the carcass behind it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What is left free where a mesh is cut apart."""
+
+    beside_m: float = param(0.0015, "m", "between a moving front and what stays beside it")
+    behind_m: float = param(0.002, "m", "between a moving front and the carcass behind it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,6 +77,7 @@ def front_range(link: Link) -> tuple[Vector3, Vector3]:
 
 def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
     """The inside of the carcass, between its boards; empty (low > high) unless both sides, top, bottom and back have one."""
+    params = tuned(Params)
     base = item.links[0]
     half = item.dimensions_m / 2
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -81,7 +89,7 @@ def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
         if end[axis] > half[axis] - _TOUCH_M:
             high[axis] = max(high[axis], start[axis])
         if axis == 0:
-            low[1] = min(low[1], start[1] - _BEHIND_M)  # the front edges of the sides
+            low[1] = min(low[1], start[1] - params.behind_m)  # the front edges of the sides
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         return np.ones(3), -np.ones(3)
     return low, high
@@ -96,8 +104,9 @@ def _range(link: Link, boxes: Sequence[Box]) -> tuple[Vector3, Vector3]:
 
 def _widened(region: Region) -> Region:
     """The region a carcass must leave free: a little wider than the front, and deeper by the seat gap."""
-    beside = np.array([_BESIDE_M, 0.0, _BESIDE_M])
-    return Region(low=region.low - beside, high=region.high + beside + np.array([0.0, _BEHIND_M, 0.0]))
+    params = tuned(Params)
+    beside = np.array([params.beside_m, 0.0, params.beside_m])
+    return Region(low=region.low - beside, high=region.high + beside + np.array([0.0, params.behind_m, 0.0]))
 
 
 def _inner_boxes(item: SceneObject, link: Link, paint: Paint) -> list[TexturedMesh]:
@@ -119,7 +128,7 @@ def _cut_open(item: SceneObject, mesh: TexturedMesh, paint: Paint, fronts: dict[
         panels = [_placed(_thinner(box), link, paint) for box in link.boxes if box.role != "handle"]
         visuals[link.name] = joined([skin, *panels])
     base = item.links[0]
-    behind = max(region.high[1] for region in fronts.values()) + _BEHIND_M
+    behind = max(region.high[1] for region in fronts.values()) + tuned(Params).behind_m
     pieces = [_sliced(mesh, np.array([0.0, 1.0, 0.0]), behind)]
     if len(fronts) == 1:
         pieces += _beside(_sliced(mesh, np.array([0.0, -1.0, 0.0]), -behind), _widened(next(iter(fronts.values()))))

@@ -13,7 +13,9 @@ from packaging.utils import canonicalize_name
 
 from r2c2r_core.model.scene import Box
 from r2c2r_core.synthesize.fixtures.boards import Boards
-from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, FRONT_GAP_M, SEAT_GAP_M, CarcassPlan, FrontKind, Panels
+from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassPlan, FrontKind, Panels
+from r2c2r_core.synthesize.fixtures.carcass import Params as CarcassParams
+from r2c2r_core.tuning import tuned
 
 SIZE = np.array([0.6, 0.58, 0.72])
 PLANS = {
@@ -56,26 +58,28 @@ def test_boards_fill_the_outer_size_and_meet_without_overlapping(plan: CarcassPl
 @pytest.mark.parametrize("provider", PROVIDERS)
 @every_plan
 def test_what_moves_is_clear_of_the_body_and_of_its_neighbours(plan: CarcassPlan, provider: str) -> None:
+    carcass_params = tuned(CarcassParams)
     panels = CARCASSES.load(provider).panels(plan)
     for leaf in panels.movers:
         assert leaf[0].role == "front"
         assert {box.role for box in leaf[1:]} <= {"inner"}
-        assert all(apart_m(a, b) > SEAT_GAP_M - 1e-9 for a in leaf for b in panels.base)
+        assert all(apart_m(a, b) > carcass_params.seat_gap_m - 1e-9 for a in leaf for b in panels.base)
     for a, b in itertools.combinations([*(leaf[0] for leaf in panels.movers), *of_role(panels, "front")], 2):
-        assert apart_m(a, b) > FRONT_GAP_M - 1e-9
+        assert apart_m(a, b) > carcass_params.front_gap_m - 1e-9
 
 
 @pytest.mark.parametrize("provider", PROVIDERS)
 @every_plan
 def test_fronts_come_in_the_plans_order_and_meet_at_its_seams(plan: CarcassPlan, provider: str) -> None:
+    carcass_params = tuned(CarcassParams)
     panels = CARCASSES.load(provider).panels(plan)
     moving = [span for kind, span in zip(plan.fronts, plan.spans_m, strict=True) if kind != "fixed"]
     axis = 2 if plan.stacked else 0
     half = plan.dimensions_m[axis] / 2
     for (low, high), leaf in zip(moving, panels.movers, strict=True):
         start, end = (float(corner[axis]) for corner in corners(leaf[0]))
-        assert start == pytest.approx(low + (0 if low <= -half else FRONT_GAP_M / 2), abs=1e-9)
-        assert end == pytest.approx(high - (0 if high >= half else FRONT_GAP_M / 2), abs=1e-9)
+        assert start == pytest.approx(low + (0 if low <= -half else carcass_params.front_gap_m / 2), abs=1e-9)
+        assert end == pytest.approx(high - (0 if high >= half else carcass_params.front_gap_m / 2), abs=1e-9)
     assert [travel > 0 for travel in panels.travel_m] == [kind == "drawer" for kind in plan.fronts if kind != "fixed"]
 
 

@@ -5,7 +5,9 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.synthesize import layout as layout_module
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
-from r2c2r_core.synthesize.layout import GAP_M, REST_GAP_M, Layout, arrange, overlapping_pairs
+from r2c2r_core.synthesize.layout import Layout, arrange, overlapping_pairs
+from r2c2r_core.synthesize.layout import Params as LayoutParams
+from r2c2r_core.tuning import tuned
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 
@@ -73,7 +75,7 @@ def test_small_overlaps_are_trimmed_and_leave_a_gap() -> None:
     )
     a, b = layout.objects
     gap = (b.front_centre[0] - b.dimensions_m[0] / 2) - (a.front_centre[0] + a.dimensions_m[0] / 2)
-    assert GAP_M <= gap < 0.0031
+    assert tuned(LayoutParams).gap_m <= gap < 0.0031
     assert abs(a.dimensions_m[0] - 0.5) < 0.006
     assert max(layout.moves_m.values()) < 0.005
 
@@ -119,6 +121,7 @@ def test_a_depth_nobody_saw_gives_way_before_a_measured_front_moves() -> None:
 
 
 def test_things_come_to_rest_on_what_is_below_them() -> None:
+    layout_params = tuned(LayoutParams)
     layout = arranged(
         Unit("top", "counter", (0, 0, 0.9), (1.2, 0.62, 0.04), kind="thing"),
         Unit("bottle", "bottle", (0.1, 0, 1.052), (0.08, 0.08, 0.24), kind="thing"),
@@ -128,7 +131,7 @@ def test_things_come_to_rest_on_what_is_below_them() -> None:
     top = counter.world_from_object.translation[2] + counter.dimensions_m[2] / 2
     for thing in things:
         bottom = thing.world_from_object.translation[2] - thing.dimensions_m[2] / 2
-        assert abs(bottom - top - REST_GAP_M) < 1e-6
+        assert abs(bottom - top - layout_params.rest_gap_m) < 1e-6
     assert overlapping_pairs(layout.objects) == []
 
 
