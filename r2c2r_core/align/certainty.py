@@ -1,6 +1,7 @@
 """Whether a placement can be trusted: rivals that fit as well, motions that nothing holds, and both in words."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -15,12 +16,21 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.tuning import param, tuned
 
-_SIGMAS = 2.0
-_CONFIDENCE = 0.975  # one-sided, of two standard deviations
-_FULL_FRAMES = 9  # the weights of points and outlines count as many independent readings as so many frames give
-_KNOWN_FRAMES = 3  # by how much frames differ is known from other objects as well as from so many frames of this one
 _LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a placement is called uncertain."""
+
+    sigmas: float = param(2.0, "σ", "at which a motion is stated")
+    confidence: float = param(
+        0.975, "share", "one-sided, of two standard deviations", source="normal distribution", gt=0.5, lt=1
+    )
+    full_frames: int = param(9, "count", "frames as whose independent readings the weights of points and outlines count", gt=0)
+    known_frames: int = param(3, "count", "frames' worth of what other objects tell of how much frames differ", gt=0)
 
 
 def spread_of(pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]) -> Spread:
@@ -56,6 +66,7 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     the fewer they are, the more of it there is. The normal matrix is inverted as a whole: a turn that a shift makes up for
     counts as free.
     """
+    params = tuned(Params)
     joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
     jacobian = joined.jacobian * unit
     weighted = jacobian * joined.weight[:, None]
@@ -66,11 +77,11 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
         own = joined.frame_index == frame
         rest = normal - weighted[own].T @ jacobian[own]
         steps.append(-np.linalg.solve(rest, pull - weighted[own].T @ joined.residual[own]))
-    noise = np.linalg.inv(normal) * max(1.0, _FULL_FRAMES / max(len(steps), 1))
+    noise = np.linalg.inv(normal) * max(1.0, params.full_frames / max(len(steps), 1))
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)
-    widened = float(stdtrit(len(steps) - 1 + _KNOWN_FRAMES, _CONFIDENCE) / ndtri(_CONFIDENCE))
+    widened = float(stdtrit(len(steps) - 1 + params.known_frames, params.confidence) / ndtri(params.confidence))
     return np.asarray(noise + widened**2 * (len(steps) - 1) / len(steps) * apart.T @ apart)
 
 
@@ -88,15 +99,16 @@ def ties(best: Judgement, rival: Judgement) -> bool:
 
 def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
     """What the scan does not hold as well as a placement should be, a line each; a front tells where the wall is."""
+    params = tuned(Params)
     figures = np.array([spread.turn_deg, spread.shift_m, spread.scale])
     texts = (
-        (_turn_in_words(spread.turn_axis_world), f"{_SIGMAS * spread.turn_deg:.1f} degrees"),
-        (_shift_in_words(spread.shift_axis_world, front), f"{1000 * _SIGMAS * spread.shift_m:.0f} mm"),
-        ("its size", f"{100 * _SIGMAS * spread.scale:.0f} %"),
+        (_turn_in_words(spread.turn_axis_world), f"{params.sigmas * spread.turn_deg:.1f} degrees"),
+        (_shift_in_words(spread.shift_axis_world, front), f"{1000 * params.sigmas * spread.shift_m:.0f} mm"),
+        ("its size", f"{100 * params.sigmas * spread.scale:.0f} %"),
     )
     return tuple(
         f"{what} is hardly held by what the scan shows: it may be off by {how_much}"
-        for (what, how_much), loose in zip(texts, _SIGMAS * figures > _LIMITS, strict=True)
+        for (what, how_much), loose in zip(texts, params.sigmas * figures > _LIMITS, strict=True)
         if loose
     )
 

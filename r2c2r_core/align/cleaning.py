@@ -1,13 +1,21 @@
 """Which of the points inside the masks are the object's, and fewer of them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.tuning import param, tuned
 
-_CROWD = 40  # points looked at for each that is kept: a long recording has a million
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which points are looked at."""
+
+    crowd: int = param(40, "count", "points looked at for each that is kept", source="a long recording has a million", ge=1)
 
 
 def main_body(points: Points) -> np.ndarray:
@@ -31,7 +39,7 @@ def thin_out(points: Points, count: int) -> np.ndarray:
     if len(points) <= count:
         return np.arange(len(points))
     shuffled = np.random.default_rng(0).permutation(len(points))  # frames disagree by a centimetre: none may be first
-    shuffled = shuffled[: _CROWD * count]
+    shuffled = shuffled[: tuned(Params).crowd * count]
     voxel = 0.002
     while True:
         _, first = np.unique(_cell_keys(points[shuffled], voxel), return_index=True)

@@ -1,5 +1,6 @@
 """Render and compare: how well a placed mesh explains the masks, the depth and the colours of the views."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -7,16 +8,23 @@ import numpy as np
 
 from r2c2r_core.align.observe import placing_noise
 from r2c2r_core.align.shape import Shape
-from r2c2r_core.align.view import OCCLUDER_GAP_M, View
+from r2c2r_core.align.view import Params as ViewParams
+from r2c2r_core.align.view import View
 from r2c2r_core.arrays import DepthMetres, Mask, Points
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3
 from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.tuning import param, tuned
 
-_SLAB_M = 0.015  # of a front's depth counts as its face: a door is 18-20 mm thick
-_WEIGHTS = (0.45, 0.35, 0.20)  # mask, depth, colour
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well a placed mesh explains the views."""
+
+    slab_m: float = param(0.015, "m", "of a front's depth that counts as its face", source="a door is 18-20 mm thick")
+    weights: tuple[float, float, float] = param((0.45, 0.35, 0.20), "score", "of mask, depth and colour")
 
 
 class Rendered(NamedTuple):
@@ -37,7 +45,7 @@ class ViewScore(NamedTuple):
     @property
     def total(self) -> float:
         """The weighted sum."""
-        return float(np.dot(_WEIGHTS, self))
+        return float(np.dot(tuned(Params).weights, self))
 
 
 class Judgement(NamedTuple):
@@ -67,8 +75,8 @@ def render_pose(shape: Shape, vertices_world: Points, behind: np.ndarray, view: 
     raster = rasterize(vertices_world, shape.faces, attributes, view.camera, view.world_from_camera.inverse)
     depth = raster.depth_m
     hit = depth > 0
-    hidden = hit & ~view.mask & view.noise.occluded(view.depth_m, depth, OCCLUDER_GAP_M)
-    return Rendered(depth, hit & (raster.attributes[..., 0] < _SLAB_M), hidden | ~view.inside)
+    hidden = hit & ~view.mask & view.noise.occluded(view.depth_m, depth, tuned(ViewParams).occluder_gap_m)
+    return Rendered(depth, hit & (raster.attributes[..., 0] < tuned(Params).slab_m), hidden | ~view.inside)
 
 
 def behind_face(pose: Similarity3, shape: Shape, vertices_world: Points, front: FrontPanel | None) -> np.ndarray:

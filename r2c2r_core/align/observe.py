@@ -14,8 +14,16 @@ from r2c2r_core.geometry.views import MaskView, choose_views, stands_open
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Depth, Frame
 from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.tuning import param, tuned
 
-_MESH_M = 0.004  # median distance from scan to mesh over the sample kitchens (benchmarks/baseline.json)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well meshes are known."""
+
+    mesh_m: float = param(
+        0.004, "m", "median distance from scan to mesh", source="measured over the sample kitchens (benchmarks/baseline.json)"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,7 +79,7 @@ def _silhouette_size(views: tuple[View, ...], centre: Vector3) -> float:
 
 def placing_noise(noise: DepthNoise, depth_m: np.ndarray) -> np.ndarray:
     """Standard deviation to expect between depth and a mesh in its right place, metres: both err."""
-    return np.hypot(noise.sigma(depth_m), _MESH_M)
+    return np.hypot(noise.sigma(depth_m), tuned(Params).mesh_m)
 
 
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:

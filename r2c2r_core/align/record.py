@@ -1,5 +1,7 @@
 """The record of a chosen pose: the evidence for it, and the doubts about it in words."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.align.certainty import loose_ends, spread_of, ties
@@ -11,8 +13,14 @@ from r2c2r_core.align.voting import Votes, inliers_of
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import NO_MATCHES, MatchedPoints, Placement, Spread
+from r2c2r_core.tuning import param, tuned
 
-_TRUSTED_IOU = 0.6
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which placements are doubted."""
+
+    trusted_iou: float = param(0.6, "score", "IoU below which a placement is")
 
 
 def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes, asset: MeshAsset, method: str) -> Placement:
@@ -77,7 +85,7 @@ def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: 
     if other_size is not None and ties(best.judgement, other_size.judgement):
         share = other_size.pose.scale / best.pose.scale - 1.0
         lines.append(f"{abs(share):.0%} {'larger' if share > 0 else 'smaller'} it fits about as well: check its size")
-    if best.judgement.iou < _TRUSTED_IOU:
+    if best.judgement.iou < tuned(Params).trusted_iou:
         lines.append(f"the placed mesh covers the masks poorly (IoU {best.judgement.iou:.2f})")
     if len(case.observation.views) < 2:
         lines.append("one frame alone shows the object: nothing confirms its place and size")

@@ -14,11 +14,13 @@ from r2c2r_core.align.judge import behind_face, face_depth, render_pose
 from r2c2r_core.align.lift import Lifted
 from r2c2r_core.align.observe import Observation
 from r2c2r_core.align.shape import Shape
-from r2c2r_core.align.view import OCCLUDER_GAP_M, View
+from r2c2r_core.align.view import Params as ViewParams
+from r2c2r_core.align.view import View
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.camera import ray_slopes
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.tuning import tuned
 
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
@@ -193,7 +195,10 @@ def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
     """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
     grown = cv2.dilate(rendered_depth, np.ones((5, 5), np.uint8))
     return np.asarray(
-        (rendered_depth == 0) & (grown > 0) & ~view.mask & view.noise.occluded(view.depth_m, grown, OCCLUDER_GAP_M)
+        (rendered_depth == 0)
+        & (grown > 0)
+        & ~view.mask
+        & view.noise.occluded(view.depth_m, grown, tuned(ViewParams).occluder_gap_m)
     )
 
 

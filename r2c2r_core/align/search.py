@@ -19,13 +19,22 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Similarity3, rotation_between
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import Progress
+from r2c2r_core.tuning import param, tuned
 
 _UP = np.array([0.0, 0.0, 1.0])
-_TURNED_DEG = 20.0  # from here on two poses are told apart by their turn
-_RESIZED = 0.04  # and from this share on by their size: twice what a placement may be off
-_UPRIGHT_DEG = 3.0  # what leans less is upright: bases of generated meshes are bumpy
-_SCATTER = 0.01  # by which scores of one pose, a pixel this way or that, differ
-_TOPPLED_DEG = 30.0  # what leans more does not stand there by mistake
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When poses are told apart."""
+
+    turned_deg: float = param(20.0, "deg", "between two poses that are told apart by their turn")
+    resized: float = param(0.04, "log", "of two scales that are told apart", source="twice what a placement may be off")
+    upright_deg: float = param(
+        3.0, "deg", "of leaning: what leans less is upright", source="bases of generated meshes are bumpy"
+    )
+    scatter: float = param(0.01, "score", "by which scores of one pose, a pixel this way or that, differ")
+    toppled_deg: float = param(30.0, "deg", "of leaning: what leans more does not stand there by mistake")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,8 +91,9 @@ def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
 
     A thing that would topple as it is placed wins only where it fits better than one that stands.
     """
+    params = tuned(Params)
     finished = [_finish(t, case) for t in _contenders(trials, case)]
-    return sorted(finished, key=lambda t: (lean_deg(t.pose, case) > 0) * _SCATTER - t.judgement.score)
+    return sorted(finished, key=lambda t: (lean_deg(t.pose, case) > 0) * params.scatter - t.judgement.score)
 
 
 def finish_known(hypothesis: Hypothesis, case: Case) -> Trial:
@@ -93,7 +103,7 @@ def finish_known(hypothesis: Hypothesis, case: Case) -> Trial:
 
 def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
     """Whether it is turned differently; a turn about the axis of a round thing is no difference."""
-    if angle_deg(best.pose, trial.pose) < _TURNED_DEG:
+    if angle_deg(best.pose, trial.pose) < tuned(Params).turned_deg:
         return False
     turn = trial.pose.rotation.T @ best.pose.rotation
     return not spins_alike(shape, Rotation.from_matrix(turn).as_rotvec())
@@ -101,8 +111,9 @@ def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
 
 def resized(trial: Trial, best: Trial) -> bool:
     """Whether it is turned alike, but of another size."""
-    alike = angle_deg(best.pose, trial.pose) < _TURNED_DEG
-    return alike and abs(float(np.log(trial.pose.scale / best.pose.scale))) > _RESIZED
+    params = tuned(Params)
+    alike = angle_deg(best.pose, trial.pose) < params.turned_deg
+    return alike and abs(float(np.log(trial.pose.scale / best.pose.scale))) > params.resized
 
 
 def lean_deg(pose: Similarity3, case: Case) -> float:
@@ -110,7 +121,7 @@ def lean_deg(pose: Similarity3, case: Case) -> float:
     if case.track.kind != "thing" or not case.shape.bases:
         return 0.0
     lean = _angle_to_base(pose, _nearest_base(pose, case.shape))
-    return lean if lean > _UPRIGHT_DEG else 0.0
+    return lean if lean > tuned(Params).upright_deg else 0.0
 
 
 def angle_deg(a: Similarity3, b: Similarity3) -> float:
@@ -121,6 +132,7 @@ def angle_deg(a: Similarity3, b: Similarity3) -> float:
 
 def _contenders(trials: list[Trial], case: Case) -> list[Trial]:
     """The best, the best turned otherwise, the best of another size; and of those that lean a little, them stood upright."""
+    params = tuned(Params)
     best = trials[0]
     different: tuple[Callable[[Trial], bool], ...] = (
         lambda t: turned_otherwise(t, best, case.shape),
@@ -128,7 +140,7 @@ def _contenders(trials: list[Trial], case: Case) -> list[Trial]:
     )
     rivals = [next(filter(differs, trials[1:]), None) for differs in different]
     found = [best, *(t for t in rivals if t is not None)]
-    return found + [_stood_upright(t, case) for t in found if 0 < lean_deg(t.pose, case) < _TOPPLED_DEG]
+    return found + [_stood_upright(t, case) for t in found if 0 < lean_deg(t.pose, case) < params.toppled_deg]
 
 
 def _stood_upright(trial: Trial, case: Case) -> Trial:
@@ -146,7 +158,7 @@ def _finish(trial: Trial, case: Case) -> Trial:
     pose = refine(pose, *evidence, free_scale=False, iterations=4, loose=0.012)
     pose = sweep_loosest(pose, *evidence)
     finished = _judged(trial.hypothesis._replace(pose=pose), case, case.observation.views)
-    return trial if finished.judgement.score < trial.judgement.score - _SCATTER else finished
+    return trial if finished.judgement.score < trial.judgement.score - tuned(Params).scatter else finished
 
 
 def _refined(hypothesis: Hypothesis, case: Case) -> Hypothesis:

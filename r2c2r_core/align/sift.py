@@ -1,6 +1,7 @@
 """SIFT keypoints with RootSIFT descriptors (Arandjelović and Zisserman 2012), ratio and mutual test."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -8,8 +9,14 @@ import numpy as np
 from r2c2r_core.align.protocol import Features, Matcher, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.geometry.descriptors import mutual_pairs
+from r2c2r_core.tuning import param, tuned
 
-_MARGIN_PX = 12  # kept around the mask: beyond it is background, of which the renders have none
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Where keypoints are looked for."""
+
+    margin_px: int = param(12, "px", "kept around the mask", source="beyond it is background, of which the renders have none")
 
 
 class SiftMatcher(Matcher):
@@ -22,8 +29,12 @@ class SiftMatcher(Matcher):
 
     def describe(self, image: Image, mask: Mask) -> Features:
         """The strongest keypoints of `image` inside `mask`."""
+        params = tuned(Params)
         left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-        low, high = np.maximum([left - _MARGIN_PX, top - _MARGIN_PX], 0), [left + width + _MARGIN_PX, top + height + _MARGIN_PX]
+        low, high = (
+            np.maximum([left - params.margin_px, top - params.margin_px], 0),
+            [left + width + params.margin_px, top + height + params.margin_px],
+        )
         part = slice(low[1], high[1]), slice(low[0], high[0])
         grey = cv2.cvtColor(image[part], cv2.COLOR_RGB2GRAY)
         found, descriptors = self._sift.detectAndCompute(grey, mask[part].astype(np.uint8) * 255)

@@ -1,14 +1,27 @@
 """Which ways up a mesh can stand: gravity is known, so of two poses that fit alike the one that would topple is wrong."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from r2c2r_core.arrays import Matrix3, Points, Vector3
+from r2c2r_core.tuning import param, tuned
 
-_TOUCHING = (0.03, 0.02, 0.02)  # of the diameter counts as touching the support, pass by pass: generated bases are bumpy
-_FLAT = 1 / 9  # of a foot's width is the most that it is thick: on a round side a thing rocks
-_SETTLED_DEG = 12.0  # a direction farther from square to its base belongs to another base
-_MOST = 14  # directions tried
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which ways up a mesh can stand."""
+
+    touching: tuple[float, float, float] = param(
+        (0.03, 0.02, 0.02),
+        "ratio",
+        "to the diameter of what counts as touching the support, pass by pass",
+        source="generated bases are bumpy",
+    )
+    flat: float = param(1 / 9, "ratio", "of a foot's thickness to its width, at most: on a round side a thing rocks")
+    settled_deg: float = param(12.0, "deg", "from square to its base: a direction farther off belongs to another base")
+    most: int = param(14, "count", "directions tried", ge=1)
 
 
 def standing_directions(
@@ -19,34 +32,36 @@ def standing_directions(
     They come from the box axes and the flat sides of the hull. A box's own axes are known by all of its sides; anything
     else stands square to its base, which its box axes miss by some degrees where a handle sticks out.
     """
+    params = tuned(Params)
     axes = [sign * frame[:, k] for frame in frames for k in range(3) for sign in (1.0, -1.0)]
     sides = [-n for n in hull_directions(points, 8)]  # a mug's base is among its smaller sides
     own, others = (axes[:6], [*sides, *axes[6:]]) if boxiness > 0.5 else ([], [*sides, *axes])
     stable: list[Vector3] = []
     rest: list[Vector3] = []
     for direction in own:
-        _add(stable if _carries(_foot(points, direction, _TOUCHING[-1]), points, direction) else rest, direction)
+        _add(stable if _carries(_foot(points, direction, params.touching[-1]), points, direction) else rest, direction)
     for direction in others:
         settled = settled_on_base(points, direction)
         _add(rest if settled is None else stable, direction if settled is None else settled)
     ups = list(stable)
     for direction in rest:
         _add(ups, direction)
-    return tuple(ups[:_MOST]), tuple(stable[:_MOST])
+    return tuple(ups[: params.most]), tuple(stable[: params.most])
 
 
 def settled_on_base(points: Points, up: Vector3) -> Vector3 | None:
     """`up` turned square to the side that `points` (an even sample) would rest on; None where they would topple or rock."""
+    params = tuned(Params)
     start = up
-    for touching in _TOUCHING:
+    for touching in params.touching:
         foot = _foot(points, up, touching)
         if len(foot) < 12:
             return None
         _, (_, width, thickness), axes = np.linalg.svd(foot - foot.mean(axis=0), full_matrices=False)
         up = axes[2] * np.sign(axes[2] @ up)
-        if up @ start < np.cos(np.radians(_SETTLED_DEG)):
+        if up @ start < np.cos(np.radians(params.settled_deg)):
             return None
-    return up if thickness < _FLAT * width and _carries(foot, points, up) else None
+    return up if thickness < params.flat * width and _carries(foot, points, up) else None
 
 
 def hull_directions(points: Points, count: int) -> list[Vector3]:

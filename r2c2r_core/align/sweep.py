@@ -1,6 +1,7 @@
 """What neither surface nor outline holds, the colours may: the yaw of a bottle is where its label shows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,10 +12,23 @@ from r2c2r_core.align.refine import loosest_motion, moved
 from r2c2r_core.align.residuals import Anchors, pivot_of
 from r2c2r_core.align.shape import Shape
 from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.tuning import param, tuned
 
-_LOOSE = 0.01  # of the size at the rim: half a degree and more is worth a sweep
-_SPANS = (0.075, 0.02)  # of the size at the rim, half widths: 8 degrees, as far as tried turns are apart; 2
-_STEPS = 9
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When colours turn an object."""
+
+    loose: float = param(
+        0.01, "ratio", "to the size, of a turn's spread at the rim that is worth a sweep", source="half a degree"
+    )
+    spans: tuple[float, float] = param(
+        (0.075, 0.02),
+        "ratio",
+        "to the size at the rim, half widths of the sweeps",
+        source="8 degrees, as far as tried turns are apart; 2",
+    )
+    steps: int = param(9, "count", "places of a sweep", ge=3)
 
 
 def sweep_loosest(
@@ -24,8 +38,9 @@ def sweep_loosest(
 
     Unchanged where everything is held, and where no place along the way is better.
     """
+    params = tuned(Params)
     motion, spread_m = loosest_motion(pose, shape, observation, anchors, lifted)
-    if spread_m < _LOOSE * observation.size_m:
+    if spread_m < params.loose * observation.size_m:
         return pose
     pivot = pivot_of(pose, shape)
 
@@ -34,12 +49,12 @@ def sweep_loosest(
         return np.array([judge(p, shape, observation.views, anchors.front).score for p in poses])
 
     at = 0.0
-    for span in _SPANS:
-        places = at + np.linspace(-span, span, _STEPS) * observation.size_m
+    for span in params.spans:
+        places = at + np.linspace(-span, span, params.steps) * observation.size_m
         found = scores(places)
         at = float(places[int(np.argmax(found))])
     bend, slope, _ = np.polyfit(places - at, found, 2)  # single scores are noisy: pixels
-    if bend < 0 and abs(0.5 * slope / bend) < _SPANS[-1] * observation.size_m:
+    if bend < 0 and abs(0.5 * slope / bend) < params.spans[-1] * observation.size_m:
         at -= float(0.5 * slope / bend)
     before, after = scores(np.array([0.0, at]))
     return moved(pose, at * motion, pivot) if after > before else pose

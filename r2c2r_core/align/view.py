@@ -13,8 +13,16 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Depth, Frame
 from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.tuning import param, tuned
 
-OCCLUDER_GAP_M = 0.03  # a pixel this much nearer than the object, beyond the noise, belongs to something in front of it
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What hides an object."""
+
+    occluder_gap_m: float = param(
+        0.03, "m", "nearer than the object by more, beyond the noise, a pixel belongs to something in front of it"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,7 +95,7 @@ def outline(mask: Mask, inside: Mask, depth_m: DepthMetres, noise: DepthNoise) -
     own_depth = own[tuple(nearest_known)]
     border = np.ones_like(mask)
     border[1:-1, 1:-1] = False
-    blocked = (~inside | border) | (~mask & noise.occluded(depth_m, own_depth, OCCLUDER_GAP_M))
+    blocked = (~inside | border) | (~mask & noise.occluded(depth_m, own_depth, tuned(Params).occluder_gap_m))
     bad_rim = rim & ndimage.binary_dilation(blocked, iterations=3)
     _, nearest_rim = ndimage.distance_transform_edt(~rim, return_indices=True)
     return signed, ~bad_rim[tuple(nearest_rim)]

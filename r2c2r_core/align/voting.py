@@ -1,5 +1,6 @@
 """Scale and pose voted over frames from matched points (paper eq. 2-7, mended by method.md rows 1-7)."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,19 @@ from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.geometry.consensus import similarity_consensus
 from r2c2r_core.geometry.registration import SimilarityFit, refit
 from r2c2r_core.geometry.transforms import Similarity3
+from r2c2r_core.tuning import param, tuned
 
-_RELATIVE = 0.05  # of the scaled mesh size: with an absolute limit alone a tiny scale wins
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which votes agree."""
+
+    relative: float = param(
+        0.05,
+        "ratio",
+        "to the scaled mesh's size, of a vote's distance",
+        source="with an absolute limit alone a tiny scale wins",
+    )
 
 
 class Votes(NamedTuple):
@@ -32,6 +44,7 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
     together (errors of a scale fixed first leak into the rest), frames are summed, where eq. 7 leaves its index, and
     frames too poor to vote alone still count in the joint estimate.
     """
+    params = tuned(Params)
     by_frame = {m.frame_index: 0 for m in lifted}
     if not sum(len(m.points_mesh) for m in lifted):
         return Votes((), by_frame)
@@ -42,12 +55,12 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
     for m in [*lifted, None]:
         source, target, allowed = (mesh, world, limit) if m is None else (m.points_mesh, m.points_world, 3.0 * m.noise_m)
         own = similarity_consensus(
-            source, target, threshold=allowed, rng=rng, scale_range=scale_range, relative_threshold=_RELATIVE
+            source, target, threshold=allowed, rng=rng, scale_range=scale_range, relative_threshold=params.relative
         )
         if own is None:
             continue
         agrees = inliers_of(own.target_from_source, mesh, world, limit, size)
-        joint = refit(mesh, world, agrees, limit, _RELATIVE * size, 4) or own
+        joint = refit(mesh, world, agrees, limit, params.relative * size, 4) or own
         if not scale_range[0] <= joint.target_from_source.scale <= scale_range[1]:
             continue
         count = int(np.count_nonzero(inliers_of(joint.target_from_source, mesh, world, limit, size)))
@@ -61,7 +74,7 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
 def inliers_of(pose: Similarity3, mesh: Points, world: Points, limit: np.ndarray, size: float) -> np.ndarray:
     """Which matches agree with a pose, within the depth noise and a share of the placed size."""
     residual = np.linalg.norm(pose.apply(mesh) - world, axis=1)
-    return np.asarray(residual < np.minimum(limit, _RELATIVE * size * pose.scale))
+    return np.asarray(residual < np.minimum(limit, tuned(Params).relative * size * pose.scale))
 
 
 def match_views(

@@ -1,6 +1,7 @@
 """Photographs onto a mesh: each texel is a robust blend of the sharp, frontal, unhidden frames that see it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,17 +15,36 @@ from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.unseen import fill_unseen, own_texels, spread_colours
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_COSINE = 0.2
-_GRAZING_COSINE = 0.5
-_HIDDEN_M = 0.015
-_SENSOR_GAP_M = 0.03
-_VIEWS_PER_SIDE = 9
-_POWER = 4.0  # (cos^2 * sharpness / z^2)^4 nearly picks the best frame and still hides seams (backends.md §2.6)
-_NEXT_VIEW = 0.05  # what a flat side's next-best frame keeps of its weight: poses differ by millimetres, a blend ghosts
-_OUTLIER_LEVELS = 40.0  # grey levels: a highlight or an occluder's fringe stands further from the median of the frames
-_EDGE_SHARE = 0.006  # of the mask's size: the dark gap and the blurred outline that its edge may hold
 _REMAP_WIDTH = 1024  # cv2.remap needs each side below 32767
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How photographs are blended on a mesh."""
+
+    least_cosine: float = param(0.2, "cosine", "of the angle from which a texel may be seen")
+    grazing_cosine: float = param(0.5, "cosine", "below it a look is grazing, and depth beyond the surface speaks against it")
+    hidden_m: float = param(0.015, "m", "behind the mesh's own surface, from where a texel is hidden")
+    sensor_gap_m: float = param(0.03, "m", "beyond the depth's noise, before the texel, from where something hides it")
+    views_per_side: int = param(9, "count", "frames that paint one side", ge=1)
+    power: float = param(
+        4.0,
+        "ratio",
+        "exponent of a frame's weight cos²·sharpness/z²",
+        source="backends.md 2.6: 4 nearly picks the best frame and still hides seams",
+    )
+    next_view: float = param(
+        0.05,
+        "ratio",
+        "of its weight that a flat side's next-best frame keeps",
+        source="poses differ by millimetres, a blend ghosts",
+    )
+    outlier_levels: float = param(
+        40.0, "grey", "from the median of the frames, where a highlight or an occluder's fringe stands", gt=0
+    )
+    edge_share: float = param(0.006, "share", "of the mask's size: the dark gap and the blurred outline that its edge may hold")
 
 
 class Baked(NamedTuple):
@@ -80,6 +100,7 @@ class _Photo(NamedTuple):
 
 def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.ndarray:
     """(view, chart): whether the view is among the most useful for that side: frontal, near, sharp."""
+    params = tuned(Params)
     wanted = np.zeros((len(views), 6), dtype=bool)
     sharp = np.array([0.3 + 0.7 * view.sharpness for view in views])
     for chart in np.unique(atlas.chart):
@@ -87,15 +108,16 @@ def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.n
         towards = eyes_local - atlas.points[atlas.chart == chart].mean(axis=0)
         distance = np.maximum(np.linalg.norm(towards, axis=1), 0.05)
         usefulness = np.maximum(towards @ normal / distance, 0.0) ** 2 / distance**2 * sharp
-        best = np.argsort(-usefulness, kind="stable")[:_VIEWS_PER_SIDE]
+        best = np.argsort(-usefulness, kind="stable")[: params.views_per_side]
         wanted[best[usefulness[best] > 0], chart] = True
     return wanted
 
 
 def _prefer_best(weights: np.ndarray) -> None:
     """Scale a side's weights (k, t), in place, so that the frame that shows most of it best carries it."""
+    params = tuned(Params)
     for rank, view in enumerate(np.argsort(-weights.sum(axis=1), kind="stable")):
-        weights[view] *= max(_NEXT_VIEW**rank, 1e-9)
+        weights[view] *= max(params.next_view**rank, 1e-9)
 
 
 def _gather(
@@ -129,23 +151,24 @@ def _photo(view: View, vertices_world: Points, faces: Faces, world_from_local: R
 
 @lru_cache(maxsize=VIEWS_KEPT)
 def _well_inside(view: View) -> Mask:
-    return moved_edge(view.mask, -max(1.0, _EDGE_SHARE * np.sqrt(view.mask.sum())))
+    return moved_edge(view.mask, -max(1.0, tuned(Params).edge_share * np.sqrt(view.mask.sum())))
 
 
 def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray) -> None:
     """Fill in one view's colours (3, t) and weights (t,) of texels at points (3, t) with normals (3, t)."""
+    params = tuned(Params)
     dx, dy, dz = photo.camera_from_local.inverse.translation.astype(np.float32)[:, None] - points
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
     cosine = (dx * normals[0] + dy * normals[1] + dz * normals[2]) / np.maximum(distance, np.float32(1e-9))
-    facing = np.flatnonzero(cosine > _LEAST_COSINE)
+    facing = np.flatnonzero(cosine > params.least_cosine)
     if len(facing) == 0:
         return
     cosine = cosine[facing]
     in_camera = _moved(points[:, facing], photo.camera_from_local)
-    colours, shown = _look_up(photo, in_camera, cosine < _GRAZING_COSINE)
+    colours, shown = _look_up(photo, in_camera, cosine < params.grazing_cosine)
     z = np.maximum(in_camera[:, 2], np.float32(0.05))
     sharpness = np.float32(0.3 + 0.7 * photo.view.sharpness)
-    weights[facing] = np.where(shown, (cosine**2 * sharpness / z**2) ** _POWER, np.float32(0))
+    weights[facing] = np.where(shown, (cosine**2 * sharpness / z**2) ** params.power, np.float32(0))
     samples[:, facing] = colours.T
 
 
@@ -155,6 +178,7 @@ def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple
     It must lie in the mask, behind nothing of the mesh, and where the sensor measured, not behind anything else. On grazing
     sides, where a mask that is a pixel too wide smears the neighbour over a hand's breadth, depth must confirm the surface.
     """
+    params = tuned(Params)
     z, (height, width) = in_camera[:, 2], photo.surface_m.shape
     camera, noise = photo.view.rgb_camera, photo.view.noise
     uv = np.where(z[:, None] > 0.05, project(in_camera, camera), np.float32(np.nan))
@@ -162,9 +186,9 @@ def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple
     small = np.array([width / camera.width, height / camera.height], np.float32)
     both, _ = sample_nearest(np.stack([photo.surface_m, photo.sensor_m], axis=-1), uv * small)
     surface, measured = both[:, 0], both[:, 1]
-    hidden = noise.occluded(measured, z, _SENSOR_GAP_M)
-    beyond = noise.seen_through(measured, z, _SENSOR_GAP_M) & grazing
-    return _sample_bilinear(photo.view.rgb, uv), inside & in_mask & (z < surface + _HIDDEN_M) & ~hidden & ~beyond
+    hidden = noise.occluded(measured, z, params.sensor_gap_m)
+    beyond = noise.seen_through(measured, z, params.sensor_gap_m) & grazing
+    return _sample_bilinear(photo.view.rgb, uv), inside & in_mask & (z < surface + params.hidden_m) & ~hidden & ~beyond
 
 
 def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:
@@ -176,6 +200,7 @@ def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:
 
 def _blend(sides: Sequence[_Side], views: int, count: int) -> tuple[Colours, np.ndarray]:
     """Each texel's weighted mean of the samples that agree with the median brightness, after levelling the views' exposures."""
+    params = tuned(Params)
     greys = [_grey(side.samples) for side in sides]
     gains = _gains(sides, greys, views)
     colours, seen = np.zeros((count, 3), np.uint8), np.zeros(count, dtype=bool)
@@ -185,7 +210,7 @@ def _blend(sides: Sequence[_Side], views: int, count: int) -> tuple[Colours, np.
         gain = gains[side.views, None]
         grey *= gain
         median = _median_shown(grey, side.weights > 0)
-        agreement = np.exp(-(((grey - median) / np.float32(_OUTLIER_LEVELS)) ** 2))
+        agreement = np.exp(-(((grey - median) / np.float32(params.outlier_levels)) ** 2))
         final = side.weights / np.maximum(side.weights.max(axis=0), np.float32(1e-30)) * (agreement + np.float32(1e-4))
         share = gain * final / np.maximum(final.sum(axis=0), np.float32(1e-12))
         for channel, samples in enumerate(side.samples):

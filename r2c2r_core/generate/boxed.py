@@ -1,7 +1,7 @@
 """Furniture fronts and appliances: a box with flat faces, its front on the measured plane, with handle and relief."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Literal
 
@@ -20,6 +20,7 @@ from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.tuning import param, tuned
 
 HandleStyle = Literal["bar", "block", "none"]
 
@@ -35,10 +36,16 @@ _TOLD: dict[DepthSource, str] = {
 # of the draw's; what was seen, or is sold, has none
 _SPREAD: dict[DepthSource, float] = {"wall": 0.2, "worktop": 1.0, "category": 1.0}
 _HANDLE_ERROR: dict[HandleStyle, float] = {"bar": 0.0, "block": 0.25, "none": 1.0}  # of its protrusion
-_FRONT_ZONE_M = 0.03  # faces this near to the outer face belong to the front
-_LEAST_FACE_POINTS = 200
-_MOST_HIDDEN = 0.6  # of a category's depth: sides that end before it are seen in part only
-_LOOKED_AT = 0.3  # cosine: a face seen at a flatter angle is not measured
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a box's depth and front are believed measured."""
+
+    front_zone_m: float = param(0.03, "m", "behind the outer face, within which faces belong to the front")
+    least_face_points: int = param(200, "count", "of a face that is measured")
+    most_hidden: float = param(0.6, "share", "of a category's depth: sides that end before it are seen in part only")
+    looked_at: float = param(0.3, "cosine", "of the angle from which a face must be seen to be measured")
 
 
 def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
@@ -56,7 +63,7 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
         low = np.array([-front.width_m / 2, 0.0, -front.height_m / 2])
         high = np.array([front.width_m / 2, depth, front.height_m / 2])
         made = _box_with_relief(BoxPart(low, high), front.world_from_front, np.zeros(3), relief(variation), handle)
-        at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < _FRONT_ZONE_M
+        at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < tuned(Params).front_zone_m
         error = abs(depth - depths[0].depth_m) + _handle_error(relief(variation), handle)
         return replace(made, maskable=at_front, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
 
@@ -138,7 +145,7 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
     measured = end - float(low[1])
     front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, float(low[1]), 0.0]]))[0])
     assumed = depths_behind(evidence.capture, front, width, height, category)
-    if measured > _MOST_HIDDEN * category.depth.usual and _side_seen(box, evidence.pool):
+    if measured > tuned(Params).most_hidden * category.depth.usual and _side_seen(box, evidence.pool):
         return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
     reached = DepthBehind(measured, "points")
     return distinct([b if b.depth_m >= measured else reached for b in assumed]), measured
@@ -146,13 +153,14 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
 
 def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:
     """Corners of the box in its own frame, each face that cameras look at moved to the median of its points."""
+    params = tuned(Params)
     half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
     low, high = -half, half.copy()
     for axis in range(3):
         for sign, corner in ((-1.0, low), (1.0, high)):
             found = [_face_points(v, box, half, axis, sign, variation.erosion_px) for v in variation.views]
             points = np.concatenate(found)
-            if len(points) >= _LEAST_FACE_POINTS:
+            if len(points) >= params.least_face_points:
                 limit = 0.04 * 2 * half[axis]
                 corner[axis] += float(np.clip(np.median(points) - corner[axis], -limit, limit))
     if evidence.track.front is not None:
@@ -164,7 +172,7 @@ def _face_points(view: View, box: ThingBox, half: Vector3, axis: int, sign: floa
     """Coordinates along `axis` of the view's points on one face, where the view looks at that face."""
     eye = box.world_from_object.inverse.apply(view.eye_world[None])[0]
     towards = eye - np.where(np.arange(3) == axis, sign * half, 0.0)
-    if sign * towards[axis] < _LOOKED_AT * np.linalg.norm(towards):
+    if sign * towards[axis] < tuned(Params).looked_at * np.linalg.norm(towards):
         return np.zeros(0)
     points: Points = box.world_from_object.inverse.apply(masked_points(view, erosion_px))
     near = np.abs(points[:, axis] - sign * half[axis]) < max(0.03, 0.06 * half[axis])

@@ -15,11 +15,17 @@ from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
 
 Place = Callable[..., Placement]
 """(capture, track, asset, progress=…) to a placement, or PlacementFailed: how align does it is its own matter."""
 
-_MOST_WEIGHED = 5  # candidates placed for their evidence: about 4 s each on one core
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How many candidates are placed."""
+
+    most_weighed: int = param(5, "count", "candidates placed for their evidence", source="about 4 s each on one core", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +96,7 @@ def weighed(
     unknown = [c for c in found.candidates if "mask_iou" not in c.metrics]
     if not unknown or len(found.candidates) == 1:
         return found
-    tried = sorted(unknown, key=lambda c: found.ranking.index(c.candidate_id))[:_MOST_WEIGHED]
+    tried = sorted(unknown, key=lambda c: found.ranking.index(c.candidate_id))[: tuned(Params).most_weighed]
     fits: dict[str, dict[str, float]] = {}
     for k, asset in enumerate(tried):
         part = progress.part(k / len(tried), (k + 1) / len(tried))

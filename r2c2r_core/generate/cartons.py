@@ -1,5 +1,6 @@
 """Flat-sided boxes in the depths that outlines, walls and what is usual let them have."""
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -11,26 +12,34 @@ from r2c2r_core.generate.seen import Seen
 from r2c2r_core.generate.shape import Shape, thing_model
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh
+from r2c2r_core.tuning import param, tuned
 
-_BOX_M, _FAR_SHARE = 0.006, 0.1  # median distance of a box's points from it, and the share that may be far from it
-_FAR_M = 0.015
-_OPEN_M = 0.004  # a depth that the scan leaves open by more than this is guessed in several ways
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as a flat-sided box."""
+
+    box_m: float = param(0.006, "m", "median distance of a box's points from it, at most")
+    far_share: float = param(0.1, "share", "of its points that may be far from it")
+    far_m: float = param(0.015, "m", "from the box, where a point is far")
+    open_m: float = param(0.004, "m", "that the scan leaves a depth open, from where it is guessed in several ways")
 
 
 def carton_family(evidence: Evidence, seen: Seen) -> tuple[Hypothesis, ...]:
     """A flat-sided box where the points lie on one, as deep as outlines, walls and what is usual let it be."""
+    params = tuned(Params)
     walls = evidence.capture.room.walls
     found = fit_cuboid(seen.points, seen.low, seen.high, evidence.pool, seen.world_from_local, walls)
     if found is None:
         return ()
     off = np.abs(surface_distance(found, seen.world_from_local.apply(seen.points)))
-    if np.median(off) > _BOX_M or (off > _FAR_M).mean() > _FAR_SHARE:
+    if np.median(off) > params.box_m or (off > params.far_m).mean() > params.far_share:
         return ()
     room = room_behind(found, walls)
     family = [Hypothesis("a box", partial(_cuboid_shape, found, room, 0.0))]
-    if found.depth_spread_m > _OPEN_M:
+    if found.depth_spread_m > params.open_m:
         family.append(Hypothesis("a box, shallower than likely", partial(_cuboid_shape, found, room, -1.0)))
-        if room > _OPEN_M:
+        if room > params.open_m:
             family.append(Hypothesis("a box, deeper than likely", partial(_cuboid_shape, found, room, 1.0)))
     return tuple(family)
 

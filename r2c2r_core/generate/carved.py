@@ -4,6 +4,7 @@ Recipe of backends.md §2.6 and stack.md §8. Every field is a distance in metre
 own gravity-aligned frame, so the zero level is a closed surface whatever was not seen.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +15,17 @@ from r2c2r_core.generate.seen import Seen, observe_thing
 from r2c2r_core.generate.symmetry import Revolution, best_mirror
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.generate.votes import Votes, grid_votes
+from r2c2r_core.tuning import param, tuned
 
-_TRUNCATION_VOXELS = 3.0
-_LEAST_TRUNCATION_M = 0.012  # LiDAR noise and pose error together
-_SURE_FRAMES = 3  # that see a surface, before something thinner than four voxels is believed
-SHEET_M = 0.04  # how thick a thing is behind what was seen of it, where that is all there is
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a thing is carved."""
+
+    truncation_ratio: float = param(3.0, "ratio", "of the truncation distance to a voxel", gt=0)
+    least_truncation_m: float = param(0.012, "m", "truncation distance, at least", source="LiDAR noise and pose error together")
+    sure_frames: int = param(3, "count", "that see a surface, before something thinner than four voxels is believed")
+    sheet_m: float = param(0.04, "m", "how thick a thing is behind what was seen of it, where that is all there is")
 
 
 class Carving(NamedTuple):
@@ -33,12 +40,13 @@ class Carving(NamedTuple):
 
 def carve(evidence: Evidence, variation: Variation) -> Carving:
     """The votes of one draw's frames; raises GenerationFailed where there is too little depth."""
+    params = tuned(Params)
     seen = observe_thing(evidence, variation)
     margin = max(0.006, 1.5 * variation.voxel_m)
     low, high = seen.low - margin, seen.high + margin
     grid = grid_round(seen.low, seen.high, variation.voxel_m, margin)
     centres = grid.centres()
-    truncation = max(_TRUNCATION_VOXELS * grid.voxel_m, _LEAST_TRUNCATION_M)
+    truncation = max(params.truncation_ratio * grid.voxel_m, params.least_truncation_m)
     votes = grid_votes(centres, grid.shape, grid.voxel_m, variation, truncation, seen.world_from_local)
     return Carving(seen, grid, votes, truncation, np.maximum(low - centres, centres - high).max(axis=1))
 
@@ -64,7 +72,7 @@ def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool
     hidden = (~seen & ~free & (votes.outside_m > 0)).reshape(shape)
     mirrored = mirror and _mirror_unseen(field, (seen | free).reshape(shape), free.reshape(shape), hidden)
     solid = field < 0
-    sure = (votes.surfaces >= _SURE_FRAMES).reshape(shape)
+    sure = (votes.surfaces >= tuned(Params).sure_frames).reshape(shape)
     slivers = solid & ~ndimage.binary_opening(solid, iterations=2) & ~sure
     field[slivers] = carving.grid.voxel_m  # what is left between two silhouettes and hardly seen as a surface
     return ndimage.gaussian_filter(field, 0.7), mirrored
@@ -77,7 +85,7 @@ def sheet_field(carving: Carving, solid: np.ndarray) -> np.ndarray:
     surface = np.abs(carving.votes.distance_m).reshape(carving.grid.shape) < carving.grid.voxel_m
     if not surface.any():
         return solid
-    behind = ndimage.distance_transform_edt(~surface) * carving.grid.voxel_m - SHEET_M
+    behind = ndimage.distance_transform_edt(~surface) * carving.grid.voxel_m - tuned(Params).sheet_m
     return np.maximum(solid, np.minimum(behind, carving.truncation_m))
 
 

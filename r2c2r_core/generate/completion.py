@@ -1,6 +1,7 @@
 """The weight-free generator: what was seen, at LiDAR noise, completed by symmetry, to the wall or to the category's depth."""
 
 import zlib
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,8 @@ from r2c2r_core.generate.asset import centred, shape_metrics
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
-from r2c2r_core.generate.consistency import JUDGES, self_consistency
+from r2c2r_core.generate.consistency import Params as ConsistencyParams
+from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.protocol import MeshGenerator
@@ -20,10 +22,16 @@ from r2c2r_core.generate.things import thing_hypotheses
 from r2c2r_core.generate.variation import Variation, draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.tuning import param, tuned
 
-_FRONT_PX = 768  # long side of a front's picture
-_FINEST_TEXEL_M = 0.0012  # a phone at 1 m sees 1.3 mm per pixel
-_THING_PX = 512
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How fine textures are."""
+
+    front_px: int = param(768, "px", "long side of a front's picture", ge=16)
+    finest_texel_m: float = param(0.0012, "m", "side of a texel, at least", source="a phone at 1 m sees 1.3 mm per pixel", gt=0)
+    thing_px: int = param(512, "px", "side of a thing's picture", ge=16)
 
 
 class Completion(MeshGenerator):
@@ -117,7 +125,7 @@ def _generator(evidence: Evidence, purpose: str, seed: int) -> np.random.Generat
 
 def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
     """Scale-free measures, and how the shape fits what is known: masks and depth of the frames that judge all alike."""
-    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:JUDGES])
+    fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[: tuned(ConsistencyParams).judges])
     more = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
     if evidence.track.kind == "thing":  # furniture hangs on its wall
         more |= {"stands": float(stands(shape.vertices_world, shape.faces)), "carved": shape.parameters.get("carved", 0.0)}
@@ -135,9 +143,10 @@ def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesi
 
 
 def _cut_open(shape: Shape) -> Atlas:
+    params = tuned(Params)
     if shape.front_y_m is not None:
-        return planar_atlas(shape.vertices_local, shape.faces, _FRONT_PX, _FINEST_TEXEL_M)
-    return unwrapped_atlas(shape.vertices_local, shape.faces, _THING_PX)
+        return planar_atlas(shape.vertices_local, shape.faces, params.front_px, params.finest_texel_m)
+    return unwrapped_atlas(shape.vertices_local, shape.faces, params.thing_px)
 
 
 def _is_solid(shape: Shape) -> bool:

@@ -15,24 +15,20 @@ faces than a simulator likes, has to fit better to win.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.errors import GenerationFailed, OverrideError
-from r2c2r_core.generate.consistency import COPIED_COST, disagreement
+from r2c2r_core.generate.consistency import Params as ConsistencyParams
+from r2c2r_core.generate.consistency import disagreement
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset
+from r2c2r_core.tuning import param, tuned
 
 Rule = Literal["medoid", "mean"]
 
 _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
-_UNSEEN_WEIGHT = 1.0  # per metre: half of an error that was seen
-_OPEN_COST = 0.1  # of IoU: what is not closed has no inside, volume or mass
-_FALLS_COST = 0.1  # what would tip over was not found standing
-_MOST_FACES, _HEAVY_COST = 20_000, 0.02  # per doubling beyond them
-_BY_CHANCE = 0.02  # draws of one hypothesis differ by this: the frames that were drawn are the ones that judge, or are not
-_FITS_ALIKE = 0.005  # of IoU
 _BUT = {
     "oddness": "its proportions differ {oddness:.1f} %",
     "unseen": "what nobody saw of it is {unseen:.0f} cm off the likeliest",
@@ -42,6 +38,26 @@ _BUT = {
     "open": "it is not closed",
 }
 """What each cost but the fit says of who has to bear it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a candidate's faults cost, in units of mask IoU."""
+
+    unseen_weight: float = param(
+        1.0, "score", "per metre that what nobody saw is off the likeliest", source="half of an error that was seen"
+    )
+    open_cost: float = param(0.1, "score", "of a mesh that is not closed: it has no inside, volume or mass")
+    falls_cost: float = param(0.1, "score", "of what would tip over, for it was not found standing")
+    most_faces: int = param(20_000, "count", "triangles that cost nothing")
+    heavy_cost: float = param(0.02, "score", "per doubling of the triangles beyond them")
+    by_chance: float = param(
+        0.02,
+        "score",
+        "by which draws of one hypothesis differ",
+        source="the frames that were drawn are the ones that judge, or are not",
+    )
+    fits_alike: float = param(0.005, "score", "by which two candidates may differ and fit alike")
 
 
 def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str] = (), rule: Rule = "medoid") -> CandidateSet:
@@ -78,9 +94,10 @@ def chosen_by_person(candidates: CandidateSet, candidate_id: str) -> CandidateSe
 
 def _of_most_frames(candidates: Sequence[MeshAsset], order: Sequence[int], cost: np.ndarray) -> int:
     """The best one; of draws that assume what it does and cost no more than chance makes of it, that from most frames."""
+    params = tuned(Params)
     best = order[0]
     said = candidates[best].assumes
-    alike = [i for i in order if said and candidates[i].assumes == said and cost[i] <= cost[best] + _BY_CHANCE]
+    alike = [i for i in order if said and candidates[i].assumes == said and cost[i] <= cost[best] + params.by_chance]
     return max(alike, key=lambda i: len(candidates[i].frames), default=best)
 
 
@@ -95,20 +112,22 @@ def _oddness(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule
 
 def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) -> dict[str, np.ndarray]:
     """Per candidate all that speaks against it, in units of IoU, by what it is."""
+    consistency_params = tuned(ConsistencyParams)
+    params = tuned(Params)
     by_chance = np.array([not c.assumes or rule == "mean" for c in candidates])
     known = np.array(["mask_iou" in c.metrics for c in candidates])
     fit = np.array([disagreement(c.metrics) if "mask_iou" in c.metrics else 0.0 for c in candidates])
-    unseen = np.where(known, _UNSEEN_WEIGHT * np.array([c.metrics.get("unseen_error_m", 0.0) for c in candidates]), 0.0)
+    unseen = np.where(known, params.unseen_weight * np.array([c.metrics.get("unseen_error_m", 0.0) for c in candidates]), 0.0)
     usual = float(np.median((fit + unseen)[known])) if known.any() else 0.0  # for one whose fit is unknown
     faces = np.array([c.metrics.get("faces", 0.0) for c in candidates])
     return {
         "oddness": np.where(by_chance, _oddness(candidates, allowed, rule), 0.0),
         "fit": np.where(known, fit, usual),
         "unseen": unseen,
-        "heavy": _HEAVY_COST * np.log2(np.maximum(faces / _MOST_FACES, 1.0)),
-        "falls": np.array([_FALLS_COST if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates]),
-        "copied": np.array([COPIED_COST * c.metrics.get("carved", 0.0) for c in candidates]),
-        "open": np.array([0.0 if c.watertight else _OPEN_COST for c in candidates]),
+        "heavy": params.heavy_cost * np.log2(np.maximum(faces / params.most_faces, 1.0)),
+        "falls": np.array([params.falls_cost if c.metrics.get("stands", 1.0) == 0.0 else 0.0 for c in candidates]),
+        "copied": np.array([consistency_params.copied_cost * c.metrics.get("carved", 0.0) for c in candidates]),
+        "open": np.array([0.0 if c.watertight else params.open_cost for c in candidates]),
     }
 
 
@@ -147,9 +166,10 @@ def _reason(
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:
     """Why not the one that fits masks and depth best of the others, where their fit does not say it; begins with "; "."""
+    params = tuned(Params)
     fit = costs["fit"]
     rival = min((i for i in allowed if i != best and "mask_iou" in candidates[i].metrics), key=lambda i: fit[i], default=None)
-    if rival is None or fit[rival] > fit[best] + _FITS_ALIKE:
+    if rival is None or fit[rival] > fit[best] + params.fits_alike:
         return ""
     decided = max(_BUT, key=lambda term: costs[term][rival] - costs[term][best])
     if costs[decided][rival] - costs[decided][best] <= max(fit[best] - fit[rival], 1e-3):
@@ -159,5 +179,5 @@ def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[i
         unseen=100 * candidates[rival].metrics.get("unseen_error_m", 0.0),
         faces=candidates[rival].metrics.get("faces", 0.0),
     )
-    fits = "fits better" if fit[rival] < fit[best] - _FITS_ALIKE else "fits alike"
+    fits = "fits better" if fit[rival] < fit[best] - params.fits_alike else "fits alike"
     return f"; {candidates[rival].candidate_id} {fits}, but {said}"

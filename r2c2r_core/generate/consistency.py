@@ -1,6 +1,7 @@
 """How well a mesh, where its generator believes it is, reproduces the masks and the depth it came from."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
@@ -12,14 +13,23 @@ from r2c2r_core.geometry.camera import sample_through
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.tuning import param, tuned
 
-_RENDER_PX = 240  # long side of the view; finer changes the IoU by less than its noise
-_OCCLUDER_GAP_M = 0.05
-_WORST_DEPTH_M = 0.2  # backends.md §2.7
-_DEPTH_WEIGHT = 2.0  # per metre, against 1 per unit of IoU (backends.md §2.7)
-JUDGES = 8  # views of the pool, best first, that judge every shape of an object alike
 VIEWS_KEPT = 24  # an object's pool: what is known of a view is asked for again by every candidate
-COPIED_COST = 0.05  # of IoU: carving copies the masks' errors, it has to agree with them better than a clean shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a candidate is compared with masks and depth."""
+
+    render_px: int = param(240, "px", "long side of the view", source="finer changes the IoU by less than its noise", ge=32)
+    occluder_gap_m: float = param(0.05, "m", "beyond the depth's noise, before the object, from where something hides it")
+    worst_depth_m: float = param(0.2, "m", "to which the error of a depth pixel is cut", source="backends.md 2.7")
+    depth_weight: float = param(2.0, "score", "per metre of depth error, against 1 per unit of IoU", source="backends.md 2.7")
+    judges: int = param(8, "count", "views of the pool, best first, that judge every shape of an object alike", ge=1)
+    copied_cost: float = param(
+        0.05, "score", "of carving, which copies the masks' errors: it has to agree with them better than a clean shape"
+    )
 
 
 def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray, views: Sequence[View]) -> dict[str, float]:
@@ -27,6 +37,7 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
 
     A front's mask leaves its carcass out, except where a bare side shows: the better of both silhouettes counts.
     """
+    params = tuned(Params)
     overlaps, residuals = [], []
     for view in views:
         depth = render_depth(vertices_world, faces[maskable], view)
@@ -39,14 +50,14 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
         overlaps.append(overlap)
         both = (depth > 0) & (sensor > 0) & mask
         if both.sum() >= 20:
-            residuals.append(float(np.minimum(np.abs(depth - sensor)[both], _WORST_DEPTH_M).mean()))
+            residuals.append(float(np.minimum(np.abs(depth - sensor)[both], params.worst_depth_m).mean()))
     metrics = {"mask_iou": float(np.mean(overlaps))} if overlaps else {}
     return {**metrics, "depth_residual_m": float(np.mean(residuals))} if residuals else metrics
 
 
 def disagreement(fit: Mapping[str, float]) -> float:
     """What `self_consistency` measured as one cost, 0 for a perfect fit, in units of IoU."""
-    return 1.0 - fit["mask_iou"] + _DEPTH_WEIGHT * fit.get("depth_residual_m", 0.0)
+    return 1.0 - fit["mask_iou"] + tuned(Params).depth_weight * fit.get("depth_residual_m", 0.0)
 
 
 def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) -> float:
@@ -61,7 +72,7 @@ def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) 
 def render_depth(vertices_world: Points, faces: Faces, view: View) -> DepthMetres:
     """The mesh's depth in the view's crop, at a small size."""
     camera = view.rgb_camera
-    scale = min(1.0, _RENDER_PX / max(camera.width, camera.height))
+    scale = min(1.0, tuned(Params).render_px / max(camera.width, camera.height))
     small = camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
     return rasterize(vertices_world, faces, np.ones((len(vertices_world), 3)), small, view.world_from_camera.inverse).depth_m
 
@@ -83,5 +94,5 @@ def sensor_depth(view: View, shape: tuple[int, ...]) -> DepthMetres:
 
 def _visible_iou(depth: DepthMetres, sensor: DepthMetres, mask: Mask, noise: DepthNoise) -> float:
     """IoU of the silhouette with the mask, leaving out pixels where something nearer hides the mesh."""
-    hidden = (depth > 0) & noise.occluded(sensor, depth, _OCCLUDER_GAP_M) & ~mask
+    hidden = (depth > 0) & noise.occluded(sensor, depth, tuned(Params).occluder_gap_m) & ~mask
     return mask_iou((depth > 0) & ~hidden, mask)

@@ -7,6 +7,7 @@ of its outline) projected out, finds yaw and sides together, and its covariance 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -18,23 +19,35 @@ from r2c2r_core.geometry.boxes import box_corners, upright_box
 from r2c2r_core.geometry.camera import project, sample_nearest, unproject
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.capture import Wall
+from r2c2r_core.tuning import param, tuned
 
-_OUTLINE_SAMPLES = 80  # of a view
-_POINTS = 1200
-_OUTLINE_M, _DEPTH_M = 0.004, 0.008  # noise of an outline and of a depth point
-_INDEPENDENT = 12.0  # outline pixels, and depth points, of one frame that err on their own: neighbours err together
-_ROBUST = 2.5  # of the noise: further off is something else
-_SHIFT_M = 0.006  # a frame's pose error, across the view
-_WALL_M = 0.003  # how far a box may stand in a wall
 _YAW_RAD = np.pi  # the local frame's own yaw says next to nothing
-_USUAL_DEPTH, _DEPTH_SPREAD = 0.5, 0.35  # of the width: all that is known of a box seen squarely
-_STARTS = (0.25, 0.5, 1.0)  # depths to start from, of the width
-_SAME_YAW = np.radians(2.0)
-_NO_BOX_M = 0.012  # depth points lie this far from anything that is no box
-_ROUGH_ROUNDS, _ROUNDS = 8, 12
-_ALONG_PX = 2.5  # depth pixels to either side of an outline, where it is judged whose outline it is
-_BEFORE_M = 0.03
 _WALL_ROW, _USUAL_ROW = -3, -1  # of the residuals: what no frame shows of the depth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What is known, and how well, of a box fitted to masks and depth."""
+
+    outline_samples: int = param(80, "count", "of a view's outline", ge=8)
+    points: int = param(1200, "count", "depth points that are fitted", ge=10)
+    outline_m: float = param(0.004, "m", "noise of an outline, one sigma", gt=0)
+    depth_m: float = param(0.008, "m", "noise of a depth point, one sigma", gt=0)
+    independent: float = param(
+        12.0, "count", "outline pixels, and depth points, of one frame that err on their own: neighbours err together", gt=0
+    )
+    robust: float = param(2.5, "σ", "beyond which a residual is something else", gt=0)
+    shift_m: float = param(0.006, "m", "a frame's pose error, across the view", gt=0)
+    wall_m: float = param(0.003, "m", "how far a box may stand in a wall, one sigma", gt=0)
+    usual_depth: float = param(0.5, "ratio", "of depth to width: all that is known of a box seen squarely", gt=0)
+    depth_spread: float = param(0.35, "ratio", "of that, one sigma", gt=0)
+    starts: tuple[float, float, float] = param((0.25, 0.5, 1.0), "ratio", "of depth to width, from where the fit starts")
+    same_yaw_rad: float = param(float(np.radians(2.0)), "rad", "between two yaws to start from")
+    no_box_m: float = param(0.012, "m", "median distance of the depth points from the box, beyond which it is no box")
+    rough_rounds: int = param(8, "count", "of the first fit", ge=1)
+    rounds: int = param(12, "count", "of the last", ge=1)
+    along_px: float = param(2.5, "px", "of depth, to either side of an outline, where it is judged whose outline it is")
+    before_m: float = param(0.03, "m", "nearer beyond the outline than within: something else covers the object")
 
 
 class Cuboid(NamedTuple):
@@ -68,19 +81,20 @@ def fit_cuboid(
 
     The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame.
     """
+    params = tuned(Params)
     outlines = [found for view in views if (found := _own_outline(view)) is not None]
     if len(outlines) < 3:
         return None
-    chosen = points_local[:: max(len(points_local) // _POINTS, 1)]
+    chosen = points_local[:: max(len(points_local) // params.points, 1)]
     bottom = float(low[2])
     coarse = [o._replace(uv_px=o.uv_px[::4]) for o in outlines]
     rough = _Problem(chosen[::4], coarse, world_from_local, walls, bottom)
-    tried = [rough.fitted(start, _ROUGH_ROUNDS) for start in _starts(chosen, float(high[2]))]
+    tried = [rough.fitted(start, params.rough_rounds) for start in _starts(chosen, float(high[2]))]
     problem = _Problem(chosen, outlines, world_from_local, walls, bottom)
     start = min(tried, key=lambda found: found[1])[0]
-    if rough.median_distance(start) > _NO_BOX_M:
+    if rough.median_distance(start) > params.no_box_m:
         return None
-    best, cost = problem.fitted(start, _ROUNDS)
+    best, cost = problem.fitted(start, params.rounds)
     sizes = np.array([best[2] - best[1], best[4] - best[3], best[5] - low[2]])
     if (sizes < 0.005).any():
         return None
@@ -92,12 +106,13 @@ def fit_cuboid(
 
 def _starts(points: Points, top_m: float) -> list[np.ndarray]:
     """Boxes of several depths behind the points, along the frame and along the points' own smallest rectangle."""
+    params = tuned(Params)
     own = (upright_box(points, trim=0.01).yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4
     starts = []
-    for yaw in (0.0, own) if abs(own) > _SAME_YAW else (0.0,):
+    for yaw in (0.0, own) if abs(own) > params.same_yaw_rad else (0.0,):
         turned = points @ rotation_about_z(yaw)
         start, end = np.quantile(turned, 0.01, axis=0), np.quantile(turned, 0.99, axis=0)
-        for share in _STARTS:
+        for share in params.starts:
             starts.append(np.array([yaw, start[0], end[0], start[1], start[1] + share * (end[0] - start[0]), top_m]))
     return starts
 
@@ -109,10 +124,11 @@ def surface_distance(cuboid: Cuboid, points_world: Points) -> np.ndarray:
 
 def room_behind(cuboid: Cuboid, walls: Sequence[Wall]) -> float:
     """How much deeper the box may be before its back stands in a wall, metres; infinite where none is behind it."""
+    params = tuned(Params)
     corners = cuboid.world_from_cuboid.apply(box_corners(cuboid.size_m))
     into = cuboid.world_from_cuboid.rotation[:, 1]
     free = [
-        (float((corners @ wall.normal).min() - wall.offset_m) + _WALL_M) / float(-wall.normal @ into)
+        (float((corners @ wall.normal).min() - wall.offset_m) + params.wall_m) / float(-wall.normal @ into)
         for wall in walls
         if wall.normal @ into < -0.1
     ]
@@ -130,6 +146,7 @@ class _Problem:
         walls: Sequence[Wall],
         bottom_m: float,
     ) -> None:
+        params = tuned(Params)
         self._points, self._outlines, self._bottom_m = points, outlines, bottom_m
         self._cameras = [o.view.world_from_camera.inverse @ world_from_local for o in outlines]
         local_from_world = world_from_local.inverse
@@ -138,10 +155,12 @@ class _Problem:
             for wall in walls
         ]
         counts = [len(o.uv_px) for o in outlines]
-        depth = np.full(len(points), _INDEPENDENT * len(outlines) / max(len(points), 1) / _DEPTH_M**2)
-        outline = [np.full(n, _INDEPENDENT / n / _OUTLINE_M**2) for n in counts]
-        self._weights = np.concatenate([depth, *outline, [1.0 / _WALL_M**2, 1.0 / _YAW_RAD**2, 1.0]])
-        scales = np.repeat([_ROBUST * _DEPTH_M, _ROBUST * _OUTLINE_M, np.inf], [len(points), sum(counts), 3])
+        depth = np.full(len(points), params.independent * len(outlines) / max(len(points), 1) / params.depth_m**2)
+        outline = [np.full(n, params.independent / n / params.outline_m**2) for n in counts]
+        self._weights = np.concatenate([depth, *outline, [1.0 / params.wall_m**2, 1.0 / _YAW_RAD**2, 1.0]])
+        scales = np.repeat(
+            [params.robust * params.depth_m, params.robust * params.outline_m, np.inf], [len(points), sum(counts), 3]
+        )
         self._scales: np.ndarray = scales
 
     def fitted(self, start: np.ndarray, rounds: int) -> tuple[np.ndarray, float]:
@@ -194,6 +213,7 @@ class _Problem:
         return np.stack(columns, axis=1)
 
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
+        params = tuned(Params)
         yaw, left, right, front, back, top = parameters
         rotation = rotation_about_z(float(yaw))
         low, high = np.array([left, front, self._bottom_m]), np.array([right, back, top])
@@ -203,7 +223,7 @@ class _Problem:
         outline = [_outline_residual(camera.apply(corners), o) for camera, o in zip(self._cameras, self._outlines, strict=True)]
         inside = [min(float((corners @ normal).min() - offset), 0.0) for normal, offset in self._walls]
         width = max(right - left, 1e-3)
-        usual = (back - front - _USUAL_DEPTH * width) / (_DEPTH_SPREAD * width)
+        usual = (back - front - params.usual_depth * width) / (params.depth_spread * width)
         return np.concatenate([off, *outline, [min(inside, default=0.0), yaw, usual]])
 
 
@@ -215,6 +235,7 @@ def _box_distance(points: Points, half: np.ndarray) -> np.ndarray:
 
 def _outline_residual(corners_camera: Points, outline: _Outline) -> np.ndarray:
     """Metres of each outline pixel outside the corners' silhouette, without what a shift of the whole frame explains."""
+    params = tuned(Params)
     if corners_camera[:, 2].min() < 0.05:
         return np.full(len(outline.uv_px), 1.0)
     corners = project(corners_camera, outline.view.rgb_camera)
@@ -226,13 +247,14 @@ def _outline_residual(corners_camera: Points, outline: _Outline) -> np.ndarray:
     edge = np.argmax(distance, axis=1)
     off = distance[np.arange(len(edge)), edge] * outline.metres_per_px
     across = normals[edge]
-    share = _OUTLINE_M**2 * len(off) / _INDEPENDENT / _SHIFT_M**2
+    share = params.outline_m**2 * len(off) / params.independent / params.shift_m**2
     shift = np.linalg.solve(across.T @ across + share * np.eye(2), across.T @ np.clip(off, -0.02, 0.02))
     return np.asarray(off - across @ shift)
 
 
 def _own_outline(view: View) -> _Outline | None:
     """The outline pixels that are neither at the photo's border nor beside something in front; None for too few."""
+    params = tuned(Params)
     contours, _ = cv2.findContours(view.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return None
@@ -244,19 +266,19 @@ def _own_outline(view: View) -> _Outline | None:
     out = np.column_stack([along[:, 1], -along[:, 0]]) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     out *= np.sign(((contour - contour.mean(axis=0)) * out).sum()) or 1.0
     edge = contour + 0.5 + 0.5 * out  # contours run through the centres of the outermost pixels
-    reach = _ALONG_PX * view.rgb_camera.fx / view.depth_camera.fx
+    reach = params.along_px * view.rgb_camera.fx / view.depth_camera.fx
     inner, outer = (_depth_at(view, edge + sign * reach * out) for sign in (-1.0, 1.0))
     own = inner[inner > 0]
     if len(own) < 10:
         return None
     inner = np.where(inner > 0, inner, np.median(own))
-    blocked = (outer > 0) & (outer < inner - _BEFORE_M)
+    blocked = (outer > 0) & (outer < inner - params.before_m)
     height, width = view.mask.shape
     border = (contour < 2).any(axis=1) | (contour[:, 0] > width - 3) | (contour[:, 1] > height - 3)
     kept = np.flatnonzero(~blocked & ~border)
     if len(kept) < 30:
         return None
-    kept = kept[:: max(len(kept) // _OUTLINE_SAMPLES, 1)]
+    kept = kept[:: max(len(kept) // params.outline_samples, 1)]
     return _Outline(view, edge[kept], float(np.median(own)) / view.rgb_camera.fx)
 
 

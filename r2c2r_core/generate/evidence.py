@@ -14,8 +14,16 @@ from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.tuning import param, tuned
 
-_EDGE_STEP = 0.06  # of the depth within 3x3 pixels: the object's outline, where depth mixes (backends.md 2.7)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth pixels of an object are its outline."""
+
+    edge_step: float = param(
+        0.06, "ratio", "of a step within 3x3 pixels to the depth: the outline, where depth mixes", source="backends.md 2.7"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,7 +114,7 @@ def depth_edges(depth_m: DepthMetres) -> Mask:
     filled = np.where(depth_m > 0, depth_m, np.nan).astype(np.float32)
     near = cv2.erode(np.where(np.isnan(filled), np.float32(1e3), filled), np.ones((3, 3), np.uint8))
     far = cv2.dilate(np.where(np.isnan(filled), np.float32(0), filled), np.ones((3, 3), np.uint8))
-    return np.asarray((depth_m > 0) & (far - near > _EDGE_STEP * near))
+    return np.asarray((depth_m > 0) & (far - near > tuned(Params).edge_step * near))
 
 
 def _view_of(frame: Frame, track: MaskTrack, centre_world: Vector3) -> MaskView:

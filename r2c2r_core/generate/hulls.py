@@ -1,21 +1,13 @@
 """Carved things in their variants: what nobody saw solid, mirrored, empty, or on legs."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.generate.carved import (
-    SHEET_M,
-    Carving,
-    above,
-    carve,
-    emptied_height,
-    sheet_field,
-    solid_field,
-    volume_below,
-)
+from r2c2r_core.generate.carved import Carving, above, carve, emptied_height, sheet_field, solid_field, volume_below
+from r2c2r_core.generate.carved import Params as CarvedParams
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.legs import Support, find_support
@@ -25,8 +17,14 @@ from r2c2r_core.generate.symmetry import fit_revolution
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_SHEETS = 3.0  # a thing less wide than this many boards is solid in any case
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a thing is solid in any case."""
+
+    least_sheets: float = param(3.0, "ratio", "of its width to a board's thickness, below which it is")
 
 
 def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) -> tuple[Hypothesis, ...]:
@@ -71,7 +69,7 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
         family.insert(0, Hypothesis("carved, its back as round as its front", turned))
     if known.mirrored:
         family.append(Hypothesis("carved, not mirrored", unmirrored))
-    if np.ptp(known.carving.seen.points, axis=0).min() > _LEAST_SHEETS * SHEET_M:
+    if np.ptp(known.carving.seen.points, axis=0).min() > tuned(Params).least_sheets * tuned(CarvedParams).sheet_m:
         family.append(Hypothesis("as thin as a board where nobody saw its back", sheet))
     if support is not None:
         family.insert(0, Hypothesis("a slab on four legs", lambda variation: _on_legs(carved(variation), support)))

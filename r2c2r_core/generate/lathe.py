@@ -4,6 +4,8 @@ A LiDAR pixel is a fifth of a bottle; a colour pixel is a fortieth. So depth say
 round, and the silhouettes say how wide it is at each height.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
@@ -11,15 +13,23 @@ from r2c2r_core.generate.evidence import View
 from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.geometry.camera import project, sample_nearest, unproject
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_RINGS = 40
-_SEGMENTS = 40
-_STEP_PX = 0.25
-_SAME_WIDTH = 0.08
-_BITTEN = 0.88  # one side this much narrower than the other: the mask, not the thing
-_MASK_WEIGHT = 0.3
-_LEAST_VIEWS = 3
-_ROBUST_SCALES_M = (0.04, 0.02, 0.01, 0.01)  # of the depth residuals, round by round: the first axis may be 2 cm off
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Bodies of revolution read off the masks."""
+
+    rings: int = param(40, "count", "heights of the profile", ge=4)
+    segments: int = param(40, "count", "round the axis", ge=6)
+    step_px: float = param(0.25, "px", "between places across an outline", gt=0)
+    same_width: float = param(0.08, "share", "of the median radius by which a view's own may differ and be whole")
+    bitten: float = param(0.88, "ratio", "of the narrower to the wider side, below which the mask is bitten, not the thing")
+    mask_weight: float = param(0.3, "ratio", "of the masks to the depth, where the axis is fitted")
+    least_views: int = param(3, "count", "that tell a radius", ge=1)
+    robust_scales_m: tuple[float, float, float, float] = param(
+        (0.04, 0.02, 0.01, 0.01), "m", "of the depth residuals, round by round", source="the first axis may be 2 cm off"
+    )
 
 
 def fit_lathe(
@@ -31,11 +41,12 @@ def fit_lathe(
     the axis is where the depth points lie on them and the masks are balanced about it. (A circle fitted to depth alone is
     too small and too near: noise along the rays looks like curvature.)
     """
+    params = tuned(Params)
     whole = tuple(view for view in views if not view.is_cropped)
-    if len(whole) < _LEAST_VIEWS:
+    if len(whole) < params.least_views:
         return None
     current = start
-    for scale_m in _ROBUST_SCALES_M:
+    for scale_m in params.robust_scales_m:
         top_m = _silhouette_top(current, bottom_m, top_m, whole, world_from_local)
         measured = _silhouette_profile(current, bottom_m, top_m, whole, world_from_local)
         if measured is None:
@@ -57,22 +68,23 @@ def _silhouette_profile(
     revolution: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
 ) -> tuple[Revolution, np.ndarray] | None:
     """Radii at `_RINGS` heights, and each view's equation (sideways x, y, metres): how far its mask is off the axis."""
+    params = tuned(Params)
     from scipy import ndimage
 
-    heights = bottom_m + (np.arange(_RINGS) + 0.5) / _RINGS * (top_m - bottom_m)
+    heights = bottom_m + (np.arange(params.rings) + 0.5) / params.rings * (top_m - bottom_m)
     edges = np.array([_half_widths(revolution, heights, view, world_from_local) for view in views])  # (view, 2, height)
     widths = _full_halves(edges)
     counts = np.isfinite(widths).sum(axis=0)
-    known = counts >= _LEAST_VIEWS
+    known = counts >= params.least_views
     if known.mean() < 0.7:
         return None
     radii = np.array([np.median(column[np.isfinite(column)]) for column in widths.T[known]])
     radii = np.interp(heights, heights[known], radii)
     smooth = ndimage.gaussian_filter1d(ndimage.median_filter(radii, 5, mode="nearest"), 1.0, mode="nearest")
-    step = (top_m - bottom_m) / _RINGS
+    step = (top_m - bottom_m) / params.rings
     ends = np.concatenate([[bottom_m], heights, [heights[-1] + step / 2]])
     # a mask narrower than the others ends at something in front, not at the thing's own outline
-    own = [k for k in range(len(views)) if abs(_middle(widths[k] / radii) - 1.0) < _SAME_WIDTH]
+    own = [k for k in range(len(views)) if abs(_middle(widths[k] / radii) - 1.0) < params.same_width]
     balance = np.array([_balance(revolution, edges[k], views[k], world_from_local) for k in own]).reshape(-1, 3)
     profile = Revolution(revolution.centre, ends, np.concatenate([smooth[:1], smooth, smooth[-1:]]))
     return profile, balance
@@ -83,7 +95,7 @@ def _full_halves(edges: np.ndarray) -> np.ndarray:
     shift = np.array([_middle((view[0] - view[1]) / 2) for view in edges])
     centred = edges - np.where(np.isfinite(shift), shift, 0.0)[:, None, None] * np.array([1.0, -1.0])[None, :, None]
     narrow, wide = centred.min(axis=1), centred.max(axis=1)
-    return np.asarray(np.where(narrow < _BITTEN * wide, wide, centred.mean(axis=1)))
+    return np.asarray(np.where(narrow < tuned(Params).bitten * wide, wide, centred.mean(axis=1)))
 
 
 def _middle(values: np.ndarray) -> float:
@@ -116,7 +128,7 @@ def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, s
     weight = np.where(body, 1.0 / (1.0 + (residual / scale_m) ** 2), 0.0)
     rows = (offset / distance[:, None]) * weight[:, None]
     # masks fix the axis sideways; how far away it is they only tell through pose errors, so depth weighs more
-    share = _MASK_WEIGHT * weight.sum() / max(len(balance), 1) / (1.0 + (balance[:, 2:] / scale_m) ** 2)
+    share = tuned(Params).mask_weight * weight.sum() / max(len(balance), 1) / (1.0 + (balance[:, 2:] / scale_m) ** 2)
     system = np.concatenate([rows, balance[:, :2] * share])
     target = np.concatenate([residual * weight, balance[:, 2] * share[:, 0]])
     step = np.linalg.lstsq(system, target, rcond=None)[0]
@@ -125,37 +137,39 @@ def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, s
 
 def lathe_mesh(revolution: Revolution) -> tuple[Points, Faces]:
     """The closed, outward surface of a body of revolution with flat ends."""
-    angle = np.arange(_SEGMENTS) / _SEGMENTS * 2 * np.pi
+    params = tuned(Params)
+    angle = np.arange(params.segments) / params.segments * 2 * np.pi
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     rings = len(revolution.heights_m)
-    vertices = np.zeros((rings * _SEGMENTS + 2, 3))
+    vertices = np.zeros((rings * params.segments + 2, 3))
     vertices[:-2, :2] = (revolution.centre + revolution.radii_m[:, None, None] * circle).reshape(-1, 2)
-    vertices[:-2, 2] = np.repeat(revolution.heights_m, _SEGMENTS)
+    vertices[:-2, 2] = np.repeat(revolution.heights_m, params.segments)
     vertices[-2:, :2] = revolution.centre
     vertices[-2:, 2] = revolution.heights_m[[0, -1]]
-    here = np.arange(_SEGMENTS)
+    here = np.arange(params.segments)
     following = np.roll(here, -1)
     faces = []
     for ring in range(rings - 1):
-        low, high = ring * _SEGMENTS, (ring + 1) * _SEGMENTS
+        low, high = ring * params.segments, (ring + 1) * params.segments
         faces.append(np.column_stack([low + here, low + following, high + following]))
         faces.append(np.column_stack([low + here, high + following, high + here]))
-    last = (rings - 1) * _SEGMENTS
-    faces.append(np.column_stack([following, here, np.full(_SEGMENTS, len(vertices) - 2)]))
-    faces.append(np.column_stack([last + here, last + following, np.full(_SEGMENTS, len(vertices) - 1)]))
+    last = (rings - 1) * params.segments
+    faces.append(np.column_stack([following, here, np.full(params.segments, len(vertices) - 2)]))
+    faces.append(np.column_stack([last + here, last + following, np.full(params.segments, len(vertices) - 1)]))
     return vertices, np.concatenate(faces)
 
 
 def _half_widths(revolution: Revolution, heights: np.ndarray, view: View, world_from_local: Rigid3) -> np.ndarray:
     """(2, n) metres from the axis to the mask's right and left edge at each height; nan where the axis itself is hidden."""
+    params = tuned(Params)
     axis = _axis_points(revolution, heights)
     camera_from_local = view.world_from_camera.inverse @ world_from_local
     in_camera = camera_from_local.apply(axis)
     pixel = project(in_camera, view.rgb_camera)
     along = pixel[-1] - pixel[0]
     across = np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)  # to the right: heights run up
-    reach = int(np.ceil(2.5 * revolution.radii_m.max() * view.rgb_camera.fx / in_camera[:, 2].min() / _STEP_PX))
-    offsets = (np.arange(-reach, reach + 1) * _STEP_PX)[None, :, None] * across
+    reach = int(np.ceil(2.5 * revolution.radii_m.max() * view.rgb_camera.fx / in_camera[:, 2].min() / params.step_px))
+    offsets = (np.arange(-reach, reach + 1) * params.step_px)[None, :, None] * across
     values, inside = sample_nearest(view.mask, (pixel[:, None, :] + offsets).reshape(-1, 2))
     row = (values & inside).reshape(len(heights), -1)
     right, left = row[:, reach:], row[:, reach::-1]
@@ -164,7 +178,7 @@ def _half_widths(revolution: Revolution, heights: np.ndarray, view: View, world_
     local_from_camera = world_from_local.inverse.rotation @ view.world_from_camera.rotation
     edges = []
     for sign, run in ((1.0, right), (-1.0, left)):
-        edge = pixel + sign * (_run_length(run) - 0.5)[:, None] * _STEP_PX * across
+        edge = pixel + sign * (_run_length(run) - 0.5)[:, None] * params.step_px * across
         ray = (unproject(edge, np.ones(len(edge)), view.rgb_camera) @ local_from_camera.T)[:, :2]
         # seen from above, the ray touches the circle: its distance from the axis is the radius
         edges.append(sign * (ray[:, 0] * forward[1] - ray[:, 1] * forward[0]) / np.linalg.norm(ray, axis=1))
@@ -192,7 +206,7 @@ def _silhouette_top(
         shown = values & inside
         if shown[0] and not shown.all():
             tops.append(heights[int(np.argmin(shown))])
-    return float(np.median(tops)) if len(tops) >= _LEAST_VIEWS else top_m
+    return float(np.median(tops)) if len(tops) >= tuned(Params).least_views else top_m
 
 
 def _axis_points(revolution: Revolution, heights: np.ndarray) -> Points:

@@ -6,6 +6,7 @@ the same, mirrored, where free space lets one stand.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -18,19 +19,32 @@ from r2c2r_core.generate.relief import BoxPart
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_CELL_M, _LEVEL_M = 0.02, 0.015
-_LEAST_AREA = 0.3  # of the thing's plan, that its slab covers
-_LOWEST, _HIGHEST_M = 0.3, 1.15  # a slab's height: share of the thing's, and metres
-_SLAB_M, _SLAB_RANGE_M = 0.05, (0.02, 0.12)
-_POST_M, _POST_RANGE_M = 0.045, (0.025, 0.08)
-_RIM_M, _LEAST_RIM = 0.03, 20  # of a slab's edge: how far in it reaches, and its points in a centimetre of height
-_CORNER_M = 0.10  # how far from a corner its post may stand
-_LEAN = 0.35  # a post's, at most: metres sideways a metre down
-_STEP_M, _LEAST_STEPS, _LEAST_POINTS = 0.03, 5, 8  # heights at which depth must show a post, and its points at each
-_TO_EDGE_M = 0.06  # a slab ends where the thing does, if it is seen to come this near
-_CLOSED = 0.5  # of the height below a slab that is filled wider than a post: a side
-_EMPTY = 0.7  # of a corner's height that is seen free: nothing stands there
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a slab on posts is."""
+
+    cell_m: float = param(0.02, "m", "side of the cells in plan", gt=0)
+    level_m: float = param(0.015, "m", "half the height within which a sheet is level")
+    least_area: float = param(0.3, "share", "of the thing's plan that its slab covers")
+    lowest: float = param(0.3, "share", "of the thing's height, above which the slab is")
+    highest_m: float = param(1.15, "m", "height of a slab, at most")
+    slab_m: float = param(0.05, "m", "thickness of a slab, where nobody sees it")
+    slab_range_m: tuple[float, float] = param((0.02, 0.12), "m", "least and most thickness of a slab")
+    post_m: float = param(0.045, "m", "width of a post, where nobody sees it")
+    post_range_m: tuple[float, float] = param((0.025, 0.08), "m", "least and most width of a post")
+    rim_m: float = param(0.03, "m", "how far in a slab's edge reaches")
+    least_rim: int = param(20, "count", "points of an edge in a centimetre of height")
+    corner_m: float = param(0.10, "m", "from a corner to its post, at most")
+    lean: float = param(0.35, "ratio", "sideways to down of a post, at most")
+    step_m: float = param(0.03, "m", "between heights at which depth must show a post", gt=0)
+    least_steps: int = param(5, "count", "heights that show it")
+    least_points: int = param(8, "count", "of a post at each of them")
+    to_edge_m: float = param(0.06, "m", "from the thing's end, within which a slab reaches it")
+    closed: float = param(0.5, "share", "of the height below a slab filled wider than a post: a side")
+    empty: float = param(0.7, "share", "of a corner's height that is seen free: nothing stands there")
 
 
 class Post(NamedTuple):
@@ -59,16 +73,17 @@ class Support(NamedTuple):
 
 def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     """The slab that was seen and its four posts; None without a floor or a slab, with a closed side or an empty corner."""
+    params = tuned(Params)
     seen, points = carving.seen, carving.seen.points
     if seen.floor is None:
         return None
     level = _slab_level(points, seen.floor, float(seen.high[2]), np.ptp(points[:, :2], axis=0))
     if level is None:
         return None
-    on_slab = points[np.abs(points[:, 2] - level) < _LEVEL_M, :2]
+    on_slab = points[np.abs(points[:, 2] - level) < params.level_m, :2]
     low, high = np.percentile(on_slab, 1, axis=0), np.percentile(on_slab, 99, axis=0)
-    low = np.where(low - seen.low[:2] < _TO_EDGE_M, seen.low[:2], low)
-    high = np.where(seen.high[:2] - high < _TO_EDGE_M, seen.high[:2], high)
+    low = np.where(low - seen.low[:2] < params.to_edge_m, seen.low[:2], low)
+    high = np.where(seen.high[:2] - high < params.to_edge_m, seen.high[:2], high)
     slab = BoxPart(np.append(low, level - _thickness(points, level, low, high)), np.append(high, level))
     if _has_closed_side(points, slab, seen.floor):
         return None
@@ -85,12 +100,13 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
 
 def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> float | None:
     """The height at which the points cover most of the plan."""
-    lowest, highest = floor + _LOWEST * (top - floor), min(top, floor + _HIGHEST_M)
-    best, level = _LEAST_AREA * float(np.prod(plan)), None
-    for z in np.arange(lowest, highest + _LEVEL_M, _LEVEL_M):
-        inside = points[np.abs(points[:, 2] - z) < _LEVEL_M]
-        cells = np.unique(np.floor(inside[:, :2] / _CELL_M).astype(int), axis=0)
-        area = len(cells) * _CELL_M**2
+    params = tuned(Params)
+    lowest, highest = floor + params.lowest * (top - floor), min(top, floor + params.highest_m)
+    best, level = params.least_area * float(np.prod(plan)), None
+    for z in np.arange(lowest, highest + params.level_m, params.level_m):
+        inside = points[np.abs(points[:, 2] - z) < params.level_m]
+        cells = np.unique(np.floor(inside[:, :2] / params.cell_m).astype(int), axis=0)
+        area = len(cells) * params.cell_m**2
         if area > best:
             best, level = area, float(np.median(inside[:, 2]))
     return level
@@ -98,15 +114,16 @@ def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> f
 
 def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) -> float:
     """How far down the points of the slab's own edge reach, between its corners."""
-    near = (points[:, :2] > low - _CELL_M).all(axis=1) & (points[:, :2] < high + _CELL_M).all(axis=1)
-    at_edge = ((points[:, :2] < low + _RIM_M) | (points[:, :2] > high - _RIM_M)).any(axis=1)
-    in_corner = ((points[:, :2] < low + _CORNER_M) | (points[:, :2] > high - _CORNER_M)).all(axis=1)
+    params = tuned(Params)
+    near = (points[:, :2] > low - params.cell_m).all(axis=1) & (points[:, :2] < high + params.cell_m).all(axis=1)
+    at_edge = ((points[:, :2] < low + params.rim_m) | (points[:, :2] > high - params.rim_m)).any(axis=1)
+    in_corner = ((points[:, :2] < low + params.corner_m) | (points[:, :2] > high - params.corner_m)).all(axis=1)
     below = level - points[near & at_edge & ~in_corner, 2]
     counts = np.histogram(below, bins=np.arange(0.02, 0.16, 0.01))[0]  # the first two centimetres may be its rounded edge
-    if counts[0] < _LEAST_RIM:
-        return _SLAB_M
+    if counts[0] < params.least_rim:
+        return params.slab_m
     ends = np.flatnonzero(counts < 0.3 * counts[0])
-    return float(np.clip(0.02 + 0.01 * (ends[0] if len(ends) else len(counts)), *_SLAB_RANGE_M))
+    return float(np.clip(0.02 + 0.01 * (ends[0] if len(ends) else len(counts)), *params.slab_range_m))
 
 
 def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
@@ -114,34 +131,36 @@ def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
 
     Without this, a closed side that is cut off round a corner and seen at a slant is as slender as a post.
     """
+    params = tuned(Params)
     from scipy import ndimage
 
     low, high = slab.low[:2], slab.high[:2]
-    lowest, highest = floor + _STEP_M, float(slab.low[2])
-    if highest - lowest < _STEP_M:
+    lowest, highest = floor + params.step_m, float(slab.low[2])
+    if highest - lowest < params.step_m:
         return False
-    corner = np.minimum(_CORNER_M, (high - low) / 4)
+    corner = np.minimum(params.corner_m, (high - low) / 4)
     between = (points[:, :2] > low + corner) & (points[:, :2] < high - corner)
-    wide = np.ones((round(1.5 * _POST_RANGE_M[1] / _CELL_M), 1), bool)  # a post that noise blurs is still narrower
+    wide = np.ones((round(1.5 * params.post_range_m[1] / params.cell_m), 1), bool)  # a post that noise blurs is still narrower
     for axis, edge in product((0, 1), (low, high)):
         along = 1 - axis
-        side = points[between[:, along] & (np.abs(points[:, axis] - edge[axis]) < _CORNER_M)]
-        cells = max(int((high - low)[along] / _CELL_M), 1), int((highest - lowest) / _STEP_M)
+        side = points[between[:, along] & (np.abs(points[:, axis] - edge[axis]) < params.corner_m)]
+        cells = max(int((high - low)[along] / params.cell_m), 1), int((highest - lowest) / params.step_m)
         span = [[low[along], high[along]], [lowest, highest]]
         filled = np.histogram2d(side[:, along], side[:, 2], bins=cells, range=span)[0] > 0
-        if ndimage.binary_erosion(filled, wide).any(axis=0).mean() > _CLOSED:
+        if ndimage.binary_erosion(filled, wide).any(axis=0).mean() > params.closed:
             return True
     return False
 
 
 def _points_under(slab: BoxPart, floor: float, views: Sequence[View], world_from_local: Rigid3) -> list[tuple[Points, Vector3]]:
     """Each view's depth points between slab and floor, whatever the mask says, and the camera's place."""
+    params = tuned(Params)
     found = []
-    low, high = slab.low[:2] - _CORNER_M, slab.high[:2] + _CORNER_M
+    low, high = slab.low[:2] - params.corner_m, slab.high[:2] + params.corner_m
     for view in views:
         local_from_camera = world_from_local.inverse @ view.world_from_camera
         points = local_from_camera.apply(depth_points(view.depth_m, view.depth_camera)[view.depth_m > 0])
-        inside = (points[:, 2] > floor + _STEP_M) & (points[:, 2] < slab.low[2])
+        inside = (points[:, 2] > floor + params.step_m) & (points[:, 2] < slab.low[2])
         inside &= (points[:, :2] > low).all(axis=1) & (points[:, :2] < high).all(axis=1)
         found.append((points[inside], local_from_camera.translation))
     return found
@@ -149,20 +168,21 @@ def _points_under(slab: BoxPart, floor: float, views: Sequence[View], world_from
 
 def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post | None:
     """The post at a corner, where depth shows a slender one over most of its height."""
+    params = tuned(Params)
     outer = np.array([(slab.low, slab.high)[corner[k]][k] for k in (0, 1)])
     middles, widths = [], []
     for points, eye in under:
-        reach = _CORNER_M + _LEAN * (slab.low[2] - points[:, 2])
+        reach = params.corner_m + params.lean * (slab.low[2] - points[:, 2])
         near = points[(np.abs(points[:, :2] - outer) < reach[:, None]).all(axis=1)]
         away = outer - eye[:2]
         away /= max(float(np.linalg.norm(away)), 1e-9)
         across = near[:, :2] @ np.array([away[1], -away[0]])
-        for z in np.arange(floor + _STEP_M, slab.low[2], _STEP_M):
-            level = np.abs(near[:, 2] - z) < _STEP_M / 2
-            if np.count_nonzero(level) < _LEAST_POINTS:
+        for z in np.arange(floor + params.step_m, slab.low[2], params.step_m):
+            level = np.abs(near[:, 2] - z) < params.step_m / 2
+            if np.count_nonzero(level) < params.least_points:
                 continue
             width = float(np.ptp(np.percentile(across[level], [5, 95])))
-            if width < _POST_RANGE_M[1]:
+            if width < params.post_range_m[1]:
                 middles.append(np.append(np.median(near[level, :2], axis=0) + width / 2 * away, z))
                 widths.append(width)
     line = _steady_line(np.array(middles).reshape(-1, 3))
@@ -171,13 +191,14 @@ def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: t
     lean, offset = line
     top = np.append(lean * slab.low[2] + offset, slab.low[2] + 0.002)
     inside = (top[:2] > slab.low[:2] - 0.02).all() and (top[:2] < slab.high[:2] + 0.02).all()
-    width = float(np.clip(np.median(widths), *_POST_RANGE_M))
-    return Post(top, lean, width, floor, True) if inside and (np.abs(lean) < _LEAN).all() else None
+    width = float(np.clip(np.median(widths), *params.post_range_m))
+    return Post(top, lean, width, floor, True) if inside and (np.abs(lean) < params.lean).all() else None
 
 
 def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
     """(x, y) as a line over z by reweighted least squares; None for too few heights or where the middles lie on no line."""
-    if len(np.unique(np.round(middles[:, 2] / _STEP_M))) < _LEAST_STEPS:
+    params = tuned(Params)
+    if len(np.unique(np.round(middles[:, 2] / params.step_m))) < params.least_steps:
         return None
     system = np.column_stack([middles[:, 2], np.ones(len(middles))])
     weight: np.ndarray = np.ones(len(middles))
@@ -191,6 +212,7 @@ def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post:
     """A corner's post as the mirror image of a seen one, left-right before front-back; without one, upright."""
+    params = tuned(Params)
     middle = (slab.low + slab.high)[:2] / 2
     for flip in ((1, 0), (0, 1), (1, 1)):
         twin = seen[(corner[0] ^ flip[0], corner[1] ^ flip[1])]
@@ -199,16 +221,17 @@ def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner
             return twin._replace(
                 top=np.append(middle + sign * (twin.top[:2] - middle), twin.top[2]), lean=sign * twin.lean, is_seen=False
             )
-    inset = _POST_M / 2
+    inset = params.post_m / 2
     at = [slab.high[k] - inset if corner[k] else slab.low[k] + inset for k in (0, 1)]
-    return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), _POST_M, floor, False)
+    return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), params.post_m, floor, False)
 
 
 def _is_empty(carving: Carving, post: Post) -> bool:
     """Whether most of the post's height was seen to be free."""
+    params = tuned(Params)
     grid = carving.grid
-    z = np.arange(post.floor_m + _STEP_M, post.top[2], grid.voxel_m)
+    z = np.arange(post.floor_m + params.step_m, post.top[2], grid.voxel_m)
     along = np.column_stack([post.top[:2] + post.lean * (z - post.top[2])[:, None], z])
     index = np.clip(((along - grid.low) / grid.voxel_m).astype(int), 0, np.array(grid.shape) - 1)
     free = (carving.votes.free_m > 0).reshape(grid.shape)[tuple(index.T)]
-    return bool(free.mean() > _EMPTY)
+    return bool(free.mean() > params.empty)

@@ -1,5 +1,6 @@
 """Distance fields on a grid, and the closed surface of one that agrees best with the masks."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +11,19 @@ from r2c2r_core.generate.consistency import silhouette_iou
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import largest_component, simplify, volume
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_MOST_VOXELS = 1_000_000
-_MOST_CELLS = 160  # along the longest side: 6 mm on a chair
-_OUTWARDS_M, _INWARDS_M = (0.002, 0.004), (-0.002, -0.004)
-_MOST_FACES = 6000
-_FLATTER = 0.35  # of a voxel: how far simplifying may move the surface
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How fine fields and their surfaces are."""
+
+    most_voxels: int = param(1_000_000, "count", "of a grid", ge=1000)
+    most_cells: int = param(160, "count", "along the longest side", source="6 mm on a chair", ge=8)
+    most_faces: int = param(6000, "count", "triangles of the surface", ge=100)
+    flatter: float = param(0.35, "ratio", "to a voxel: how far simplifying may move the surface")
+    outwards_m: tuple[float, float] = param((0.002, 0.004), "m", "by which a surface is tried further out, at first")
+    inwards_m: tuple[float, float] = param((-0.002, -0.004), "m", "by which it is tried further in")
 
 
 class Grid(NamedTuple):
@@ -39,8 +47,9 @@ class Grid(NamedTuple):
 
 def grid_round(low: Vector3, high: Vector3, voxel_m: float, margin_m: float) -> Grid:
     """A grid over the box with a margin and two voxels of air."""
+    params = tuned(Params)
     start, size = low - margin_m - 2 * voxel_m, high - low + 2 * margin_m + 4 * voxel_m
-    voxel_m = max(voxel_m, float(size.max()) / _MOST_CELLS, float(np.cbrt(np.prod(size) / _MOST_VOXELS)))
+    voxel_m = max(voxel_m, float(size.max()) / params.most_cells, float(np.cbrt(np.prod(size) / params.most_voxels)))
     counts = np.ceil(size / voxel_m).astype(int) + 1
     return Grid(start, (int(counts[0]), int(counts[1]), int(counts[2])), voxel_m)
 
@@ -50,9 +59,10 @@ def best_level(grid: Grid, field: np.ndarray, floor: float | None, variation: Va
 
     `field` has the grid's shape and is positive outside. `floor` is the height that the thing stands on, if it is known.
     """
+    params = tuned(Params)
     views = variation.views[:: max(len(variation.views) // 5, 1)]
     best, best_score = 0.0, -1.0
-    for levels in ((0.0,), _OUTWARDS_M, _INWARDS_M):  # the agreement has one peak: climb it
+    for levels in ((0.0,), params.outwards_m, params.inwards_m):  # the agreement has one peak: climb it
         for level in levels:
             extracted = _extract(grid, field, level, floor)
             score = -1.0 if extracted is None else silhouette_iou(world_from_local.apply(extracted[0]), extracted[1], views)
@@ -66,11 +76,12 @@ def best_level(grid: Grid, field: np.ndarray, floor: float | None, variation: Va
 
 def surface_at(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces]:
     """The closed surface field = level, in the local frame; raises GenerationFailed where there is none."""
+    params = tuned(Params)
     extracted = _extract(grid, field, level, floor)
     if extracted is None:
         raise GenerationFailed("carving left nothing", hint="its masks disagree; add a click")
     try:
-        return simplify(*extracted, _FLATTER * grid.voxel_m, _MOST_FACES)
+        return simplify(*extracted, params.flatter * grid.voxel_m, params.most_faces)
     except ValueError as error:
         raise GenerationFailed(str(error), hint="its masks disagree; add a click") from error
 

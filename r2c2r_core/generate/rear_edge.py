@@ -6,6 +6,7 @@ the face goes on, what is left to the wall where it has ended. The edge is the c
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,30 +14,38 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.generate.evidence import View
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_FLATTEST = 0.08  # sine of the angle between a ray and the face
-_BEFORE_M = 0.05  # nearer than the face: something in front of it
-_BIN_M = 0.01
-_LEAST = 6  # pixels of a bin, and of a frame on either part of a face
-_LEAST_BINS = 8
-_SURE = 0.7  # of the depth: up to here the face is there
-_LEAST_GAP_M = 0.015  # between the rear edge and what is behind it
-_CLEARER = 0.5  # of the misfit of a face without an end
 _WIDEST_M = 0.08  # how far from where it was thought the edge is looked for
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Where a face seen at a slant ends."""
+
+    flattest: float = param(0.08, "cosine", "with the face's normal of a ray that tells")
+    before_m: float = param(0.05, "m", "nearer than the face: something in front of it")
+    bin_m: float = param(0.01, "m", "width of the strips along the face", gt=0)
+    least: int = param(6, "count", "pixels of a strip, and of a frame on either part of a face", ge=1)
+    least_bins: int = param(8, "count", "strips that are known")
+    sure: float = param(0.7, "share", "of the depth up to which the face is there")
+    least_gap_m: float = param(0.015, "m", "between the rear edge and what is behind it")
+    clearer: float = param(0.5, "ratio", "of the misfit to that of a face without an end, at most")
 
 
 def rear_edge(
     low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3, reach_m: float = _WIDEST_M
 ) -> float:
     """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, moved to where depth lets the edge be."""
+    params = tuned(Params)
     thought = float(high[1])
     bounds = []
     for axis, side in ((2, 1.0), (0, -1.0), (0, 1.0)):
         crossings, behind = [np.zeros(0)], [np.zeros(0)]
         for view in views:
             y, gap = _continued(low, high, view, world_from_local, axis, side, reach_m)
-            known = y < low[1] + _SURE * (high[1] - low[1])
-            if known.sum() < _LEAST or np.count_nonzero(~known) < _LEAST:
+            known = y < low[1] + params.sure * (high[1] - low[1])
+            if known.sum() < params.least or np.count_nonzero(~known) < params.least:
                 continue
             crossings.append(y)
             behind.append(gap - np.median(gap[known]))  # the frame's own pose error
@@ -53,6 +62,7 @@ def _continued(
     low: Vector3, high: Vector3, view: View, world_from_local: Rigid3, axis: int, side: float, reach_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where pixels' rays cross the plane of a face (y), and how far behind the crossing, along y, the surface they hit lies."""
+    params = tuned(Params)
     eye = world_from_local.inverse.apply(view.eye_world[None])[0]
     face = high[axis] if side > 0 else low[axis]
     if side * (eye[axis] - face) <= 0.05:
@@ -60,7 +70,7 @@ def _continued(
     valid = view.depth_m > 0
     hit = (world_from_local.inverse @ view.world_from_camera).apply(depth_points(view.depth_m, view.depth_camera)[valid])
     ray = hit - eye
-    steep = side * ray[:, axis] < -_FLATTEST * np.linalg.norm(ray, axis=1)
+    steep = side * ray[:, axis] < -params.flattest * np.linalg.norm(ray, axis=1)
     share = (face - eye[axis]) / np.where(steep, ray[:, axis], -1.0 * side)
     crossing = eye + share[:, None] * ray
     other = 2 - axis
@@ -68,7 +78,7 @@ def _continued(
     inside = steep & (crossing[:, other] > low[other] + margin) & (crossing[:, other] < high[other] - margin)
     inside &= (crossing[:, 1] > low[1] + 0.3 * (high[1] - low[1])) & (crossing[:, 1] < high[1] + reach_m)
     gap = (hit - crossing)[:, 1]
-    inside &= (gap > -_BEFORE_M) & (ray[:, 1] > 0)
+    inside &= (gap > -params.before_m) & (ray[:, 1] > 0)
     return crossing[inside, 1], gap[inside]
 
 
@@ -77,18 +87,19 @@ def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reac
 
     Bins of y are told apart by least absolute deviations. Between the two lie the pixels that a phone drops at an edge.
     """
-    index = np.floor(crossing / _BIN_M).astype(int)
-    bins = np.array([k for k in np.unique(index) if np.count_nonzero(index == k) >= _LEAST])
-    if len(bins) < _LEAST_BINS:
+    params = tuned(Params)
+    index = np.floor(crossing / params.bin_m).astype(int)
+    bins = np.array([k for k in np.unique(index) if np.count_nonzero(index == k) >= params.least])
+    if len(bins) < params.least_bins:
         return None
-    y = (bins + 0.5) * _BIN_M
+    y = (bins + 0.5) * params.bin_m
     gap = np.array([np.median(behind[index == k]) for k in bins])
     misfits = []
     for k in range(1, len(bins) - 1):
         wall = np.median(gap[k:] + y[k:])  # what is behind is upright: the gap shrinks by as much as y grows
-        beyond = np.abs(gap[k:] + y[k:] - wall).sum() if wall - y[k] > _LEAST_GAP_M else np.inf
+        beyond = np.abs(gap[k:] + y[k:] - wall).sum() if wall - y[k] > params.least_gap_m else np.inf
         misfits.append(float(np.abs(gap[:k]).sum() + beyond))
     best = int(np.argmin(misfits)) + 1
-    if misfits[best - 1] > _CLEARER * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
+    if misfits[best - 1] > params.clearer * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
         return None
-    return float(y[best - 1]), float(y[best] - _BIN_M / 2)
+    return float(y[best - 1]), float(y[best] - params.bin_m / 2)

@@ -4,7 +4,7 @@ Everything here is in a `front`-like frame: +X right, +Y into the furniture, +Z 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -14,15 +14,26 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.generate.evidence import View, masked_points
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.model.track import FrontHandle, FrontPanel
+from r2c2r_core.tuning import param, tuned
 
-_OVERLAP_M = 0.002  # pieces reach this far into the panel, so that the union is one solid
-_LEAST_STEP_M = 0.005
-_LEAST_AREA_M2 = 0.0012
-_DEEPEST_STEP_M = 0.04
-_BORDER_M = 0.015
-_LEAST_FILL = 0.75  # of its bounding rectangle that a step must cover
-_SIGMAS = 4.0
-_HAND_M = (0.01, 0.09)  # what hands need behind a handle, and what would be in the way
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What stands out of a front."""
+
+    overlap_m: float = param(0.002, "m", "by which pieces reach into the panel, so that the union is one solid")
+    least_step_m: float = param(0.005, "m", "height of a step that is shown")
+    least_area_m2: float = param(0.0012, "m²", "of a step that is shown")
+    deepest_step_m: float = param(0.04, "m", "height of a step that is believed")
+    border_m: float = param(0.015, "m", "along the front's edge, where no step is looked for")
+    least_fill: float = param(0.75, "share", "of its bounding rectangle that a step must cover")
+    sigmas: float = param(4.0, "σ", "of the heights' noise that a step must pass")
+    hand_m: tuple[float, float] = param(
+        (0.01, 0.09),
+        "m",
+        "least and most that a handle stands out",
+        source="what hands need behind it, and what would be in the way",
+    )
 
 
 class BoxPart(NamedTuple):
@@ -60,7 +71,7 @@ def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
     raised, sunk = find_steps(heights, front.handle)
     if front.handle is None:
         return Relief(raised, sunk, None)
-    protrusion = float(np.clip(measured_protrusion(heights, front.handle, footprint), *_HAND_M))
+    protrusion = float(np.clip(measured_protrusion(heights, front.handle, footprint), *tuned(Params).hand_m))
     return Relief(raised, sunk, replace(front.handle, protrusion_m=protrusion))
 
 
@@ -115,6 +126,7 @@ def _cell_medians(cell: np.ndarray, height: np.ndarray, count: int) -> np.ndarra
 
 def find_steps(heights: HeightMap, handle: FrontHandle | None) -> tuple[list[BoxPart], list[BoxPart]]:
     """Rectangles that stand out of, and that lie back in, the outer face, where depth supports them beyond noise."""
+    params = tuned(Params)
     z = _levelled_to_border(heights)
     known = np.isfinite(z)
     if known.mean() < 0.5:
@@ -122,11 +134,11 @@ def find_steps(heights: HeightMap, handle: FrontHandle | None) -> tuple[list[Box
     filled = np.where(known, z, 0.0).astype(np.float32)
     smooth = cv2.medianBlur(filled, 3)
     noise = 1.4826 * float(np.median(np.abs(filled - smooth)[known]))
-    allowed = known & ~_handle_cells(heights, handle) & ~_border_cells(heights)
+    allowed = known & ~_handle_cells(heights, handle) & ~_border_cells(heights, params.border_m)
     raised: list[BoxPart] = []
     sunk: list[BoxPart] = []
     for sign, parts in ((1.0, raised), (-1.0, sunk)):
-        strong = allowed & (sign * smooth > max(_LEAST_STEP_M, _SIGMAS * noise))
+        strong = allowed & (sign * smooth > max(params.least_step_m, params.sigmas * noise))
         parts.extend(_step_boxes(heights, smooth, strong, sign))
     return raised, sunk
 
@@ -134,7 +146,7 @@ def find_steps(heights: HeightMap, handle: FrontHandle | None) -> tuple[list[Box
 def handle_parts(handle: FrontHandle, *, as_bar: bool) -> list[BoxPart]:
     """A handle of the measured rectangle and protrusion: a bar on two posts, or a block where it is small or thin."""
     low = np.array([handle.left_m, -handle.protrusion_m, handle.bottom_m])
-    high = np.array([handle.right_m, _OVERLAP_M, handle.top_m])
+    high = np.array([handle.right_m, tuned(Params).overlap_m, handle.top_m])
     long, narrow = (2, 0) if handle.is_vertical else (0, 2)
     length, breadth = high[long] - low[long], high[narrow] - low[narrow]
     if not as_bar or length < 2.5 * breadth or handle.protrusion_m < 0.015:
@@ -165,15 +177,16 @@ def measured_protrusion(heights: HeightMap, handle: FrontHandle, footprint_m: fl
 def _levelled_to_border(heights: HeightMap) -> np.ndarray:
     """Heights above the outer frame: on a framed front most cells lie on the sunken field, so the median is not the face."""
     z = heights.height_m
-    strip = _border_cells(heights, 0.05) & ~_border_cells(heights) & np.isfinite(z)
+    strip = _border_cells(heights, 0.05) & ~_border_cells(heights, tuned(Params).border_m) & np.isfinite(z)
     if strip.sum() < 20:
         return z
     level = float(np.median(z[strip]))
-    return z - level if abs(level) > _LEAST_STEP_M else z
+    return z - level if abs(level) > tuned(Params).least_step_m else z
 
 
 def _step_boxes(heights: HeightMap, smooth: np.ndarray, strong: np.ndarray, sign: float) -> list[BoxPart]:
     """The connected regions that fill a rectangle at one level, as boxes."""
+    params = tuned(Params)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(strong.astype(np.uint8), connectivity=4)
     rows, columns = smooth.shape
     pitch_x, pitch_z = -2 * heights.left_m / columns, -2 * heights.bottom_m / rows
@@ -183,13 +196,13 @@ def _step_boxes(heights: HeightMap, smooth: np.ndarray, strong: np.ndarray, sign
         left, bottom, width, height, area = (int(v) for v in stats[label])
         level = float(np.median(smooth[region]))
         spread = float(np.median(np.abs(smooth[region] - level)))
-        if area * pitch_x * pitch_z < _LEAST_AREA_M2 or area < _LEAST_FILL * width * height:
+        if area * pitch_x * pitch_z < params.least_area_m2 or area < params.least_fill * width * height:
             continue
-        if abs(level) > _DEEPEST_STEP_M or spread > 0.35 * abs(level):
+        if abs(level) > params.deepest_step_m or spread > 0.35 * abs(level):
             continue
         x0, z0 = heights.left_m + left * pitch_x, heights.bottom_m + bottom * pitch_z
         x1, z1 = x0 + width * pitch_x, z0 + height * pitch_z
-        near, far = (-abs(level), _OVERLAP_M) if sign > 0 else (-0.01, abs(level))
+        near, far = (-abs(level), params.overlap_m) if sign > 0 else (-0.01, abs(level))
         boxes.append(BoxPart(np.array([x0, near, z0]), np.array([x1, far, z1])))
     return boxes
 
@@ -201,7 +214,7 @@ def _cell_centres(heights: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     return x[None, :], z[:, None]
 
 
-def _border_cells(heights: HeightMap, border_m: float = _BORDER_M) -> np.ndarray:
+def _border_cells(heights: HeightMap, border_m: float) -> np.ndarray:
     x, z = _cell_centres(heights)
     return np.asarray((np.abs(x) > -heights.left_m - border_m) | (np.abs(z) > -heights.bottom_m - border_m))
 

@@ -1,5 +1,6 @@
 """Any triangles as a closed, outward, textured mesh: what was wrong is mended, and every step is noted for a person."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -24,15 +25,23 @@ from r2c2r_core.geometry.meshes import (
     volume,
 )
 from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.tuning import param, tuned
 
-_KEPT_FACES = 20_000
-_REDUCED_FACES = 10_000  # of a mesh that must be unwrapped anew: the atlas of 20 000 takes seconds
-_REMESH_CELLS = 80  # along the longest side
-_SHELL_CELLS = 0.75  # half the thickness a leaking sheet is given
-_LEAST_FLATNESS = 1e-4  # shortest over longest side
-_TEXTURE_PX = 1024
-_LARGEST_PX = 2048
-_CRUMB = 0.01  # of the largest body's diagonal: what floats beside it and is smaller is no part of it
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How foreign meshes are mended."""
+
+    kept_faces: int = param(20_000, "count", "triangles of a mesh that is kept as it is")
+    reduced_faces: int = param(
+        10_000, "count", "of a mesh that must be unwrapped anew", source="the atlas of 20 000 takes seconds"
+    )
+    remesh_cells: int = param(80, "count", "along the longest side of a mesh that is not closed", ge=8)
+    shell_ratio: float = param(0.75, "ratio", "to a cell: half the thickness a leaking sheet is given")
+    least_flatness: float = param(1e-4, "ratio", "of the shortest to the longest side of a mesh that has a volume")
+    texture_px: int = param(1024, "px", "side of a new texture", ge=16)
+    largest_px: int = param(2048, "px", "longest side of a texture that is kept", ge=16)
+    crumb: float = param(0.01, "ratio", "to the largest body's diagonal: what floats beside it and is smaller is no part of it")
 
 
 class Mended(NamedTuple):
@@ -68,22 +77,23 @@ def _once_each(faces: Faces, notes: list[str]) -> Faces:
 
 def _bodies(vertices: Points, faces: Faces, notes: list[str]) -> list[Surface]:
     """The pieces that hang together over edges with two faces, largest first, without crumbs."""
+    params = tuned(Params)
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(faces))
     pieces = [compact(vertices, faces[labels == label]) for label in np.unique(labels)]
     sizes = np.array([np.linalg.norm(np.ptp(piece[0], axis=0)) for piece in pieces])
-    kept = [pieces[k] for k in np.argsort(-sizes) if sizes[k] > _CRUMB * sizes.max()]
+    kept = [pieces[k] for k in np.argsort(-sizes) if sizes[k] > params.crumb * sizes.max()]
     if len(kept) < len(pieces):
-        notes.append(f"{len(pieces) - len(kept)} crumbs smaller than {100 * _CRUMB:.0f} % of it were dropped")
+        notes.append(f"{len(pieces) - len(kept)} crumbs smaller than {100 * params.crumb:.0f} % of it were dropped")
     return kept
 
 
 def _keeps_its_skin(parts: list[MeshPart], bodies: list[Surface]) -> bool:
     """Whether nothing has to be changed but, perhaps, the side all faces look to: closed bodies that stand apart."""
     count = len(parts[0].faces)
-    if len(parts) != 1 or not parts[0].keeps_its_texture or count > _KEPT_FACES:
+    if len(parts) != 1 or not parts[0].keeps_its_texture or count > tuned(Params).kept_faces:
         return False
     if sum(len(body[1]) for body in bodies) != count or not all(_is_solid(*body) for body in bodies):
         return False
@@ -103,7 +113,7 @@ def _check_sane(label: str, vertices: Points, faces: Faces) -> None:
     if len(faces) < 4:
         raise OverrideError(f"{label}: {len(faces)} triangles, at least 4 expected", hint="export it again as triangles")
     sides = np.ptp(vertices[np.unique(faces)], axis=0)
-    if sides.max() <= 0 or sides.min() < _LEAST_FLATNESS * sides.max():
+    if sides.max() <= 0 or sides.min() < tuned(Params).least_flatness * sides.max():
         size = " x ".join(f"{side:.3g}" for side in sides)
         raise OverrideError(f"{label}: the mesh is flat ({size}), a body with a volume expected", hint="give it thickness")
 
@@ -114,14 +124,15 @@ def _is_solid(vertices: Points, faces: Faces) -> bool:
 
 def _with_own_texture(part: MeshPart, notes: list[str], rng: np.random.Generator) -> TexturedMesh:
     """A closed part as it is, wound outwards."""
+    params = tuned(Params)
     assert part.uv is not None
     assert part.texture is not None
     faces, texture = part.faces, part.texture
     if volume(part.vertices, faces) < 0:
         faces = faces[:, ::-1]
         notes.append("its faces pointed inwards and were turned round")
-    if max(texture.shape[:2]) > _LARGEST_PX:
-        scale = _LARGEST_PX / max(texture.shape[:2])
+    if max(texture.shape[:2]) > params.largest_px:
+        scale = params.largest_px / max(texture.shape[:2])
         texture = np.asarray(cv2.resize(texture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         notes.append(f"its texture was reduced to {texture.shape[1]} x {texture.shape[0]} pixels")
     used, faces = np.unique(faces, return_inverse=True)  # a vertex that no face uses would count for the mesh's size
@@ -131,10 +142,11 @@ def _with_own_texture(part: MeshPart, notes: list[str], rng: np.random.Generator
 
 def _closed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     """One closed, outward surface within the face limit; notes what was done."""
+    params = tuned(Params)
     vertices, faces = _solid_union(bodies, notes) or _remeshed(label, bodies, notes)
-    if len(faces) > _KEPT_FACES:
+    if len(faces) > params.kept_faces:
         count, size = len(faces), float(np.ptp(vertices, axis=0).max())
-        vertices, faces = simplify(vertices, faces, 1e-4 * size, _REDUCED_FACES)
+        vertices, faces = simplify(vertices, faces, 1e-4 * size, params.reduced_faces)
         notes.append(f"simplified from {count} to {len(faces)} triangles")
     return vertices, faces
 
@@ -175,20 +187,21 @@ def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
 
 def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     """The outer boundary on a grid: everything that air from outside cannot reach is solid; sheets get a thickness."""
+    params = tuned(Params)
     from scipy import ndimage
     from skimage.measure import marching_cubes
 
     vertices, faces = _stacked(bodies)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    cell = float((high - low).max()) / _REMESH_CELLS
+    cell = float((high - low).max()) / params.remesh_cells
     counts = np.ceil((high - low) / cell).astype(int) + 6
     start = low - 2.5 * cell
     axes = [start[k] + np.arange(counts[k]) * cell for k in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     distance = distances_to_mesh(grid.reshape(-1, 3), vertices, faces).reshape(grid.shape[:3]) / cell
-    labels, _ = ndimage.label(distance > _SHELL_CELLS)
+    labels, _ = ndimage.label(distance > params.shell_ratio)
     inside = (labels != labels[0, 0, 0]) & (labels > 0)
-    field = np.where(inside, -1.0, distance - _SHELL_CELLS)
+    field = np.where(inside, -1.0, distance - params.shell_ratio)
     points, cubes, _, _ = marching_cubes(ndimage.gaussian_filter(field, 0.6), 0.0)
     closed, cubes = join_vertices(points.astype(np.float64), cubes.astype(np.int64))
     if volume(closed, cubes) < 0:
@@ -196,8 +209,10 @@ def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     tight = _tightened(start + closed * cell, cubes, inside, start, cell, (vertices, faces))
     if not _is_solid(tight, cubes):
         raise OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
-    notes.append(f"it was not a closed body: remeshed, details finer than {100 / _REMESH_CELLS:.1f} % of its size are lost")
-    return simplify(tight, cubes, 0.1 * cell, _REDUCED_FACES)
+    notes.append(
+        f"it was not a closed body: remeshed, details finer than {100 / params.remesh_cells:.1f} % of its size are lost"
+    )
+    return simplify(tight, cubes, 0.1 * cell, params.reduced_faces)
 
 
 def _tightened(vertices: Points, faces: Faces, inside: np.ndarray, start: np.ndarray, cell: float, original: Surface) -> Points:
@@ -220,7 +235,7 @@ def _stacked(bodies: list[Surface]) -> Surface:
 
 def _recoloured(vertices: Points, faces: Faces, parts: list[MeshPart], rng: np.random.Generator) -> TexturedMesh:
     """A new texture for a changed surface: each texel takes the nearest colour of the original."""
-    atlas = unwrapped_atlas(vertices, faces, _TEXTURE_PX)
+    atlas = unwrapped_atlas(vertices, faces, tuned(Params).texture_px)
     colours = colours_at(parts, atlas.points)
     texture = np.zeros((*atlas.size, 3), np.uint8)
     texture[:] = np.median(colours, axis=0).astype(np.uint8)

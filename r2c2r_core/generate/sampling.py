@@ -13,8 +13,15 @@ import numpy as np
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.cutout import usable_views
 from r2c2r_core.generate.evidence import Evidence, View
+from r2c2r_core.tuning import param, tuned
 
-_FEWEST, _MOST = 4, 8
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How many views are drawn."""
+
+    fewest: int = param(4, "count", "views of a draw", ge=1)
+    most: int = param(8, "count", "views of a draw", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,12 +61,13 @@ def draw_sampling(evidence: Evidence, candidate_id: str, seed: int) -> Sampling:
     `stochastic` conditions each step on one image in turn, so images beyond the number of steps would never be looked at:
     there are always at least as many steps as images.
     """
+    params = tuned(Params)
     name = evidence.track.name
     views = usable_views(evidence.pool)
     if not views:
         raise GenerationFailed(f"{name}: its masks are too small for a picture", hint="add a click on a nearer frame")
     rng = np.random.default_rng([seed, zlib.crc32(name.encode()), zlib.crc32(candidate_id.encode())])
-    count = min(int(rng.integers(_FEWEST, _MOST + 1)), len(views))
+    count = min(int(rng.integers(params.fewest, params.most + 1)), len(views))
     chosen = np.sort(rng.choice(len(views), count, replace=False))
     steps = max(12, count)
     return Sampling(

@@ -1,5 +1,6 @@
 """What the frames show of a thing: its depth points and the box in which it is looked for."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,15 @@ from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, masked_points
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_POINTS = 60
-_COMPONENT_CELL_M = 0.03
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth points are a thing's."""
+
+    least_points: int = param(60, "count", "of a thing that is seen at all")
+    component_cell_m: float = param(0.03, "m", "gap that parts two things", gt=0)
 
 
 class Seen(NamedTuple):
@@ -36,7 +43,7 @@ def _local_frame(evidence: Evidence) -> Rigid3:
     if evidence.track.box is not None:
         return evidence.track.box.world_from_object
     points = np.concatenate([masked_points(v) for v in evidence.pool])
-    if len(points) < _LEAST_POINTS:
+    if len(points) < tuned(Params).least_points:
         raise GenerationFailed(
             f"{evidence.track.name}: {len(points)} depth points inside its masks", hint="scan it from nearer"
         )
@@ -45,11 +52,12 @@ def _local_frame(evidence: Evidence) -> Rigid3:
 
 def _object_points(evidence: Evidence, variation: Variation, world_from_local: Rigid3) -> Points:
     """Depth points of the object in the local frame: its largest connected piece."""
+    params = tuned(Params)
     found = [masked_points(view, variation.erosion_px) for view in variation.views]
     points = world_from_local.inverse.apply(np.concatenate(found))
-    if len(points) < _LEAST_POINTS:
+    if len(points) < params.least_points:
         raise GenerationFailed(
-            f"{evidence.track.name}: {len(points)} depth points inside its masks, {_LEAST_POINTS} needed",
+            f"{evidence.track.name}: {len(points)} depth points inside its masks, {params.least_points} needed",
             hint="scan it from nearer, or upload a mesh",
         )
     return _largest_cluster(points)
@@ -59,7 +67,7 @@ def _largest_cluster(points: Points) -> Points:
     """The points of the largest component of coarse occupied cells: what shines through slats or past edges falls off."""
     from scipy import ndimage
 
-    cell = np.floor((points - points.min(axis=0)) / _COMPONENT_CELL_M).astype(int)
+    cell = np.floor((points - points.min(axis=0)) / tuned(Params).component_cell_m).astype(int)
     counts = np.zeros(cell.max(axis=0) + 1, dtype=np.int64)
     np.add.at(counts, tuple(cell.T), 1)
     labels, count = ndimage.label(counts >= 2, structure=np.ones((3, 3, 3)))

@@ -1,17 +1,25 @@
 """Whether a thing would stay as it was found: its centre of mass lies over what it stands on."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.tuning import param, tuned
 
-_TOUCHING_M = 0.015
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What touches the ground."""
+
+    touching_m: float = param(0.015, "m", "above the lowest point, within which a vertex is a foot")
 
 
 def stands(vertices: Points, faces: Faces) -> bool:
     """Whether a closed mesh of one density (metres, +Z up) rests on its lowest points without tipping."""
     from scipy.spatial import Delaunay, QhullError
 
-    feet = vertices[vertices[:, 2] < vertices[:, 2].min() + _TOUCHING_M, :2]
+    feet = vertices[vertices[:, 2] < vertices[:, 2].min() + tuned(Params).touching_m, :2]
     try:
         return bool(Delaunay(np.unique(feet, axis=0)).find_simplex(_centre_of_mass(vertices, faces)[:2]) >= 0)
     except (QhullError, ValueError):  # a point or a line of feet

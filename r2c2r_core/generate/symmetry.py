@@ -1,14 +1,21 @@
 """Symmetries that complete what no camera saw: a body of revolution, or a left-right mirror."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.tuning import param, tuned
 
-_SLICES = 8
-_LARGEST_RADIUS_M = 0.25
-_LEAST_POINTS = 150
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a thing is round."""
+
+    slices: int = param(8, "count", "in height", ge=2)
+    largest_radius_m: float = param(0.25, "m", "of a body of revolution that is believed")
+    least_points: int = param(150, "count", "that tell it")
 
 
 class Revolution(NamedTuple):
@@ -30,35 +37,37 @@ def fit_revolution(points: Points) -> Revolution | None:
     Each slice of height is a circle about one common centre: linear least squares in the centre and the slices' terms
     r^2 - |c|^2.
     """
-    if len(points) < _LEAST_POINTS:
+    params = tuned(Params)
+    if len(points) < params.least_points:
         return None
     low, high = np.percentile(points[:, 2], [1, 99])
-    slice_index = np.clip(((points[:, 2] - low) / max(high - low, 1e-6) * _SLICES).astype(int), 0, _SLICES - 1)
+    slice_index = np.clip(((points[:, 2] - low) / max(high - low, 1e-6) * params.slices).astype(int), 0, params.slices - 1)
     body = (points[:, 2] < low + 0.93 * (high - low)) & (points[:, 2] > low)  # the lid is a disc, not a wall
     xy, member = points[body][:, :2], slice_index[body]
     origin = xy.mean(axis=0)
-    system = np.zeros((len(xy), 2 + _SLICES))
+    system = np.zeros((len(xy), 2 + params.slices))
     system[:, :2] = 2 * (xy - origin)
     system[np.arange(len(xy)), 2 + member] = 1.0
     target = ((xy - origin) ** 2).sum(axis=1)
     solution = np.linalg.lstsq(system, target, rcond=None)[0]
     centre = origin + solution[:2]
     distance = np.hypot(*(xy - centre).T)
-    filled = np.array([np.count_nonzero(member == k) >= 10 for k in range(_SLICES)])
+    filled = np.array([np.count_nonzero(member == k) >= 10 for k in range(params.slices)])
     if not filled.any():
         return None
-    median = np.array([np.median(distance[member == k]) if filled[k] else np.nan for k in range(_SLICES)])
-    middles = low + (np.arange(_SLICES) + 0.5) / _SLICES * (high - low)
+    median = np.array([np.median(distance[member == k]) if filled[k] else np.nan for k in range(params.slices)])
+    middles = low + (np.arange(params.slices) + 0.5) / params.slices * (high - low)
     radii = np.interp(middles, middles[filled], median[filled])
-    if radii.max() > _LARGEST_RADIUS_M:
+    if radii.max() > params.largest_radius_m:
         return None
     return Revolution(centre, middles, radii)
 
 
 def is_rounder_than_box(points: Points, revolution: Revolution) -> bool:
     """Whether the points are nearer to the revolution than to the rectangle around each slice of height."""
+    params = tuned(Params)
     low, high = np.percentile(points[:, 2], [1, 99])
-    member = np.clip(((points[:, 2] - low) / max(high - low, 1e-6) * _SLICES).astype(int), 0, _SLICES - 1)
+    member = np.clip(((points[:, 2] - low) / max(high - low, 1e-6) * params.slices).astype(int), 0, params.slices - 1)
     off_circle = float(np.median(np.abs(revolution.signed_distance(points))))
     return off_circle < min(0.8 * _off_rectangle(points[:, :2], member), 0.2 * float(revolution.radii_m.max()))
 
@@ -83,8 +92,9 @@ def best_mirror(occupied: np.ndarray, seen: np.ndarray, free: np.ndarray) -> int
 
 def _off_rectangle(xy: np.ndarray, member: np.ndarray) -> float:
     """Median distance of the points to the rectangle (own axes) around their slice."""
+    params = tuned(Params)
     distances = []
-    for k in range(_SLICES):
+    for k in range(params.slices):
         chosen = xy[member == k]
         if len(chosen) < 10:
             continue

@@ -1,13 +1,15 @@
 """Free-standing things: round or box-shaped where masks and depth agree that they are, else carved from free space."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, zip_longest
 from math import inf
 
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.cartons import carton_family
-from r2c2r_core.generate.consistency import COPIED_COST, JUDGES, disagreement, self_consistency
+from r2c2r_core.generate.consistency import Params as ConsistencyParams
+from r2c2r_core.generate.consistency import disagreement, self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hulls import carved_family
 from r2c2r_core.generate.hypothesis import Hypothesis
@@ -15,10 +17,17 @@ from r2c2r_core.generate.rounded import round_family
 from r2c2r_core.generate.seen import observe_thing
 from r2c2r_core.generate.symmetry import fit_revolution, is_rounder_than_box
 from r2c2r_core.generate.variation import Variation
-
-_LATHE_FIT, _CUBOID_FIT = 0.75, 0.8  # below it carving is tried: a lathe is compared with it, a box given up
+from r2c2r_core.tuning import param, tuned
 
 Family = tuple[Hypothesis, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a simple shape is good enough."""
+
+    lathe_fit: float = param(0.75, "score", "IoU below which carving is tried beside a body of revolution")
+    cuboid_fit: float = param(0.8, "score", "IoU below which a box is given up")
 
 
 def thing_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
@@ -40,13 +49,16 @@ def thing_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothe
 
 def _likeliest(lathe: Family, is_certain: bool, cuboid: Family, carved: Family, fit: Callable[[Hypothesis], float]) -> Family:
     """The clean family that fits well enough, else the better of a lathe and carving; a box where neither can be made."""
-    sure = [(fit(family[0]), family, least) for family, least in ((lathe, _LATHE_FIT), (cuboid, _CUBOID_FIT)) if family]
+    params = tuned(Params)
+    sure = [
+        (fit(family[0]), family, least) for family, least in ((lathe, params.lathe_fit), (cuboid, params.cuboid_fit)) if family
+    ]
     sure = [entry for entry in sure if entry[1] is cuboid or is_certain]
     if sure:
         best = max(sure, key=lambda entry: entry[0])
         if best[0] > best[2]:
             return best[1]
-    left = [(fit(carved[0]) - COPIED_COST, carved), *([(fit(lathe[0]), lathe)] if lathe else [])]
+    left = [(fit(carved[0]) - tuned(ConsistencyParams).copied_cost, carved), *([(fit(lathe[0]), lathe)] if lathe else [])]
     if cuboid and all(found == -inf for found, _ in left):
         return cuboid
     return max(left, key=lambda entry: entry[0])[1]
@@ -58,4 +70,6 @@ def _fit(evidence: Evidence, everything: Variation, hypothesis: Hypothesis) -> f
         shape = hypothesis.shape(everything)
     except GenerationFailed:
         return -inf
-    return 1.0 - disagreement(self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[:JUDGES]))
+    return 1.0 - disagreement(
+        self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[: tuned(ConsistencyParams).judges])
+    )

@@ -5,6 +5,7 @@ worktop is part of it. Depth tells both: pixels over the cap are as near as the 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,15 +14,22 @@ from r2c2r_core.generate.evidence import View
 from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_STEP_M = 0.003
-_HIGHEST = 0.35  # of the height: what may be missing above
-_LEAST_M = 0.006  # a shorter piece is within the masks' error
-_NOISE_M = 0.015  # of one depth pixel
-_CLEAR_M = 0.03  # behind the far rim: something else
-_LEAST_SEEN = 3  # pixels that know, of all views
-_FOOT, _BODY = 0.12, 0.35  # of the height: the foot, and the body above it
-_FLARE = 1.06
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What depth puts right of a mask."""
+
+    step_m: float = param(0.003, "m", "between places that are looked at", gt=0)
+    highest: float = param(0.35, "share", "of the height that may be missing above")
+    least_m: float = param(0.006, "m", "of a piece: a shorter one is within the masks' error")
+    noise_m: float = param(0.015, "m", "of one depth pixel")
+    clear_m: float = param(0.03, "m", "behind the far rim: something else")
+    least_seen: int = param(3, "count", "pixels that know, of all views")
+    foot: float = param(0.12, "share", "of the height that is the foot")
+    body: float = param(0.35, "share", "of the height up to which the body above the foot is looked at")
+    flare: float = param(1.06, "ratio", "of a foot's radius to the body's, from which it is a shadow")
 
 
 def with_true_ends(revolution: Revolution, points: Points, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
@@ -32,18 +40,19 @@ def with_true_ends(revolution: Revolution, points: Points, views: Sequence[View]
 
 def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
     """The body continued upwards for as long as most depth pixels on its axis are as near as the body."""
+    params = tuned(Params)
     bottom, top, widest = revolution.heights_m[0], revolution.heights_m[-1], float(revolution.radii_m.max())
-    heights = np.arange(top + _STEP_M / 2, top + _HIGHEST * (top - bottom), _STEP_M)
-    offsets = np.arange(0.0, widest + _STEP_M, _STEP_M)
+    heights = np.arange(top + params.step_m / 2, top + params.highest * (top - bottom), params.step_m)
+    offsets = np.arange(0.0, widest + params.step_m, params.step_m)
     counts = [_hits_and_known(revolution, heights, offsets, view, world_from_local) for view in views]
     hits, known = (np.sum(values, axis=0) for values in zip(*counts, strict=True))
-    solid = (known >= _LEAST_SEEN) & (hits > 0.5 * known)
+    solid = (known >= params.least_seen) & (hits > 0.5 * known)
     rows = int(np.argmin(np.append(solid[:, 0], False)))
-    if rows * _STEP_M < _LEAST_M or rows == len(heights):  # something stands behind it all the way up
+    if rows * params.step_m < params.least_m or rows == len(heights):  # something stands behind it all the way up
         return revolution
-    radii = offsets[np.argmin(np.column_stack([solid[:rows], np.zeros(rows, bool)]), axis=1) - 1] + _STEP_M / 2
+    radii = offsets[np.argmin(np.column_stack([solid[:rows], np.zeros(rows, bool)]), axis=1) - 1] + params.step_m / 2
     radii = np.minimum(np.full(rows, np.median(radii)), widest)
-    above, end = heights[:rows] - _STEP_M / 2, heights[rows - 1] + _STEP_M / 2
+    above, end = heights[:rows] - params.step_m / 2, heights[rows - 1] + params.step_m / 2
     return Revolution(
         revolution.centre,
         np.concatenate([revolution.heights_m, above[:1] + 1e-4, [end]]),
@@ -53,13 +62,14 @@ def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_
 
 def without_flared_foot(revolution: Revolution, points: Points) -> Revolution:
     """The foot no wider than the body above it, unless depth points lie that far out."""
+    params = tuned(Params)
     bottom, top = revolution.heights_m[0], revolution.heights_m[-1]
     share = (revolution.heights_m - bottom) / (top - bottom)
-    body = float(np.median(revolution.radii_m[(share > _FOOT) & (share < _BODY)]))
-    flared = (share < _FOOT) & (revolution.radii_m > _FLARE * body)
+    body = float(np.median(revolution.radii_m[(share > params.foot) & (share < params.body)]))
+    flared = (share < params.foot) & (revolution.radii_m > params.flare * body)
     if not flared.any():
         return revolution
-    low = points[points[:, 2] < bottom + _FOOT * (top - bottom)]
+    low = points[points[:, 2] < bottom + params.foot * (top - bottom)]
     out = np.hypot(*(low[:, :2] - revolution.centre).T) if len(low) else np.zeros(1)
     if float(np.median(out)) > (body + float(revolution.radii_m[flared].max())) / 2:
         return revolution
@@ -70,6 +80,7 @@ def _hits_and_known(
     revolution: Revolution, heights: np.ndarray, offsets: np.ndarray, view: View, world_from_local: Rigid3
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of the two depth pixels at each (height, distance to either side of the axis): how many lie on the body, or on either."""
+    params = tuned(Params)
     eye = world_from_local.inverse.apply(view.eye_world[None])[0]
     away = revolution.centre - eye[:2]
     away /= max(float(np.linalg.norm(away)), 1e-9)
@@ -81,7 +92,7 @@ def _hits_and_known(
     in_camera = (view.world_from_camera.inverse @ world_from_local).apply(places)
     depth, inside = sample_nearest(view.depth_m, project(in_camera, view.depth_camera))
     behind = np.where(inside & (depth > 0), depth, np.nan) - in_camera[:, 2]
-    hit = (behind > -2.0 * rim - _NOISE_M) & (behind < _NOISE_M)
-    clear = behind > _CLEAR_M
+    hit = (behind > -2.0 * rim - params.noise_m) & (behind < params.noise_m)
+    clear = behind > params.clear_m
     shape = (len(heights), 2, len(offsets))
     return hit.reshape(shape).sum(axis=1), (hit | clear).reshape(shape).sum(axis=1)

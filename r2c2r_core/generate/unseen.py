@@ -1,17 +1,27 @@
 """Colours for the texels that no frame shows."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Image, Points, Vector3
 from r2c2r_core.generate.charts import FRONT, Atlas
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_SHARE = 0.15  # of a side that must be seen before its own colours are used
-_BEFORE_FACE_M = 0.002
-_NEIGHBOURS = 4
-_MOST_KNOWN = 12_000
-_CELLS_A_REACH = 20  # colours fade over a reach: within a cell they hardly change
-_REACH = 0.15  # of the mesh's size: further from anything seen, the median colour is as good a guess
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Colours of what no frame shows."""
+
+    least_share: float = param(0.15, "share", "of a side that must be seen before its own colours are used")
+    before_face_m: float = param(0.002, "m", "before the front, from where a texel stands out")
+    neighbours: int = param(4, "count", "seen texels whose colours are blended", ge=2)
+    most_known: int = param(12_000, "count", "seen texels that are searched", ge=10)
+    cells_a_reach: int = param(20, "count", "cells to a reach: within one colours hardly change", ge=1)
+    reach: float = param(
+        0.15, "ratio", "to the mesh's size: further from anything seen, the median colour is as good a guess", gt=0
+    )
 
 
 def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.ndarray:
@@ -20,7 +30,7 @@ def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.nd
         return np.ones(len(seen), dtype=bool)
     total = np.bincount(atlas.chart, minlength=6)
     share = np.bincount(atlas.chart[seen], minlength=6) / np.maximum(total, 1)
-    return np.asarray((share > _LEAST_SHARE)[atlas.chart] | (atlas.chart == FRONT) | _stands_out(atlas, front_y_m))
+    return np.asarray((share > tuned(Params).least_share)[atlas.chart] | (atlas.chart == FRONT) | _stands_out(atlas, front_y_m))
 
 
 def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: float | None, eye_local: Vector3) -> Colours:
@@ -61,7 +71,7 @@ def spread_colours(texture: Image, atlas: Atlas) -> Image:
 
 def _stands_out(atlas: Atlas, front_y_m: float) -> np.ndarray:
     """Texels before the front face: a handle's sides go with the handle, not with the carcass."""
-    return np.asarray(atlas.points[:, 1] < front_y_m - _BEFORE_FACE_M)
+    return np.asarray(atlas.points[:, 1] < front_y_m - tuned(Params).before_face_m)
 
 
 def _mirrored(chosen: Points, points: Points, eye_local: Vector3) -> Points:
@@ -74,14 +84,15 @@ def _mirrored(chosen: Points, points: Points, eye_local: Vector3) -> Points:
 
 def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, points: Points, places: Points) -> None:
     """Fade the missing texels, in place, from the colours known nearest to their `places` to what they hold."""
+    params = tuned(Params)
     from scipy.spatial import cKDTree
 
     if len(missing) == 0:
         return
-    known = known[:: max(len(known) // _MOST_KNOWN, 1)]
-    reach = _REACH * float(np.linalg.norm(np.ptp(points, axis=0)))
-    asked, of_cell = _by_cell(places, reach / _CELLS_A_REACH)
-    found = cKDTree(points[known]).query(asked, k=min(_NEIGHBOURS, len(known)), distance_upper_bound=reach)
+    known = known[:: max(len(known) // params.most_known, 1)]
+    reach = params.reach * float(np.linalg.norm(np.ptp(points, axis=0)))
+    asked, of_cell = _by_cell(places, reach / params.cells_a_reach)
+    found = cKDTree(points[known]).query(asked, k=min(params.neighbours, len(known)), distance_upper_bound=reach)
     distance, neighbour = (values.reshape(len(asked), -1)[of_cell] for values in found)
     near = np.isfinite(distance)
     weight = np.where(near, 1.0 / np.maximum(distance, 1e-4), 0.0)

@@ -5,6 +5,7 @@ stands and how far it reaches is seen in the masks: beside the body, in the fram
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -17,16 +18,26 @@ from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.meshes import unite
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.tuning import param, tuned
 
-_WALL_M, _WALL_SHARE = 0.004, 0.2  # stoneware; never more than this share of the radius
-_FLOOR = 1.5  # walls thick
-_AZIMUTHS = 36
 _REACHES_M = np.arange(0.008, 0.06, 0.004)  # beyond the body: where a handle is looked for
-_SPREAD = 4  # azimuths to either side of the clearest that are averaged
-_BESIDE = 1.08  # of the radius: a place that a frame sees past the body
-_LEAST_VIEWS, _SHOWN = 3, 0.5
-_BAR_M, _BAR_SHARE = 0.009, 0.5  # how thick a handle's ring is; never more than this share of its radius
-_TALLEST = 0.36  # of the height: the radius of a handle's ring
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Mugs, bowls and pots."""
+
+    wall_m: float = param(0.004, "m", "thickness of the wall", source="stoneware")
+    wall_share: float = param(0.2, "share", "of the radius that a wall may take")
+    floor: float = param(1.5, "ratio", "of the floor's thickness to the wall's")
+    azimuths: int = param(36, "count", "directions in which a handle is looked for", ge=8)
+    spread: int = param(4, "count", "azimuths to either side of the clearest that are averaged")
+    beside: float = param(1.08, "ratio", "to the radius: a place that a frame sees past the body")
+    least_views: int = param(3, "count", "that may show a handle", ge=1)
+    shown: float = param(0.5, "share", "of those views that must")
+    bar_m: float = param(0.009, "m", "thickness of a handle's ring")
+    bar_share: float = param(0.5, "share", "of its ring's radius that it may take")
+    tallest: float = param(0.36, "share", "of the height: the radius of a handle's ring")
 
 
 class VesselHandle(NamedTuple):
@@ -38,9 +49,10 @@ class VesselHandle(NamedTuple):
 
 def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Points, Faces]:
     """The closed surface of the body with its hollow, and the handle as a ring through the wall."""
+    params = tuned(Params)
     bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
-    wall = min(_WALL_M, _WALL_SHARE * float(revolution.radii_m.min()))
-    floor = bottom + _FLOOR * wall
+    wall = min(params.wall_m, params.wall_share * float(revolution.radii_m.min()))
+    floor = bottom + params.floor * wall
     inside = revolution.heights_m > floor
     heights = np.concatenate([[floor], revolution.heights_m[inside], [top + wall]])
     radii = np.interp(heights, revolution.heights_m, revolution.radii_m) - wall
@@ -53,25 +65,28 @@ def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Po
 
 def find_handle(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> VesselHandle | None:
     """The direction in which most frames that look past the body show mask beside it; None where there is none."""
+    params = tuned(Params)
     shares = np.stack([_shown(revolution, azimuth, views, world_from_local) for azimuth in _azimuths()])
     near = shares[:, : len(_REACHES_M) // 3].mean(axis=1)
     if not np.isfinite(near).any():
         return None
     best = int(np.nanargmax(near))
-    if near[best] < _SHOWN or np.nanmedian(near) > 0.5 * near[best]:  # a mask wide all round is a mask too wide
+    if near[best] < params.shown or np.nanmedian(near) > 0.5 * near[best]:  # a mask wide all round is a mask too wide
         return None
-    reach = float(_REACHES_M[shares[best] >= _SHOWN].max(initial=_REACHES_M[0]))
-    beside = (best + np.arange(-_SPREAD, _SPREAD + 1)) % _AZIMUTHS
+    reach = float(_REACHES_M[shares[best] >= params.shown].max(initial=_REACHES_M[0]))
+    beside = (best + np.arange(-params.spread, params.spread + 1)) % params.azimuths
     middle = np.nan_to_num(near[beside]) @ np.exp(1j * _azimuths()[beside])
     return VesselHandle(float(np.angle(middle)), reach)
 
 
 def _azimuths() -> np.ndarray:
-    return np.arange(_AZIMUTHS) * 2 * np.pi / _AZIMUTHS
+    params = tuned(Params)
+    return np.arange(params.azimuths) * 2 * np.pi / params.azimuths
 
 
 def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_from_local: Rigid3) -> np.ndarray:
     """Per reach, the share of the frames that see past the body there whose mask holds the place; nan for too few frames."""
+    params = tuned(Params)
     bottom, top = revolution.heights_m[0], revolution.heights_m[-1]
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
     heights = bottom + np.array([0.45, 0.6, 0.75]) * (top - bottom)
@@ -82,14 +97,14 @@ def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_
     for view in views:
         eye = world_from_local.inverse.apply(view.eye_world[None])[0]
         towards = (revolution.centre - eye[:2]) / max(float(np.linalg.norm(revolution.centre - eye[:2])), 1e-9)
-        if abs(out @ [towards[1], -towards[0]]) * (radius + _REACHES_M[2]) < _BESIDE * radius:
+        if abs(out @ [towards[1], -towards[0]]) * (radius + _REACHES_M[2]) < params.beside * radius:
             continue
         camera_from_local = view.world_from_camera.inverse @ world_from_local
         pixels = project(camera_from_local.apply(np.array(places)), view.rgb_camera)
         pixels = pixels + _pose_error(view, project(camera_from_local.apply(body), view.rgb_camera))
         mask, inside = sample_nearest(view.mask, pixels)
         held.append((mask & inside).reshape(len(_REACHES_M), -1).any(axis=1))
-    return np.mean(held, axis=0) if len(held) >= _LEAST_VIEWS else np.full(len(_REACHES_M), np.nan)
+    return np.mean(held, axis=0) if len(held) >= params.least_views else np.full(len(_REACHES_M), np.nan)
 
 
 def _pose_error(view: View, body_px: np.ndarray) -> np.ndarray:
@@ -101,11 +116,12 @@ def _pose_error(view: View, body_px: np.ndarray) -> np.ndarray:
 
 def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
     """An upright ring whose outer edge is where the handle ends; its inner part is cut off by the hollow."""
+    params = tuned(Params)
     bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
     middle = 0.55 * top + 0.45 * bottom
     radius = float(np.interp(middle, revolution.heights_m, revolution.radii_m))
-    outer = min(_TALLEST * (top - bottom), radius)  # of a tall jug, a larger ring would come out on the other side
-    bar = min(_BAR_M, _BAR_SHARE * outer)
+    outer = min(params.tallest * (top - bottom), radius)  # of a tall jug, a larger ring would come out on the other side
+    bar = min(params.bar_m, params.bar_share * outer)
     stretch = max(1.0, (handle.reach_m / 2 + bar) / outer)  # of a flat pan, a round one would not touch the body
     centre = radius + max(handle.reach_m - stretch * outer, -0.4 * outer)
     disc, hole = (

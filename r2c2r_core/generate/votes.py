@@ -1,5 +1,6 @@
 """What the frames of a thing say of each voxel: seen as surface, seen free, or in no mask at all."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -10,9 +11,15 @@ from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
-_BLOCK = 4  # voxels, each way
-_OCCLUDER_GAP_M = 0.03  # depth this much nearer than a voxel belongs to something in front of it
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What frames say of voxels."""
+
+    block: int = param(4, "count", "voxels, each way, that are looked at as one first", ge=1)
+    occluder_gap_m: float = param(0.03, "m", "nearer than a voxel by more, depth belongs to something in front of it")
 
 
 class Votes(NamedTuple):
@@ -59,14 +66,15 @@ def grid_votes(
     world_from_local: Rigid3,
 ) -> Votes:
     """The same of a whole grid (last axis fastest); blocks that lie clearly outside the masks are not looked at in detail."""
+    params = tuned(Params)
     grid = centres_local.reshape(*shape, 3)
-    middles = grid[np.ix_(*[np.minimum(np.arange(0, n, _BLOCK) + _BLOCK // 2, n - 1) for n in shape])]
+    middles = grid[np.ix_(*[np.minimum(np.arange(0, n, params.block) + params.block // 2, n - 1) for n in shape])]
     reach = max(
-        _BLOCK * voxel_m, truncation
+        params.block * voxel_m, truncation
     )  # from a block's middle to its furthest voxel, and as far as anything is told apart
     away = _is_outside(world_from_local.apply(middles.reshape(-1, 3)), variation, truncation, reach).reshape(middles.shape[:3])
     for axis in range(3):
-        away = np.repeat(away, _BLOCK, axis=axis)
+        away = np.repeat(away, params.block, axis=axis)
     near = np.flatnonzero(~away[: shape[0], : shape[1], : shape[2]])
     known = collect_votes(world_from_local.apply(centres_local[near]), variation, truncation)
     votes = Votes(*(np.full(len(centres_local), value, np.float32) for value in (np.nan, truncation, 0.0, truncation)))
@@ -109,7 +117,7 @@ def _view_distances(
     nowhere = np.float32(-np.inf)
     through = np.where(inside & has_depth & (signed > truncation), signed, nowhere)
     beside_m = (outside_px - np.float32(0.5)) * z * np.float32(1.0 / view.rgb_camera.fx)
-    beside = np.where(in_image & (outside_px > 0.5) & has_depth & (signed > -_OCCLUDER_GAP_M), beside_m, nowhere)
+    beside = np.where(in_image & (outside_px > 0.5) & has_depth & (signed > -tuned(Params).occluder_gap_m), beside_m, nowhere)
     return signed, is_surface, np.maximum(through, beside), np.where(in_image, beside_m, np.float32(np.inf))
 
 

@@ -1,6 +1,7 @@
 """The whole recording as one surface: fusion of a spread subset of its frames, floating crumbs removed."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,10 +13,19 @@ from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.fusion import DepthView, Surface, fuse_depth
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
 
 _BLOCK_VOXELS = 8  # Open3D's VoxelBlockGrid allocates cubes of 8 x 8 x 8 voxels
-_OUTLIER_DEVIATIONS = 2.0
-_MOST_BLOCKS = 48_000  # 10 kB each with colour: 0.5 GB
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a room is fused."""
+
+    outlier_deviations: float = param(
+        2.0, "σ", "of the distances to neighbours, beyond which a point is an outlier", source="the paper's"
+    )
+    most_blocks: int = param(48_000, "count", "of 8 x 8 x 8 voxels", source="10 kB each with colour: 0.5 GB", ge=100)
 
 
 def fuse_frames(
@@ -77,7 +87,7 @@ def choose_grid(frames: Sequence[Frame], images: FrameImages, finest_m: float, c
         return Grid(finest_m, 1)
     # A surface one voxel thick also claims the blocks its truncation band reaches: about 2.2 times as many
     blocks = 2.2 * len(np.unique(np.concatenate(cells), axis=0))
-    for_memory = finest_m * np.sqrt(max(1.0, blocks / _MOST_BLOCKS))
+    for_memory = finest_m * np.sqrt(max(1.0, blocks / tuned(Params).most_blocks))
     voxel_m = float(np.clip(max(np.median(footprints), for_memory), finest_m, coarsest_m))
     return Grid(voxel_m, int(blocks * (finest_m / voxel_m) ** 2) + 1)
 
@@ -110,7 +120,7 @@ def drop_outliers(surface: Surface, neighbours: int) -> Surface:
         return surface
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(surface.vertices))
     kept = np.zeros(len(surface.vertices), bool)
-    kept[np.asarray(cloud.remove_statistical_outlier(neighbours, _OUTLIER_DEVIATIONS)[1])] = True
+    kept[np.asarray(cloud.remove_statistical_outlier(neighbours, tuned(Params).outlier_deviations)[1])] = True
     return _with_faces(surface, kept[surface.faces].all(axis=1))
 
 

@@ -1,6 +1,7 @@
 """Flying pixels that several frames agree on: nothing else stands where they hang, and others look right through them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -13,13 +14,28 @@ from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.ingest.store import write_depth
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
 
-_JUDGES = 6
-_LONGEST_AWAY, _KEPT = 60, 40  # frames
-_LEAST_APART_M, _MOST_APART_M, _MOST_TURN_DEG = 0.04, 0.5, 35.0  # nearer ones repeat the mistake, farther ones see other edges
-_LEAST_THROUGH = 4  # two or three also fall for the wobbling outline of a handle as a phone sees it
-_EDGE_PX = 3  # flying pixels lie at steps
-_STEP = 0.04  # of the depth: what counts as one
+_KEPT = 40  # depth images in memory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth pixels hang in the air."""
+
+    judges: int = param(6, "count", "frames that judge one", ge=1)
+    longest_away: int = param(60, "count", "frames from one to its judges")
+    least_apart_m: float = param(0.04, "m", "between cameras", source="nearer ones repeat the mistake")
+    most_apart_m: float = param(0.5, "m", "between cameras", source="farther ones see other edges")
+    most_turn_deg: float = param(35.0, "deg", "between cameras")
+    least_through: int = param(
+        4,
+        "count",
+        "judges that look through it",
+        source="two or three also fall for the wobbling outline of a handle as a phone sees it",
+    )
+    edge_px: int = param(3, "px", "from a step, within which flying pixels lie", ge=1)
+    step: float = param(0.04, "ratio", "of a step to the depth")
 
 
 class Depths(NamedTuple):
@@ -76,7 +92,7 @@ def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame,
             & (greatest > z - tolerance)
             & (np.abs(seen.metres[row, column] - z) < 1.5 * tolerance)
         )
-    wrong = (through >= _LEAST_THROUGH) & (support == 0)
+    wrong = (through >= tuned(Params).least_through) & (support == 0)
     flying[rows[wrong], columns[wrong]] = True
     return flying
 
@@ -93,9 +109,10 @@ def read_depths(frame: Frame, images: FrameImages) -> Depths:
 
 def judges_of(frames: Sequence[Frame], position: int) -> list[int]:
     """Positions of the frames that see what this one sees from a little aside; those near in time first."""
+    params = tuned(Params)
     me = frames[position].world_from_camera
     found: list[int] = []
-    for away in range(1, _LONGEST_AWAY):
+    for away in range(1, params.longest_away):
         for other in (position - away, position + away):
             if not 0 <= other < len(frames):
                 continue
@@ -103,17 +120,18 @@ def judges_of(frames: Sequence[Frame], position: int) -> list[int]:
             apart = float(np.linalg.norm(pose.translation - me.translation))
             cosine = float(pose.rotation[:, 2] @ me.rotation[:, 2])
             new = all(
-                np.linalg.norm(pose.translation - frames[k].world_from_camera.translation) > _LEAST_APART_M for k in found
+                np.linalg.norm(pose.translation - frames[k].world_from_camera.translation) > params.least_apart_m for k in found
             )
-            if _LEAST_APART_M < apart < _MOST_APART_M and cosine > np.cos(np.radians(_MOST_TURN_DEG)) and new:
+            if params.least_apart_m < apart < params.most_apart_m and cosine > np.cos(np.radians(params.most_turn_deg)) and new:
                 found.append(other)
-        if len(found) >= _JUDGES:
+        if len(found) >= params.judges:
             break
-    return found[:_JUDGES]
+    return found[: params.judges]
 
 
 def _beside_steps(depths: Depths) -> Mask:
+    params = tuned(Params)
     known = depths.metres > 0
-    step = known & ((depths.greatest > depths.least + 0.02 + _STEP * depths.metres) | ~depths.all_known)
-    size = 2 * _EDGE_PX - 1
+    step = known & ((depths.greatest > depths.least + 0.02 + params.step * depths.metres) | ~depths.all_known)
+    size = 2 * params.edge_px - 1
     return known & (cv2.dilate(step.astype(np.uint8), np.ones((size, size), np.uint8)) > 0)

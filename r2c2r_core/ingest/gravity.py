@@ -1,6 +1,7 @@
 """Which way is up, where the floor lies, how the room is turned, and its walls."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -11,12 +12,26 @@ from r2c2r_core.geometry.transforms import Rigid3, rotation_between
 from r2c2r_core.ingest.planes import Plane, SurfaceSample, find_planes
 from r2c2r_core.model.capture import Room, Wall
 from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.tuning import param, tuned
 
 _UP = np.array([0.0, 0.0, 1.0])
-_MOST_CORRECTION_DEG = 3.0  # of a file's gravity: the real kitchen's is off by 1.5 deg
-_LEAST_CORRECTION_DEG = 1.0  # a phone's gravity is better than fitted planes below this
-_ALIGNED_DEG = 4.0  # planes farther off than this are not meant to be level, upright or along the room
-_FLOOR_BELOW_CAMERA_M = 0.75  # nobody films from lower; keeps a table top from being the floor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a room is levelled."""
+
+    most_correction_deg: float = param(3.0, "deg", "of a file's gravity", source="the real kitchen's is off by 1.5 degrees")
+    least_correction_deg: float = param(
+        1.0, "deg", "below which a file's gravity stays", source="a phone's gravity is better than fitted planes"
+    )
+    aligned_deg: float = param(4.0, "deg", "planes farther off are not meant to be level, upright or along the room")
+    floor_below_camera_m: float = param(
+        0.75,
+        "m",
+        "height of the lowest camera over the floor",
+        source="nobody films from lower; keeps a table top from being the floor",
+    )
 
 
 class Levelled(NamedTuple):
@@ -94,13 +109,14 @@ def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple
 
 def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> float | None:
     """Height of the floor: the lowest level plane under the cameras with next to nothing beneath it."""
+    params = tuned(Params)
     camera_z = float(np.median(centres[:, 2]))
     level = [(float(np.median(p.points[:, 2])), p.area_m2) for p in planes if p.normal[2] > np.cos(np.radians(8.0))]
     for z, _ in sorted(level):
         # A floor bent by far, biased depth falls apart into several planes: the largest of them speaks for all
         height = max((other for other in level if abs(other[0] - z) < 0.06), key=lambda other: other[1])[0]
         beneath = float((points[:, 2] < height - 0.08).mean())
-        if camera_z - height > _FLOOR_BELOW_CAMERA_M and beneath < 0.03:
+        if camera_z - height > params.floor_below_camera_m and beneath < 0.03:
             return height
     return None
 
@@ -182,12 +198,13 @@ def _choose_up(
 
 def _corrected_up(planes: Sequence[Plane], file_up: Vector3) -> tuple[Vector3, Literal["file"], list[str]]:
     """The file's gravity, corrected a little where level planes agree on it."""
-    found = find_up(planes, file_up, _MOST_CORRECTION_DEG)
+    params = tuned(Params)
+    found = find_up(planes, file_up, params.most_correction_deg)
     level_m2 = sum(p.area_m2 for p in planes if abs(p.normal @ file_up) > np.cos(np.radians(8.0)))
     if found is None or found[1] > 1.5 or level_m2 < 0.3:
         return file_up, "file", []
     off_deg = float(np.degrees(np.arccos(np.clip(found[0] @ file_up, -1.0, 1.0))))
-    if not _LEAST_CORRECTION_DEG < off_deg <= _MOST_CORRECTION_DEG:
+    if not params.least_correction_deg < off_deg <= params.most_correction_deg:
         return file_up, "file", []
     return found[0], "file", [f"the recording's gravity was corrected by {off_deg:.1f} deg, as its level planes agree"]
 
@@ -236,14 +253,14 @@ def _up_spread_deg(planes: Sequence[Plane]) -> float | None:
     """Area-weighted rms angle by which nearly level and nearly upright planes miss it."""
     off_level = np.degrees([np.arccos(min(abs(float(p.normal[2])), 1.0)) for p in planes])
     off = np.minimum(off_level, np.abs(90.0 - off_level))
-    return _rms(off, np.array([p.area_m2 for p in planes]), off < _ALIGNED_DEG)
+    return _rms(off, np.array([p.area_m2 for p in planes]), off < tuned(Params).aligned_deg)
 
 
 def _yaw_spread_deg(planes: Sequence[Plane], yaw: float) -> float | None:
     """Area-weighted rms angle by which upright planes that nearly face along the yaw miss it."""
     upright = [p for p in planes if abs(p.normal[2]) < 0.15]
     off = np.degrees(_off_axis(np.array([np.arctan2(p.normal[1], p.normal[0]) for p in upright]), yaw))
-    return _rms(off, np.array([p.area_m2 for p in upright]), np.abs(off) < _ALIGNED_DEG)
+    return _rms(off, np.array([p.area_m2 for p in upright]), np.abs(off) < tuned(Params).aligned_deg)
 
 
 def _floor_spread_m(planes: Sequence[Plane]) -> float | None:

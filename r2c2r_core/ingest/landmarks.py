@@ -1,5 +1,6 @@
 """Points of a colour image that can be found again, with their depth, and the motion between two frames they tell."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -12,11 +13,19 @@ from r2c2r_core.geometry.descriptors import mutual_pairs
 from r2c2r_core.geometry.registration import DegenerateFitError, umeyama
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.tuning import param, tuned
 
-_WIDTH = 480  # pixels of the searched image: larger ones take longer and find no more that is found again
-_MOST = 600
-_RATIO = 0.8  # Lowe 2004
-_LEAST = 12  # agreeing landmarks: by chance a handful does
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a landmark is."""
+
+    width_px: int = param(
+        480, "px", "of the searched image", source="larger ones take longer and find no more that is found again", ge=64
+    )
+    most: int = param(600, "count", "landmarks of an image", ge=8)
+    ratio: float = param(0.8, "ratio", "of the nearest to the second nearest descriptor", source="Lowe 2004")
+    least: int = param(12, "count", "agreeing landmarks", source="by chance a handful does", ge=4)
 
 
 class Landmarks(NamedTuple):
@@ -35,14 +44,15 @@ class Motion(NamedTuple):
 
 def find_landmarks(frame: Frame, images: FrameImages, far_m: float) -> Landmarks:
     """The frame's landmarks within `far_m`."""
+    params = tuned(Params)
     grey = cv2.cvtColor(images.rgb(frame.index), cv2.COLOR_RGB2GRAY)
-    height = round(grey.shape[0] * _WIDTH / grey.shape[1])
-    small = cv2.resize(grey, (_WIDTH, height), interpolation=cv2.INTER_AREA)
-    found, descriptors = cv2.SIFT.create(nfeatures=_MOST, contrastThreshold=0.02).detectAndCompute(small, None)
+    height = round(grey.shape[0] * params.width_px / grey.shape[1])
+    small = cv2.resize(grey, (params.width_px, height), interpolation=cv2.INTER_AREA)
+    found, descriptors = cv2.SIFT.create(nfeatures=params.most, contrastThreshold=0.02).detectAndCompute(small, None)
     if not found:
         return Landmarks(np.zeros((0, 3)), np.zeros((0, 128), np.float32))
     camera = frame.depth_camera
-    uv = (np.array([p.pt for p in found]) + 0.5) * [camera.width / _WIDTH, camera.height / height]
+    uv = (np.array([p.pt for p in found]) + 0.5) * [camera.width / params.width_px, camera.height / height]
     depth, inside = sample_nearest(images.depth(frame.index).metres, uv)
     known = inside & (depth > 0) & (depth < far_m)
     root = np.sqrt(descriptors[known] / np.maximum(descriptors[known].sum(axis=1, keepdims=True), 1e-9))
@@ -51,8 +61,9 @@ def find_landmarks(frame: Frame, images: FrameImages, far_m: float) -> Landmarks
 
 def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator) -> Motion | None:
     """The rigid motion most of their common landmarks agree on; None when fewer than a dozen do."""
+    params = tuned(Params)
     there, here = _common(first, second)
-    if len(there) < _LEAST:
+    if len(there) < params.least:
         return None
     noise_m = 0.01 + 0.006 * first.points[there, 2] ** 2  # of one depth pixel of a Kinect, with the key point a pixel off
     fit = similarity_consensus(
@@ -61,7 +72,7 @@ def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator
         threshold=noise_m,
         rng=rng,
         scale_range=(0.97, 1.03),
-        minimum_inliers=_LEAST,
+        minimum_inliers=params.least,
     )
     if fit is None:
         return None
@@ -74,7 +85,8 @@ def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator
 
 def _common(first: Landmarks, second: Landmarks) -> tuple[np.ndarray, np.ndarray]:
     """Indices into both of landmarks that are each other's best match, clearly better than the next."""
-    if min(len(first.points), len(second.points)) < _LEAST:
+    params = tuned(Params)
+    if min(len(first.points), len(second.points)) < params.least:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    here, there = mutual_pairs(second.descriptors, first.descriptors, _RATIO)
+    here, there = mutual_pairs(second.descriptors, first.descriptors, params.ratio)
     return there, here

@@ -1,6 +1,7 @@
 """How much this recording's depth errs: each frame against the surface that all of them make."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
@@ -10,12 +11,25 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.tuning import param, tuned
 
-_FRAMES = 24  # spread over the recording: the figures of 24 and of all frames of the sample differ by less than 5 %
-_GROSS_M = 0.10  # further off than that is something else: what moved, or an edge seen past
-_LEAST_PIXELS = 2000  # fewer say nothing about how error grows with distance
-_BINS = 8  # of distance, each with as many pixels
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a recording's depth noise is estimated."""
+
+    frames: int = param(
+        24,
+        "count",
+        "spread over the recording",
+        source="the figures of 24 and of all frames of the sample differ by less than 5 %",
+        ge=1,
+    )
+    gross_m: float = param(0.10, "m", "further off is something else: what moved, or an edge seen past")
+    least_pixels: int = param(2000, "count", "fewer say nothing about how error grows with distance")
+    bins: int = param(8, "count", "of distance, each with as many pixels", ge=2)
 
 
 def estimate_depth_noise(frames: Sequence[Frame], images: FrameImages, vertices: Points, faces: Faces) -> DepthNoise:
@@ -24,15 +38,16 @@ def estimate_depth_noise(frames: Sequence[Frame], images: FrameImages, vertices:
     `vertices` (n, 3) in the frame that `world_from_camera` of the frames leads to. What is left of pose errors counts as
     noise, since whoever compares a frame with geometry from other frames meets both.
     """
-    chosen = frames[:: max(1, len(frames) // _FRAMES)]
+    params = tuned(Params)
+    chosen = frames[:: max(1, len(frames) // params.frames)]
     pairs = [_residuals(frame, images, vertices, faces) for frame in chosen]
     z, residual = (np.concatenate(part) if pairs else np.zeros(0) for part in zip(*pairs, strict=True))
-    if len(z) < _LEAST_PIXELS:
+    if len(z) < params.least_pixels:
         return DepthNoise()
-    order = np.array_split(np.argsort(z, kind="stable"), _BINS)
+    order = np.array_split(np.argsort(z, kind="stable"), params.bins)
     distance = np.array([np.median(z[part]) for part in order])
     sigma = np.array([_MAD_TO_SIGMA * np.median(np.abs(residual[part] - np.median(residual[part]))) for part in order])
-    (floor_m, per_m), _ = nnls(np.column_stack([np.ones(_BINS), distance]), sigma)
+    (floor_m, per_m), _ = nnls(np.column_stack([np.ones(params.bins), distance]), sigma)
     return DepthNoise(floor_m=float(floor_m), per_m=float(per_m))
 
 
@@ -43,7 +58,7 @@ def _residuals(frame: Frame, images: FrameImages, vertices: Points, faces: Faces
     nothing = np.zeros((len(vertices), 3), np.float32)
     model = rasterize(vertices, faces, nothing, camera, frame.world_from_camera.inverse).depth_m
     off = depth.metres - model
-    known = depth.valid & _smooth(model, camera) & (np.abs(off) < _GROSS_M)
+    known = depth.valid & _smooth(model, camera) & (np.abs(off) < tuned(Params).gross_m)
     return model[known].astype(np.float64), off[known].astype(np.float64)
 
 

@@ -15,15 +15,28 @@ from r2c2r_core.ingest.overlap import SmallView, agreement, overlaps, small_view
 from r2c2r_core.ingest.poses import SettledPoses, bring_together, carried, median_gap, overlapping_pairs
 from r2c2r_core.model.capture import Frame, FrameImages, PoseEvidence
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
 
-_AGREEING = 0.7  # share of the common surface that must coincide: right motions reach 0.75 to 0.95
-_RETURN_M, _RETURN_DEG = 0.015, 0.7  # how near there and back must end where it began; wrong motions end centimetres off
-_KEY_OVERLAP = 0.6  # a frame that shares less than this with its keyframe becomes the next one
-_LOOP_LANDMARKS = 20
-_MOST_LOOP_KEYS = 60  # every two of them are compared, at about 10 ms
-_PAIR_REACHES_M = (0.08, 0.05, 0.03)
-_LOOSE_M, _LOOSE_DEG = 0.01, 0.5  # how far the depth may move a motion told by landmarks, one sigma
-_LEAST_FRAMES, _LEAST_SHARE = 5, 0.5
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Poses of a recording that has none."""
+
+    agreeing: float = param(0.7, "share", "of the common surface that must coincide", source="right motions reach 0.75 to 0.95")
+    key_overlap: float = param(0.6, "share", "below which a frame becomes the next keyframe")
+    loop_landmarks: int = param(20, "count", "that close a loop")
+    most_loop_keys: int = param(60, "count", "every two of them are compared", source="at about 10 ms", ge=2)
+    pair_reaches_m: tuple[float, float, float] = param(
+        (0.08, 0.05, 0.03), "m", "within which points of two frames are matched, round by round"
+    )
+    return_m: float = param(
+        0.015, "m", "how near there and back must end where it began", source="wrong motions end centimetres off"
+    )
+    return_deg: float = param(0.7, "deg", "how near there and back must end where it began")
+    loose_m: float = param(0.01, "m", "how far the depth may move a motion told by landmarks, one sigma", gt=0)
+    loose_deg: float = param(0.5, "deg", "how far the depth may turn a motion told by landmarks, one sigma", gt=0)
+    least_frames: int = param(5, "count", "that are placed")
+    least_share: float = param(0.5, "share", "of the frames that are placed")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,10 +61,11 @@ def estimate_poses(
     frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
 ) -> SettledPoses:
     """Poses by RGB-D odometry. A recording with breaks is cut to its longest stretch; raises CaptureError below half of it."""
+    params = tuned(Params)
     rng = np.random.default_rng(0)
     track = max(_tracks(frames, images, far_m, rng, progress.part(0.0, 0.7)), key=lambda t: len(t.poses))
     count = len(track.poses)
-    if count < max(_LEAST_FRAMES, _LEAST_SHARE * len(frames)):
+    if count < max(params.least_frames, params.least_share * len(frames)):
         raise CaptureError(
             f"no poses in the recording, and only {count} of {len(frames)} frames could be tracked in one piece",
             hint="record with tracking on, or move slower and keep textured things in view",
@@ -64,7 +78,7 @@ def estimate_poses(
     chosen = [views[f.index] for f in keyframes]
     start = [f.world_from_camera for f in keyframes]
     near, loops = overlapping_pairs(overlaps(chosen, start))
-    moved = bring_together(chosen, start, [*near, *loops], step_m=_LOOSE_M, step_deg=_LOOSE_DEG)
+    moved = bring_together(chosen, start, [*near, *loops], step_m=params.loose_m, step_deg=params.loose_deg)
     gap_m = median_gap(chosen, moved, loops or near)
     notices = ["the recording has no poses; they were estimated from its images and depth"]
     if count < len(frames):
@@ -79,6 +93,7 @@ def _tracks(
     frames: Sequence[Frame], images: FrameImages, far_m: float, rng: np.random.Generator, progress: Progress
 ) -> list[_Track]:
     """Stretches of frames that could be tracked without a gap."""
+    params = tuned(Params)
     tracks: list[_Track] = []
     for position, frame in enumerate(frames):
         progress.at(position / len(frames), f"tracking frame {position + 1}/{len(frames)}")
@@ -92,7 +107,7 @@ def _tracks(
         track.poses.append(pose)
         key = track.keys[-1]
         shared = agreement(track.sights[key].view, sight.view, track.poses[key].inverse @ pose)
-        if shared.seen < _KEY_OVERLAP:
+        if shared.seen < params.key_overlap:
             track.keys.append(len(track.poses) - 1)
     return tracks
 
@@ -116,16 +131,17 @@ def _next_pose(track: _Track, sight: _Sight, images: FrameImages, rng: np.random
 
 def _confirmed(first: _Sight, second: _Sight, first_from_second: Rigid3) -> Rigid3 | None:
     """The motion, settled on the depth of both frames; None when their surfaces then do not coincide."""
+    params = tuned(Params)
     a, b = bring_together(
         [first.view, second.view],
         [Rigid3(), first_from_second],
         [(0, 1), (1, 0)],
-        reaches_m=_PAIR_REACHES_M,
-        step_m=_LOOSE_M,
-        step_deg=_LOOSE_DEG,
+        reaches_m=params.pair_reaches_m,
+        step_m=params.loose_m,
+        step_deg=params.loose_deg,
     )
     settled = a.inverse @ b
-    return settled if agreement(first.view, second.view, settled).coincide > _AGREEING else None
+    return settled if agreement(first.view, second.view, settled).coincide > params.agreeing else None
 
 
 def _dense_motion(first: _Sight, second: _Sight, images: FrameImages, guess: Rigid3) -> Rigid3 | None:
@@ -133,13 +149,14 @@ def _dense_motion(first: _Sight, second: _Sight, images: FrameImages, guess: Rig
 
     Plain surfaces fit wherever they are slid to, so coinciding depth alone proves nothing here.
     """
+    params = tuned(Params)
     there = _rgbd_odometry(first.frame, second.frame, images, guess)
     back = _rgbd_odometry(second.frame, first.frame, images, guess.inverse)
     if there is None or back is None:
         return None
     missed = there @ back
     turned_deg = np.degrees(np.arccos(np.clip((np.trace(missed.rotation) - 1.0) / 2.0, -1.0, 1.0)))
-    if np.linalg.norm(missed.translation) > _RETURN_M or turned_deg > _RETURN_DEG:
+    if np.linalg.norm(missed.translation) > params.return_m or turned_deg > params.return_deg:
         return None
     return _confirmed(first, second, there)
 
@@ -182,6 +199,7 @@ def _rgbd(frame: Frame, images: FrameImages) -> Any:
 
 def _close_loops(track: _Track, rng: np.random.Generator) -> list[Rigid3]:
     """The track's poses after its keyframes were held together by every loop that landmarks and depth confirm."""
+    params = tuned(Params)
     import open3d as o3d
 
     registration: Any = o3d.pipelines.registration
@@ -193,12 +211,12 @@ def _close_loops(track: _Track, rng: np.random.Generator) -> list[Rigid3]:
         motion = track.poses[keys[i]].inverse @ track.poses[keys[i + 1]]
         graph.edges.append(_edge(i + 1, i, motion.matrix, uncertain=False))
     loops = 0
-    step = -(-len(keys) // _MOST_LOOP_KEYS)
+    step = -(-len(keys) // params.most_loop_keys)
     for i in range(0, len(keys), step):
         for j in range(i + max(2, step), len(keys), step):
             first, second = track.sights[keys[i]], track.sights[keys[j]]
             told = motion_between(first.landmarks, second.landmarks, rng)
-            if told is None or told.agreeing < _LOOP_LANDMARKS:
+            if told is None or told.agreeing < params.loop_landmarks:
                 continue
             settled = _confirmed(first, second, told.first_from_second)
             if settled is not None:

@@ -11,11 +11,19 @@ from r2c2r_core.arrays import DepthMetres, Points
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_nearest, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.tuning import param, tuned
 
-_WIDTH = 128  # pixels of a small view: a normal needs several LiDAR pixels, and a thousand points fix a pose
-_MATCHED = 1200  # points of a view that look for their like in another
-_PROBES = 80  # points that tell how much two views overlap
-_NORMAL_COS = float(np.cos(np.radians(35.0)))
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How frames are compared by their depth."""
+
+    width_px: int = param(
+        128, "px", "of a small view", source="a normal needs several LiDAR pixels, and a thousand points fix a pose", ge=16
+    )
+    matched: int = param(1200, "count", "points of a view that look for their like in another", ge=10)
+    probes: int = param(80, "count", "points that tell how much two views overlap", ge=4)
+    normal_cos: float = param(float(np.cos(np.radians(35.0))), "cosine", "between normals of one surface: 35 degrees")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,8 +53,9 @@ class Match(NamedTuple):
 
 def small_view(frame: Frame, images: FrameImages, far_m: float) -> SmallView:
     """The frame's depth, made small."""
+    params = tuned(Params)
     depth = images.depth(frame.index).metres
-    step = max(1, round(depth.shape[1] / _WIDTH))
+    step = max(1, round(depth.shape[1] / params.width_px))
     nearby = np.where(depth < far_m, depth, np.float32(0))
     small = _smoothed(nearby[step // 2 :: step, step // 2 :: step])
     full = frame.depth_camera
@@ -63,7 +72,7 @@ def small_view(frame: Frame, images: FrameImages, far_m: float) -> SmallView:
     points = depth_points(small, camera)
     normals = _normals(points, small)
     usable = np.flatnonzero(normals.any(axis=2).ravel())
-    chosen = usable[np.linspace(0, len(usable) - 1, min(_MATCHED, len(usable))).astype(int)] if len(usable) else usable
+    chosen = usable[np.linspace(0, len(usable) - 1, min(params.matched, len(usable))).astype(int)] if len(usable) else usable
     return SmallView(
         camera=camera,
         depth_m=small,
@@ -75,12 +84,13 @@ def small_view(frame: Frame, images: FrameImages, far_m: float) -> SmallView:
 
 def overlaps(views: Sequence[SmallView], poses: Sequence[Rigid3]) -> np.ndarray:
     """Share (n, n) of view i's points that view j sees too, within 20 cm, under the given poses."""
+    params = tuned(Params)
     shares = np.zeros((len(views), len(views)))
     inverses = [p.inverse for p in poses]
     for i, view in enumerate(views):
-        if len(view.points) < _PROBES:
+        if len(view.points) < params.probes:
             continue
-        probes = poses[i].apply(view.points[:: len(view.points) // _PROBES])
+        probes = poses[i].apply(view.points[:: len(view.points) // params.probes])
         for j, other in enumerate(views):
             if i == j:
                 continue
@@ -104,7 +114,7 @@ def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_f
         gap = np.einsum("nd,nd->n", there - still, normals)
         apart = np.linalg.norm(there - still, axis=1)
     facing = world_from_second.rotation.T @ world_from_first.rotation
-    agree = np.einsum("nd,nd->n", first.point_normals @ facing.T, normals) > _NORMAL_COS
+    agree = np.einsum("nd,nd->n", first.point_normals @ facing.T, normals) > tuned(Params).normal_cos
     ok = inside & (measured > 0) & (there[:, 2] > 0.05) & agree & (np.abs(gap) < reach_m) & (apart < 2.0 * reach_m + 0.05)
     sigma = 0.004 + 0.002 * measured[ok] ** 2  # of fused Kinect and LiDAR depth
     robust = 1.0 / (1.0 + (gap[ok] / np.maximum(2.0 * sigma, 0.3 * reach_m)) ** 2) ** 2  # Geman-McClure

@@ -6,9 +6,17 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.ingest.cloud import face_areas
+from r2c2r_core.tuning import param, tuned
 
-_TOLERANCE_M = 0.02  # fused Kinect and LiDAR surfaces wobble by about 1 cm
-_NORMAL_COS = float(np.cos(np.radians(25.0)))
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a large plane is."""
+
+    tolerance_m: float = param(
+        0.02, "m", "off it, within which surface is its", source="fused Kinect and LiDAR surfaces wobble by about 1 cm", gt=0
+    )
+    normal_cos: float = param(float(np.cos(np.radians(25.0))), "cosine", "between normals of one plane: 25 degrees")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,6 +56,7 @@ def find_planes(
     sample: SurfaceSample, rng: np.random.Generator, *, smallest_m2: float = 0.15, most: int = 30, tries: int = 150
 ) -> tuple[Plane, ...]:
     """The largest planes, biggest first: RANSAC from single oriented points, each refined by least squares."""
+    params = tuned(Params)
     left = np.arange(len(sample.points))
     planes: list[Plane] = []
     while len(planes) < most and len(left) * sample.area_each_m2 >= smallest_m2:
@@ -55,22 +64,23 @@ def find_planes(
         seeds = rng.choice(len(left), min(tries, len(left)), replace=False)
         judges = rng.choice(len(left), min(3000, len(left)), replace=False)
         distance = np.abs(points[judges] @ normals[seeds].T - np.einsum("nd,nd->n", points[seeds], normals[seeds]))
-        fits = (distance < 1.5 * _TOLERANCE_M) & (normals[judges] @ normals[seeds].T > _NORMAL_COS)
+        fits = (distance < 1.5 * params.tolerance_m) & (normals[judges] @ normals[seeds].T > params.normal_cos)
         best = seeds[int(np.argmax(fits.sum(axis=0)))]
         normal, offset = _refine(points, normals, normals[best], float(normals[best] @ points[best]))
-        on_it = _lies_on(points, normals, normal, offset, _TOLERANCE_M)
+        on_it = _lies_on(points, normals, normal, offset, params.tolerance_m)
         area = float(on_it.sum() * sample.area_each_m2)
         if area < smallest_m2:
             break
         planes.append(Plane(normal=normal, offset_m=offset, area_m2=area, points=points[on_it]))
-        left = left[~_lies_on(points, normals, normal, offset, 1.5 * _TOLERANCE_M)]
+        left = left[~_lies_on(points, normals, normal, offset, 1.5 * params.tolerance_m)]
     return tuple(sorted(planes, key=lambda p: -p.area_m2))
 
 
 def _refine(points: Points, normals: Points, normal: Vector3, offset: float) -> tuple[Vector3, float]:
     """Least squares over the inliers, four rounds with a shrinking band."""
+    params = tuned(Params)
     for band in (3.0, 2.0, 1.0, 1.0):
-        on_it = _lies_on(points, normals, normal, offset, band * _TOLERANCE_M)
+        on_it = _lies_on(points, normals, normal, offset, band * params.tolerance_m)
         if on_it.sum() < 8:
             break
         centre = points[on_it].mean(axis=0)
@@ -82,7 +92,7 @@ def _refine(points: Points, normals: Points, normal: Vector3, offset: float) -> 
 
 
 def _lies_on(points: Points, normals: Points, normal: Vector3, offset: float, band_m: float) -> np.ndarray:
-    return np.asarray((np.abs(points @ normal - offset) < band_m) & (normals @ normal > _NORMAL_COS))
+    return np.asarray((np.abs(points @ normal - offset) < band_m) & (normals @ normal > tuned(Params).normal_cos))
 
 
 def _smooth_normals(vertices: Points, faces: Faces) -> Points:

@@ -6,7 +6,7 @@ model that the drift has already doubled, and closes loops by itself.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,20 +17,51 @@ from r2c2r_core.ingest.cloud import spread_frames
 from r2c2r_core.ingest.overlap import SmallView, match, overlaps, small_view
 from r2c2r_core.model.capture import Frame, FrameImages, PoseEvidence
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
 
 Pair = tuple[int, int]
 
-_LEAST_OVERLAP = 0.3
-_LEAST_MATCHES = 50
-_LEAST_LOOPS = 8
-_HELD_OUT = 4  # every fourth loop pair judges and takes no part
-_LEAST_GAIN = 0.15  # exact poses gain 5 to 8 % (noise is fitted), a phone's 20 to 25 %, 3 cm of drift 50 % and more
-_MOST_GAP_M = 0.012  # after refining: depth noise leaves 3 to 5 mm, wrong axes or inverted poses 16 to 100
-_MOST_CHANGE = 0.2  # of the motion between keyframes: drift of 8 cm takes 0.02 to 0.12, wrong axes before one door 0.27
-_INDEPENDENT = 15.0  # points of a pair that tell something new: a sensor's error is the same over whole surfaces
-_STEP_M, _STEP_DEG = 0.002, 0.1  # how much a correction may change from one keyframe to the next, one sigma
-_STAY_M, _STAY_DEG = 0.3, 10.0  # keeps the whole from floating away
-_REACHES_M = (0.15, 0.12, 0.08, 0.06, 0.04, 0.04)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When poses are refined."""
+
+    least_overlap: float = param(0.3, "share", "of two views that are matched")
+    least_matches: int = param(50, "count", "points of a pair that tells something")
+    least_loops: int = param(8, "count", "pairs that see one place at different times")
+    held_out: int = param(4, "count", "every so manieth loop pair judges and takes no part", ge=2)
+    least_gain: float = param(
+        0.15,
+        "share",
+        "of the disagreement that must go",
+        source="exact poses gain 5 to 8 % (noise is fitted), a phone's 20 to 25 %, 3 cm of drift 50 % and more",
+    )
+    most_gap_m: float = param(
+        0.012,
+        "m",
+        "of disagreement that may stay",
+        source="depth noise leaves 3 to 5 mm, wrong axes or inverted poses 16 to 100",
+    )
+    most_change: float = param(
+        0.2,
+        "share",
+        "of the motion between keyframes that poses may change",
+        source="drift of 8 cm takes 0.02 to 0.12, wrong axes before one door 0.27",
+    )
+    independent: float = param(
+        15.0,
+        "count",
+        "points of a pair that tell something new",
+        source="a sensor's error is the same over whole surfaces",
+        gt=0,
+    )
+    step_m: float = param(0.002, "m", "how much a correction may change from one keyframe to the next, one sigma", gt=0)
+    step_deg: float = param(0.1, "deg", "how much a correction may turn from one keyframe to the next, one sigma", gt=0)
+    stay_m: float = param(0.3, "m", "keeps the whole from floating away, one sigma", gt=0)
+    stay_deg: float = param(10.0, "deg", "keeps the whole from floating away, one sigma", gt=0)
+    reaches_m: tuple[float, float, float, float, float, float] = param(
+        (0.15, 0.12, 0.08, 0.06, 0.04, 0.04), "m", "within which points of two frames are matched, round by round"
+    )
 
 
 class SettledPoses(NamedTuple):
@@ -45,13 +76,14 @@ def refine_poses(
     frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
 ) -> SettledPoses:
     """Poses moved to agree with the depth where that clearly helps pairs which had no part in it; else the given ones."""
+    params = tuned(Params)
     keyframes = spread_frames(frames, most_keyframes)
     views = [small_view(f, images, far_m) for f in progress.each(keyframes, "checking the poses, frame")]
     given = [f.world_from_camera for f in keyframes]
     near, loops = overlapping_pairs(overlaps(views, given))
-    if len(loops) < _LEAST_LOOPS:
+    if len(loops) < params.least_loops:
         return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=None, gap_m=None), ())
-    judges = loops[::_HELD_OUT]
+    judges = loops[:: params.held_out]
     moved = bring_together(views, given, [*near, *(p for p in loops if p not in set(judges))])
     moved = _held_level(given, moved)
     before, after = median_gap(views, given, judges), median_gap(views, moved, judges)
@@ -80,23 +112,29 @@ def _held_level(given: Sequence[Rigid3], moved: Sequence[Rigid3]) -> list[Rigid3
 
 def _is_drift(given: Sequence[Rigid3], moved: Sequence[Rigid3], before_m: float, after_m: float) -> bool:
     """Whether the correction clearly helps, ends in agreement, and is small against the motion: wrong conventions are not."""
+    params = tuned(Params)
     motion = changed = 0.0
     for (a, b), (c, d) in zip(pairwise(given), pairwise(moved), strict=True):
         step = a.inverse @ b
         motion += _size(step)
         changed += _size(step.inverse @ c.inverse @ d)
-    return after_m < (1.0 - _LEAST_GAIN) * before_m and after_m < _MOST_GAP_M and changed < _MOST_CHANGE * motion
+    return (
+        after_m < (1.0 - params.least_gain) * before_m and after_m < params.most_gap_m and changed < params.most_change * motion
+    )
 
 
 def overlapping_pairs(shares: np.ndarray, *, near: int = 3, each: int = 3) -> tuple[list[Pair], list[Pair]]:
     """Pairs of keyframes that follow each other, and pairs that meet again later; from the share (n, n) they overlap."""
+    params = tuned(Params)
     count = len(shares)
     apart = max(near + 1, count // 10)
     both = np.minimum(shares, shares.T)
-    following = [(i, i + k) for k in range(1, near + 1) for i in range(count - k) if both[i, i + k] > _LEAST_OVERLAP]
+    following = [(i, i + k) for k in range(1, near + 1) for i in range(count - k) if both[i, i + k] > params.least_overlap]
     loops: set[Pair] = set()
     for i in range(count):
-        again = [int(j) for j in np.argsort(-both[i], kind="stable") if abs(i - j) >= apart and both[i, j] > _LEAST_OVERLAP]
+        again = [
+            int(j) for j in np.argsort(-both[i], kind="stable") if abs(i - j) >= apart and both[i, j] > params.least_overlap
+        ]
         loops.update((min(i, j), max(i, j)) for j in again[:each])
     return following, sorted(loops)
 
@@ -106,21 +144,26 @@ def bring_together(
     poses: Sequence[Rigid3],
     pairs: Sequence[Pair],
     *,
-    reaches_m: Sequence[float] = _REACHES_M,
-    step_m: float = _STEP_M,
-    step_deg: float = _STEP_DEG,
+    reaches_m: Sequence[float] | None = None,
+    step_m: float | None = None,
+    step_deg: float | None = None,
 ) -> list[Rigid3]:
-    """Poses (world_from_camera) moved so that the views of `pairs` agree, by Gauss-Newton with a shrinking reach."""
+    """Poses (world_from_camera) moved so that the views of `pairs` agree, by Gauss-Newton with a shrinking reach.
+
+    What is not said of the reaches, and of how much a correction may change from pose to pose, is as for keyframes.
+    """
+    params = tuned(Params)
     count = len(views)
     links = np.diff(np.eye(count), axis=0)
-    prior = np.kron(links.T @ links, _precision(step_m, step_deg)) + np.kron(np.eye(count), _precision(_STAY_M, _STAY_DEG))
+    step = (params.step_m if step_m is None else step_m, params.step_deg if step_deg is None else step_deg)
+    prior = np.kron(links.T @ links, _precision(*step)) + np.kron(np.eye(count), _precision(params.stay_m, params.stay_deg))
     corrections = np.zeros((count, 6))  # metres, then a rotation vector about the camera's centre; both along world axes
     current = list(poses)
-    for reach_m in reaches_m:
+    for reach_m in params.reaches_m if reaches_m is None else reaches_m:
         matrix, pull = prior.copy(), -(prior @ corrections.ravel())
         for i, j in pairs:
             found = match(views[i], views[j], current[i], current[j], reach_m)
-            if len(found.weights) < _LEAST_MATCHES:
+            if len(found.weights) < params.least_matches:
                 continue
             slopes = np.hstack(
                 [
@@ -130,7 +173,7 @@ def bring_together(
                     -np.cross(found.still - current[j].translation, found.normals),
                 ]
             )
-            weighted = slopes * (found.weights * (_INDEPENDENT / len(found.weights)))[:, None]
+            weighted = slopes * (found.weights * (params.independent / len(found.weights)))[:, None]
             rows = np.r_[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
             matrix[np.ix_(rows, rows)] += weighted.T @ slopes
             pull[rows] -= weighted.T @ found.gaps_m
@@ -141,8 +184,9 @@ def bring_together(
 
 def median_gap(views: Sequence[SmallView], poses: Sequence[Rigid3], pairs: Sequence[Pair]) -> float | None:
     """Median over pairs of the median distance (m) between what both views show; None when too few points meet."""
-    found = [match(views[i], views[j], poses[i], poses[j], _REACHES_M[0]) for i, j in pairs]
-    gaps = [float(np.median(np.abs(m.gaps_m))) for m in found if len(m.weights) >= _LEAST_MATCHES]
+    params = tuned(Params)
+    found = [match(views[i], views[j], poses[i], poses[j], params.reaches_m[0]) for i, j in pairs]
+    gaps = [float(np.median(np.abs(m.gaps_m))) for m in found if len(m.weights) >= params.least_matches]
     return float(np.median(gaps)) if gaps else None
 
 

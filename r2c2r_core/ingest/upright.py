@@ -1,7 +1,7 @@
 """Images turned by quarter turns so that up is up: phones store what their sensor saw, however the person held them."""
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,9 +10,15 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.readers.images import colour_pixels
 from r2c2r_core.ingest.readers.protocol import Colour, RawDepth, RawFrame, Recording
+from r2c2r_core.tuning import param, tuned
 
-_CLEAR = 0.5  # least length of up in the image plane: looking straight down tells nothing
-_LEAST_SHARE = 0.6  # of the frames that tell
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When images are turned."""
+
+    clear: float = param(0.5, "share", "of up that lies in the image plane: looking straight down tells nothing")
+    least_share: float = param(0.6, "share", "of the frames that tell, which must agree")
 
 
 def upright(recording: Recording) -> Recording:
@@ -45,15 +51,16 @@ def upright(recording: Recording) -> Recording:
 
 def needed_turns(frames: tuple[RawFrame, ...], up_capture: Vector3 | None) -> int:
     """Quarter turns counter-clockwise, 0..3, that make most frames stand upright; 0 where gravity is not known."""
+    params = tuned(Params)
     poses = [frame.capture_from_camera for frame in frames if frame.capture_from_camera is not None]
     if up_capture is None or not poses:
         return 0
     ups = np.array([pose.rotation.T @ up_capture for pose in poses])[:, :2]
-    clear = ups[np.linalg.norm(ups, axis=1) > _CLEAR]
+    clear = ups[np.linalg.norm(ups, axis=1) > params.clear]
     # In the image, y points down: up along (0, -1) needs no turn, along (1, 0) one, along (0, 1) two, along (-1, 0) three
     votes = Counter(np.argmax(clear @ np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]).T, axis=1).tolist())
     turns, count = votes.most_common(1)[0] if votes else (0, 0)
-    return turns if count >= _LEAST_SHARE * len(clear) else 0
+    return turns if count >= params.least_share * len(clear) else 0
 
 
 def _turned(frame: RawFrame, turns: int) -> RawFrame:

@@ -1,13 +1,23 @@
 """Depth at colour resolution without a single invented surface: every pixel continues one measured surface or stays unknown."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image
+from r2c2r_core.tuning import param, tuned
 
-_SIGMA_COLOUR = 12.0  # grey levels: noise and texture of one surface against the step to another
-_SIGMA_PX = 0.9  # depth pixels
-_SAME_SURFACE = 0.02  # of the depth: neighbours closer than this along the viewing ray continue one surface
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth pixels continue one surface."""
+
+    sigma_colour: float = param(12.0, "grey", "noise and texture of one surface against the step to another", gt=0)
+    sigma_px: float = param(0.9, "px", "of depth, within which neighbours vote", gt=0)
+    same_surface: float = param(
+        0.02, "ratio", "of a step to the depth, along the viewing ray, within which neighbours continue one surface"
+    )
 
 
 def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
@@ -17,6 +27,7 @@ def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
     votes, by distance and by likeness of colour, for the surface it lies on, continued along its own slope; the surface
     with most votes wins and only its members are averaged. A mean of both sides of an edge would hang in the air.
     """
+    params = tuned(Params)
     height, width = guide.shape[:2]
     rows, columns = depth_m.shape
     fine = cv2.cvtColor(guide, cv2.COLOR_RGB2LAB).astype(np.float32)
@@ -35,7 +46,7 @@ def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
             away_x, away_y = (x - column)[None, :], (y - row)[:, None]
             value = inverse[place]
             likeness = ((fine - coarse[place]) ** 2).sum(axis=2)
-            votes = np.exp(-(away_x**2 + away_y**2) / (2 * _SIGMA_PX**2) - likeness / (2 * _SIGMA_COLOUR**2)) + 1e-9
+            votes = np.exp(-(away_x**2 + away_y**2) / (2 * params.sigma_px**2) - likeness / (2 * params.sigma_colour**2)) + 1e-9
             said.append(value + slope_x[place] * away_x + slope_y[place] * away_y)
             weight.append(np.where(value > 0, votes, np.float32(0)))
     best = _winning_surface(said, weight)
@@ -46,12 +57,13 @@ def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
 
 def _winning_surface(said: list[np.ndarray], weight: list[np.ndarray]) -> np.ndarray:
     """The mean inverse depth of the candidates that agree with the one most agree with."""
+    params = tuned(Params)
     most = np.zeros_like(said[0])
     best = np.zeros_like(said[0])
     for centre, own in zip(said, weight, strict=True):
         total, mean = np.zeros_like(best), np.zeros_like(best)
         for value, votes in zip(said, weight, strict=True):
-            counted = np.where(np.abs(value - centre) < _SAME_SURFACE * np.abs(centre), votes, np.float32(0))
+            counted = np.where(np.abs(value - centre) < params.same_surface * np.abs(centre), votes, np.float32(0))
             total += counted
             mean += counted * value
         better = (total > most) & (own > 0)

@@ -13,13 +13,15 @@ from r2c2r_core.generate.meshfile import missing_files, parts_of, read_parts
 from r2c2r_core.generate.repair import mended
 from r2c2r_core.generate.upload import read_upload
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, oriented_extents, volume
+from r2c2r_core.tuning import tuning
 from tests.core.generate.stub import textured_box
 
 
 @pytest.fixture(autouse=True)
-def small_textures(monkeypatch):
+def small_textures():
     """A new texture of 1024 px takes over a second, and most of these facts are about shape."""
-    monkeypatch.setattr(repair, "_TEXTURE_PX", 256)
+    with tuning({repair.Params: repair.Params(texture_px=256)}):
+        yield
 
 
 def repaired(*geometries):

@@ -16,6 +16,7 @@ from r2c2r_core.errors import BackendUnavailable, GenerationFailed  # noqa: E402
 from r2c2r_core.generate import repair, sam3d  # noqa: E402
 from r2c2r_core.generate.evidence import gather_evidence  # noqa: E402
 from r2c2r_core.geometry.meshes import box_mesh, is_watertight  # noqa: E402
+from r2c2r_core.tuning import tuning
 
 LOW, HIGH = np.array([-0.23, 0.0, 0.9]), np.array([0.23, 0.34, 1.18])  # the scene's microwave, in the world
 SCALE, TURN, SHIFT = 0.6, Rotation.from_euler("xyz", [0.3, -0.8, 1.2]), np.array([0.1, -0.2, 1.3])
@@ -85,7 +86,6 @@ class Config(dict):
 
 @pytest.fixture
 def package(monkeypatch, tmp_path):
-    monkeypatch.setattr(repair, "_TEXTURE_PX", 256)  # 1024 px take over a second
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "pipeline.yaml").write_text("")
     pipeline = FakePipeline()
@@ -98,7 +98,8 @@ def package(monkeypatch, tmp_path):
     for name, module in modules.items():
         monkeypatch.setitem(sys.modules, name, module)
     sam3d._pipeline.cache_clear()
-    yield types.SimpleNamespace(pipeline=pipeline, targets=targets, weights=tmp_path)
+    with tuning({repair.Params: repair.Params(texture_px=256)}):  # 1024 px take over a second
+        yield types.SimpleNamespace(pipeline=pipeline, targets=targets, weights=tmp_path)
     sam3d._pipeline.cache_clear()
 
 
