@@ -1,13 +1,21 @@
 """The expected IoU of a mask with the truth, from how far its border is usually off: the confidence of a mask."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_PX = 0.7  # no border is better than that
-_HIDDEN_COST = 0.25  # of a thing nearly all hidden, what shows is a guess
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How sure a mask is."""
+
+    least_px: float = param(0.7, "px", "no border is better than that")
+    hidden_cost: float = param(0.25, "share", "of the expected IoU: of a thing nearly all hidden, what shows is a guess")
 
 
 def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, border_m: float) -> float:
@@ -15,6 +23,7 @@ def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, b
 
     A border off by s pixels on one side changes about s times its length of the area; borders of the image are exact.
     """
+    params = tuned(Params)
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if len(rows) == 0:
         return 0.0
@@ -28,5 +37,5 @@ def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, b
     area = float(crop.sum())
     border = area - float((inner & crop).sum())
     distance = max(float(np.median(frame.world_from_camera.inverse.apply(points_world)[:, 2])), 0.1)
-    off_px = max(border_m * frame.rgb_camera.fx / distance, _LEAST_PX)
-    return area / (area + border * off_px) * (1 - _HIDDEN_COST * (1 - min(max(share, 0.0), 1.0)))
+    off_px = max(border_m * frame.rgb_camera.fx / distance, params.least_px)
+    return area / (area + border * off_px) * (1 - params.hidden_cost * (1 - min(max(share, 0.0), 1.0)))

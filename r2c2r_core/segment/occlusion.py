@@ -9,8 +9,14 @@ from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, ray_slopes
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_NEAR_M = 0.08
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which occluders are near."""
+
+    near_m: float = param(0.08, "m", "before the object, from where an occluder is near")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,13 +140,14 @@ def colour_gradient(rgb: Image, sigma: float = 1.0) -> np.ndarray:
 
 def project_polygon(corners_world: Points, frame: Frame, camera: Intrinsics) -> Pixels | None:
     """Outline in continuous pixels of a world polygon, clipped at the near plane; None when it is behind."""
+    params = tuned(Params)
     corners = frame.world_from_camera.inverse.apply(corners_world)
     clipped = []
     for current, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if current[2] >= _NEAR_M:
+        if current[2] >= params.near_m:
             clipped.append(current)
-        if (current[2] >= _NEAR_M) != (following[2] >= _NEAR_M):
-            t = (_NEAR_M - current[2]) / (following[2] - current[2])
+        if (current[2] >= params.near_m) != (following[2] >= params.near_m):
+            t = (params.near_m - current[2]) / (following[2] - current[2])
             clipped.append(current + t * (following - current))
     if len(clipped) < 3:
         return None

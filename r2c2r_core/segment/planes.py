@@ -10,14 +10,25 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.capture import SceneSurface
 from r2c2r_core.segment.surface import face_normals
+from r2c2r_core.tuning import param, tuned
 
-_CELL_M = 0.02  # of the support map
-_NORMAL_COS = np.cos(np.radians(22))  # TSDF normals of noisy scans scatter
-_YAW_BINS = 360
-_OFFSET_BIN_M = 0.005
-_THICKNESS_M = 0.025  # points this near a plane belong to it
-_BRIDGE_M = 0.10  # holes a thing in front leaves in a run
-_SMALLEST_M2 = 0.015  # the keypad of a microwave whose glass gives no depth
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a front's plane is."""
+
+    cell_m: float = param(0.02, "m", "side of the support map's cells", gt=0)
+    normal_cos: float = param(
+        float(np.cos(np.radians(22))),
+        "cosine",
+        "with a plane's direction: 22 degrees",
+        source="TSDF normals of noisy scans scatter",
+    )
+    yaw_bins: int = param(360, "count", "of a full turn", ge=36)
+    offset_bin_m: float = param(0.005, "m", "of offsets that are counted together", gt=0)
+    thickness_m: float = param(0.025, "m", "points this near a plane belong to it")
+    bridge_m: float = param(0.10, "m", "holes a thing in front leaves in a run")
+    smallest_m2: float = param(0.015, "m²", "of a plane", source="the keypad of a microwave whose glass gives no depth")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +77,7 @@ class PlaneRegion:
 
 def find_planes(surface: SceneSurface, camera_centres_world: Points) -> tuple[PlaneRegion, ...]:
     """All vertical flat regions, largest first. Deterministic and independent of any click."""
+    params = tuned(Params)
     centres, normals, areas = _vertical_faces(surface)
     if len(centres) < 50:
         return ()
@@ -74,7 +86,7 @@ def find_planes(surface: SceneSurface, camera_centres_world: Points) -> tuple[Pl
     rest = np.ones(len(centres), bool)
     for region in regions:
         off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
-        rest &= ~((off < 0.015) & (normals @ region.outward > _NORMAL_COS) & region.supports(centres, 0.02))
+        rest &= ~((off < 0.015) & (normals @ region.outward > params.normal_cos) & region.supports(centres, 0.02))
     if rest.sum() > 50:
         regions += _regions(centres[rest], normals[rest], areas[rest])
     regions = [region for region in regions if _faces_cameras(region, camera_centres_world)]
@@ -82,12 +94,13 @@ def find_planes(surface: SceneSurface, camera_centres_world: Points) -> tuple[Pl
 
 
 def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneRegion]:
+    params = tuned(Params)
     regions: list[PlaneRegion] = []
     for yaw in _dominant_yaws(normals, areas):
         outward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-        aligned = normals @ outward > _NORMAL_COS
+        aligned = normals @ outward > params.normal_cos
         for offset in _peaks(centres[aligned] @ outward, areas[aligned]):
-            member = aligned & (np.abs(centres @ outward - offset) < _THICKNESS_M)
+            member = aligned & (np.abs(centres @ outward - offset) < params.thickness_m)
             regions += _split(centres[member], areas[member], outward)
     return regions
 
@@ -142,62 +155,66 @@ def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
 
 def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
     """Peaks of the area histogram over yaw."""
+    params = tuned(Params)
     yaw = np.arctan2(normals[:, 1], normals[:, 0]) % (2 * np.pi)
-    bins = np.bincount((yaw / (2 * np.pi) * _YAW_BINS).astype(int) % _YAW_BINS, areas, _YAW_BINS)
+    bins = np.bincount((yaw / (2 * np.pi) * params.yaw_bins).astype(int) % params.yaw_bins, areas, params.yaw_bins)
     smooth = ndimage.gaussian_filter1d(bins, 3.0, mode="wrap")
-    peaks = [i for i in range(_YAW_BINS) if smooth[i] == smooth[np.arange(i - 8, i + 9) % _YAW_BINS].max()]
+    peaks = [i for i in range(params.yaw_bins) if smooth[i] == smooth[np.arange(i - 8, i + 9) % params.yaw_bins].max()]
     enough = max(0.02 * smooth.max(), 1e-4)
-    return [(i + 0.5) / _YAW_BINS * 2 * np.pi for i in sorted(peaks, key=lambda i: -smooth[i]) if smooth[i] > enough][:12]
+    return [(i + 0.5) / params.yaw_bins * 2 * np.pi for i in sorted(peaks, key=lambda i: -smooth[i]) if smooth[i] > enough][:12]
 
 
 def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
     """Offsets along a normal where area piles up, at least 3 cm apart."""
+    params = tuned(Params)
     if len(offsets) == 0:
         return []
     low = offsets.min() - 0.05
-    bins = np.bincount(((offsets - low) / _OFFSET_BIN_M).astype(int), areas)
+    bins = np.bincount(((offsets - low) / params.offset_bin_m).astype(int), areas)
     smooth = ndimage.gaussian_filter1d(np.pad(bins, 12), 2.0)
-    radius = round(0.03 / _OFFSET_BIN_M)
+    radius = round(0.03 / params.offset_bin_m)
     highest = ndimage.maximum_filter1d(smooth, 2 * radius + 1)
     peaks = np.flatnonzero((smooth == highest) & (smooth > 0.004))
-    return [low + (i - 12 + 0.5) * _OFFSET_BIN_M for i in peaks]
+    return [low + (i - 12 + 0.5) * params.offset_bin_m for i in peaks]
 
 
 def _split(centres: Points, areas: np.ndarray, outward: Vector3) -> list[PlaneRegion]:
     """Connected parts of one plane."""
+    params = tuned(Params)
     rotation = front_rotation(outward)
     u, z = centres @ rotation[:, 0], centres[:, 2]
-    u0, z0 = u.min() - 2 * _CELL_M, z.min() - 2 * _CELL_M
-    column, row = ((u - u0) / _CELL_M).astype(int), ((z - z0) / _CELL_M).astype(int)
+    u0, z0 = u.min() - 2 * params.cell_m, z.min() - 2 * params.cell_m
+    column, row = ((u - u0) / params.cell_m).astype(int), ((z - z0) / params.cell_m).astype(int)
     occupied = np.zeros((row.max() + 3, column.max() + 3), np.uint8)
     occupied[row, column] = 1
-    bridged = cv2.morphologyEx(np.pad(occupied, 8), cv2.MORPH_CLOSE, _disk(_BRIDGE_M / _CELL_M / 2))[8:-8, 8:-8]
+    bridged = cv2.morphologyEx(np.pad(occupied, 8), cv2.MORPH_CLOSE, _disk(params.bridge_m / params.cell_m / 2))[8:-8, 8:-8]
     count, labels = cv2.connectedComponents(bridged, connectivity=4)
     regions = []
     for label in range(1, count):
         member = labels[row, column] == label
-        if areas[member].sum() > _SMALLEST_M2:
+        if areas[member].sum() > params.smallest_m2:
             regions.append(_region(centres[member], areas[member], outward))
     return regions
 
 
 def _region(centres: Points, areas: np.ndarray, outward: Vector3) -> PlaneRegion:
+    params = tuned(Params)
     normal, anchor = _fit(centres, areas, outward)
     rotation = front_rotation(normal)
     local = (centres - anchor) @ rotation
-    near = np.abs(local[:, 1]) < _THICKNESS_M
+    near = np.abs(local[:, 1]) < params.thickness_m
     if near.sum() < 10:
         near[:] = True
     low, high = local[near][:, [0, 2]].min(axis=0), local[near][:, [0, 2]].max(axis=0)
-    low, high = np.floor(low / _CELL_M) * _CELL_M, np.ceil(high / _CELL_M) * _CELL_M
+    low, high = np.floor(low / params.cell_m) * params.cell_m, np.ceil(high / params.cell_m) * params.cell_m
     width, height = high - low
     middle = anchor + rotation @ np.array([(low + high)[0] / 2, 0.0, (low + high)[1] / 2])
-    shape = (round(height / _CELL_M), round(width / _CELL_M))
+    shape = (round(height / params.cell_m), round(width / params.cell_m))
     support = np.zeros(shape, bool)
-    row = ((high[1] - local[near, 2]) / _CELL_M).astype(int).clip(0, shape[0] - 1)
-    column = ((local[near, 0] - low[0]) / _CELL_M).astype(int).clip(0, shape[1] - 1)
+    row = ((high[1] - local[near, 2]) / params.cell_m).astype(int).clip(0, shape[0] - 1)
+    column = ((local[near, 0] - low[0]) / params.cell_m).astype(int).clip(0, shape[1] - 1)
     support[row, column] = True
-    return PlaneRegion(Rigid3(rotation, middle), float(width), float(height), support, _CELL_M, float(areas[near].sum()))
+    return PlaneRegion(Rigid3(rotation, middle), float(width), float(height), support, params.cell_m, float(areas[near].sum()))
 
 
 def _fit(centres: Points, areas: np.ndarray, outward: Vector3) -> tuple[Vector3, Vector3]:
@@ -224,6 +241,7 @@ def _faces_cameras(region: PlaneRegion, camera_centres_world: Points) -> bool:
 
 def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
     """Drop regions that a larger one already covers (neighbouring yaw peaks find the same run)."""
+    params = tuned(Params)
     kept: list[PlaneRegion] = []
     for region in regions:
         points = region.points
@@ -232,7 +250,7 @@ def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
             if other.outward @ region.outward < np.cos(np.radians(25)):
                 continue
             local = other.world_from_plane.inverse.apply(points)
-            inside = other.supports(points, 0.02) & (np.abs(local[:, 1]) < 0.8 * _THICKNESS_M)
+            inside = other.supports(points, 0.02) & (np.abs(local[:, 1]) < 0.8 * params.thickness_m)
             twin = twin or bool(inside.mean() > 0.6)
         if not twin:
             kept.append(region)

@@ -13,13 +13,20 @@ from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame, SceneSurface
+from r2c2r_core.tuning import param, tuned
 
 A = TypeVar("A")
 B = TypeVar("B")
 
-WIDTH_PX = 256  # of the drawn surface: the occluders that sensors miss are broad
 _PART_M = 0.5
 _NONE = np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How coarse the surface is drawn."""
+
+    width_px: int = param(256, "px", "of the drawn surface: the occluders that sensors miss are broad", ge=16)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +124,8 @@ def draw(parts: SurfaceParts, frame: Frame) -> np.ndarray:
 
 def drawn_size(camera: Intrinsics) -> tuple[int, int]:
     """Width and height of the drawn surface."""
-    return WIDTH_PX, max(1, round(WIDTH_PX * camera.height / camera.width))
+    params = tuned(Params)
+    return params.width_px, max(1, round(params.width_px * camera.height / camera.width))
 
 
 def in_threads(work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:

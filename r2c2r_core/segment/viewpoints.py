@@ -1,17 +1,26 @@
 """View selection: sharp, near frames in which nothing hides a point, spread over directions."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_HIDDEN_M = 0.08  # a click may lie this far behind the surface that the frame shows: handles, glass
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which frames show a click."""
+
+    hidden_m: float = param(0.08, "m", "behind the surface that the frame shows, within which a click may lie: handles, glass")
 
 
 def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
     """Frames in which nothing hides the point, spread over the directions they look from."""
+    params = tuned(Params)
     rated: list[tuple[float, Frame, float]] = []
     for frame, local in zip(scene.frames, scene.seen_from_all(point), strict=True):
         camera = frame.rgb_camera
@@ -23,7 +32,7 @@ def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
             continue
         seen = scene.filled_depth(frame.index)
         row, column = int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)
-        if scene.noise.occluded(seen[row, column], local[2], _HIDDEN_M):
+        if scene.noise.occluded(seen[row, column], local[2], params.hidden_m):
             continue
         away = point - frame.world_from_camera.translation
         rated.append((float(np.sqrt(max(frame.sharpness, 1e-3)) / local[2]), frame, float(np.arctan2(away[1], away[0]))))

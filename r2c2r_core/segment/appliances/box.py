@@ -1,5 +1,7 @@
 """An appliance's box: the front rectangle with the clearest edges, extruded by the depth its sides show; its masks."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -15,17 +17,27 @@ from r2c2r_core.segment.runs.lines import Evidence
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_CANDIDATES = 36  # lines tried a direction
-_SHADOW_M = 0.02  # lines this near above a support are its shadow's
-_COVERED = 1.2  # what depth saw of the plane weighs as much as all four edges: it belongs to the appliance
 _TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How an appliance's front is chosen among lines."""
+
+    candidates: int = param(36, "count", "lines tried a direction", ge=2)
+    shadow_m: float = param(0.02, "m", "above a support: lines this near are its shadow's")
+    covered: float = param(
+        1.2, "score", "worth of what depth saw of the plane, beside 1 for all four edges: it belongs to the appliance"
+    )
 
 
 def find_rectangle(
     run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, support_row: float | None = None
 ) -> Cell | None:
     """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support."""
+    params = tuned(Params)
     cell_m = run.grid.cell_m
     low, high = clicks.min(axis=0), clicks.max(axis=0)
     part = _component(run, clicks)
@@ -34,7 +46,7 @@ def find_rectangle(
     columns = _candidates(upright, low[1], high[1], 0.4 * kind.height.low / cell_m)
     rows = _candidates(level, low[0], high[0], 0.4 * kind.width.low / cell_m)
     if support_row is not None:
-        rows = np.append(rows[rows < support_row - _SHADOW_M / cell_m], support_row)
+        rows = np.append(rows[rows < support_row - params.shadow_m / cell_m], support_row)
     support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     best: tuple[float, Cell] | None = None
     for left in columns[columns < low[0]]:
@@ -56,7 +68,7 @@ def find_rectangle(
                 + _along_rows(horizontal, bottom, left, right, run.horizontal.block)
             ) / 4
             usual = np.exp(-0.5 * (kind.height.deviation(tall) ** 2 + kind.width.deviation(width) ** 2))
-            score = edges + 0.3 * usual + _COVERED * _covered(support, left, right, top, bottom)
+            score = edges + 0.3 * usual + params.covered * _covered(support, left, right, top, bottom)
             for column, row in refused:
                 score = score - 10.0 * ((left < column < right) & (top < row) & (row < bottom))
             i = int(np.argmax(score))
@@ -186,7 +198,7 @@ def _candidates(evidence: Evidence, low: float, high: float, reach: float) -> np
     profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), 1.2)[0]
     peak = (profile >= cv2.dilate(profile[None], np.ones((1, 7), np.uint8))[0] - 1e-6) & (profile > 0.2)
     positions = np.flatnonzero(peak)
-    order = np.argsort(-profile[positions], kind="stable")[:_CANDIDATES]
+    order = np.argsort(-profile[positions], kind="stable")[: tuned(Params).candidates]
     return np.sort(positions[order]) + 0.5
 
 

@@ -1,6 +1,6 @@
 """Clicks to an appliance: its front's plane where the click lies on the front, on glass without depth, on a side or the top."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,11 +22,23 @@ from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
+from r2c2r_core.tuning import param, tuned
 
-_LOW_M = 0.6  # lower appliances stand on worktops
-_OWN_WIDTH, _IN_A_RUN = 1.3, 2.5  # of the greatest width: of a plane that is its front, or that its front is part of
-_OFF_FRONT_M = 0.04  # behind its plane: a side or the top
-_PREPARED_MARGIN_M = 0.45  # planes that miss more of an appliance are many and small: cut when clicked
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which plane clicks on an appliance mean."""
+
+    low_m: float = param(0.6, "m", "greatest height of a kind, below which it stands on worktops")
+    off_front_m: float = param(0.04, "m", "behind its plane: a side or the top")
+    own_width: float = param(1.3, "ratio", "to the greatest width of a plane that is the appliance's front")
+    in_a_run: float = param(2.5, "ratio", "to the greatest width of a plane that its front is part of")
+    prepared_margin_m: float = param(
+        0.45,
+        "m",
+        "that a plane misses of an appliance and is prepared with",
+        source="planes that miss more are many and small: cut when clicked",
+    )
 
 
 def appliance_front(
@@ -92,7 +104,7 @@ def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, suppor
 
 def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Category) -> float | None:
     """The row of the run's grid at which what a small appliance stands on lies; None for tall ones and where none was seen."""
-    if kind.height.high > _LOW_M:
+    if kind.height.high > tuned(Params).low_m:
         return None
     support = support_height(prepared.scene, point[None], ThingConfig(radius_m=kind.width.usual / 2))
     if support is None:
@@ -111,11 +123,12 @@ def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
 
 def _on_plane(prepared: PreparedCapture, region: PlaneRegion, clicks: list[PromptPoint]) -> list[Vector3]:
     """Where clicks meet the front's plane; those whose depth shows a side or the top say nothing about the front."""
+    params = tuned(Params)
     points = []
     for click in clicks:
         seen = prepared.scene.pick(click.frame, click.x, click.y)
         has_depth = prepared.scene.has_depth(click.frame, click.x, click.y)
-        if has_depth and seen is not None and _behind(region, seen) > _OFF_FRONT_M:
+        if has_depth and seen is not None and _behind(region, seen) > params.off_front_m:
             continue
         origin, ray = prepared.scene.ray(click.frame, click.x, click.y)
         met = region_along((region,), origin, ray, 10.0, 1.0)
@@ -125,6 +138,7 @@ def _on_plane(prepared: PreparedCapture, region: PlaneRegion, clicks: list[Promp
 
 def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> tuple[PlaneRegion, Vector3] | None:
     """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
+    params = tuned(Params)
     scene = prepared.scene
     origin, ray = scene.ray(click.frame, click.x, click.y)
     point = scene.pick(click.frame, click.x, click.y)
@@ -137,7 +151,7 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
             return region, point
     farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
     # A plane no wider than such an appliance is rather its front than a run of cupboards that the ray passes over
-    for widest in (_OWN_WIDTH, _IN_A_RUN):
+    for widest in (params.own_width, params.in_a_run):
         planes = tuple(plane for plane in prepared.planes if plane.width_m < widest * kind.width.high)
         met = region_along(planes, origin, ray, farthest, kind.width.high)
         if met is not None:
@@ -147,11 +161,12 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
 
 def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
     """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
+    params = tuned(Params)
     planes = [
         plane
         for plane in prepared.planes
-        if plane.width_m < _OWN_WIDTH * kind.width.high
-        and _OFF_FRONT_M < _behind(plane, point) < kind.depth.usual + 0.1
+        if plane.width_m < params.own_width * kind.width.high
+        and params.off_front_m < _behind(plane, point) < kind.depth.usual + 0.1
         and plane.supports(point[None], 0.12)[0]
     ]
     return max(planes, key=lambda plane: _faced(prepared.scene, plane, point), default=None)
@@ -182,7 +197,8 @@ def _margin(region: PlaneRegion, kind: Category) -> float:
 
 def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
     """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
+    params = tuned(Params)
     kinds = [kind for kind in every_category() if kind.kind == "appliance"]
     larger = [kind for kind in kinds if region.width_m < kind.width.high and region.height_m < kind.height.high]
     margins = {_margin(region, kind) for kind in larger}
-    return tuple(sorted(margin for margin in margins if 0 < margin <= _PREPARED_MARGIN_M))
+    return tuple(sorted(margin for margin in margins if 0 < margin <= params.prepared_margin_m))

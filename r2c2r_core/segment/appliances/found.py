@@ -10,8 +10,14 @@ from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
 from r2c2r_core.segment.fronts.front import Front, front_corners, front_panel
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_BORDER_M = 0.009  # how far borders were off, on samples and the real kitchen
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well an appliance's borders are known."""
+
+    border_m: float = param(0.009, "m", "how far borders are off", source="measured on samples and the real kitchen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +33,7 @@ class FoundAppliance:
         """Its pixels; its door is not told open."""
         mask, share = appliance_mask(self.front, self.scene, frame)
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
-        return View(mask, expected_iou(mask, share, frame, corners, _BORDER_M))
+        return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m))
 
     def panel(self) -> FrontPanel | None:
         """The rectangle of its front and its handle."""

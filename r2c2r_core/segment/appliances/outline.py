@@ -5,7 +5,7 @@ edge. But its outline is an edge in every photograph, from wherever it is taken,
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -19,20 +19,32 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.fronts.front import Front, front_middle
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.viewpoints import best_views
+from r2c2r_core.tuning import param, tuned
 
-_SAMPLES = 48  # along an edge
-_NORMAL_PX = 1.5  # half the distance over which colours beside an edge are compared
-_LEAST_SIGHT = 0.08  # of the distance, that a camera must stand beyond a face's plane to see the face
-_LEAST_SHIFT_PX = 6.0  # by which an edge must move over the range: else the frame cannot tell
-_LEAST_FRAMES = 4
-_TOP_CLEAR, _BACK_CLEAR = 2.5, 3.0  # times the usual contrast at other places: a white oven before a white wall has no edge
-_PEAK_SHARE = 0.8  # of the highest contrast: places as good as it
-_MOST_CONTRAST = 15.0  # of one frame, times its usual
-_TOP_PEAK_M, _BACK_PEAK_M = 0.014, 0.045  # how far such places may lie from it: the back is seen at a slant
-_FRAMES = 16
-_TOP_REACH_M, _TOP_STEP_M, _DEPTH_STEP_M = 0.06, 0.003, 0.004
-_DEPTH_RANGE = (0.6, 1.4)  # of the usual depth
-_HIDDEN_M = 0.05  # depth nearer by more, beyond its noise, belongs to something in front
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How an appliance's top and back are found by colour."""
+
+    samples: int = param(48, "count", "along an edge", ge=4)
+    normal_px: float = param(1.5, "px", "half the distance over which colours beside an edge are compared", gt=0)
+    least_sight: float = param(0.08, "ratio", "to the distance, that a camera must stand beyond a face's plane to see the face")
+    least_shift_px: float = param(6.0, "px", "by which an edge must move over the range: else the frame cannot tell")
+    least_frames: int = param(4, "count", "that tell")
+    top_clear: float = param(
+        2.5, "ratio", "to the usual contrast at other places, of a top", source="a white oven before a white wall has no edge"
+    )
+    back_clear: float = param(3.0, "ratio", "to the usual contrast at other places, of a back")
+    peak_share: float = param(0.8, "share", "of the highest contrast: places as good as it")
+    top_peak_m: float = param(0.014, "m", "how far such places may lie from a top")
+    back_peak_m: float = param(0.045, "m", "how far such places may lie from a back", source="it is seen at a slant")
+    most_contrast: float = param(15.0, "ratio", "of one frame to its usual")
+    frames: int = param(16, "count", "that are looked at", ge=1)
+    top_reach_m: float = param(0.06, "m", "above and below the cut, where the top is looked for")
+    top_step_m: float = param(0.003, "m", "between heights that are looked at", gt=0)
+    depth_step_m: float = param(0.004, "m", "between depths that are looked at", gt=0)
+    depth_range: tuple[float, float] = param((0.6, 1.4), "ratio", "to the usual depth, least and most")
+    hidden_m: float = param(0.05, "m", "nearer by more, beyond its noise, depth belongs to something in front")
 
 
 class Photo(NamedTuple):
@@ -65,16 +77,20 @@ def body_of(front: Front) -> Body:
 
 def photos_of(front: Front, scene: Scene) -> list[Photo]:
     """Frames that show the middle of a front, from many directions."""
-    return [_photo(scene, frame) for frame in best_views(scene, front_middle(front), _FRAMES)]
+    params = tuned(Params)
+    return [_photo(scene, frame) for frame in best_views(scene, front_middle(front), params.frames)]
 
 
 def outlined(front: Front, photos: Sequence[Photo], usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
     """The front with its upper edge and its depth at their colour edges, where those are clear; and whether the depth was."""
+    params = tuned(Params)
     body = body_of(front)
     half_height = body.top_m
-    farthest = min(_DEPTH_RANGE[1] * usual_m, np.inf if wall_m is None else wall_m)
-    depths = np.arange(_DEPTH_RANGE[0] * usual_m, farthest, _DEPTH_STEP_M)
-    body, clear = outlined_body(body, photos, half_height + np.arange(-_TOP_REACH_M, _TOP_REACH_M, _TOP_STEP_M), depths)
+    farthest = min(params.depth_range[1] * usual_m, np.inf if wall_m is None else wall_m)
+    depths = np.arange(params.depth_range[0] * usual_m, farthest, params.depth_step_m)
+    body, clear = outlined_body(
+        body, photos, half_height + np.arange(-params.top_reach_m, params.top_reach_m, params.top_step_m), depths
+    )
     cell = front.cell
     moved = replace(cell, top=cell.top - (body.top_m - half_height) / front.run.grid.cell_m)
     return replace(front, cell=moved, depth_m=body.depth_m), clear
@@ -102,22 +118,25 @@ def _photo(scene: Scene, frame: Frame) -> Photo:
 
 def best_depth(body: Body, photos: Sequence[Photo], depths_m: np.ndarray) -> float | None:
     """The depth at which the edges of the back lie on colour edges; None where no frame or no edge tells."""
+    params = tuned(Params)
     contrasts = [_contrasts(photo, _back_edges(body, photo, depths_m)) for photo in photos]
-    return _clearest(contrasts, depths_m, _BACK_CLEAR, _BACK_PEAK_M)
+    return _clearest(contrasts, depths_m, params.back_clear, params.back_peak_m)
 
 
 def best_top(body: Body, photos: Sequence[Photo], tops_m: np.ndarray) -> float | None:
     """The height at which the edges of the top lie on colour edges; None where no frame or no edge tells."""
+    params = tuned(Params)
     contrasts = [_contrasts(photo, _top_edges(body, photo, tops_m)) for photo in photos]
-    return _clearest(contrasts, tops_m, _TOP_CLEAR, _TOP_PEAK_M)
+    return _clearest(contrasts, tops_m, params.top_clear, params.top_peak_m)
 
 
 def _back_edges(body: Body, photo: Photo, depths_m: np.ndarray) -> list[Points]:
     """The visible edges of the back at every depth: (candidates, samples, 3), world."""
+    params = tuned(Params)
     eye = _eye(body, photo)
-    along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    along = (np.arange(params.samples) + 0.5) / params.samples
     edges = []
-    reach = _LEAST_SIGHT * float(np.linalg.norm(eye))
+    reach = params.least_sight * float(np.linalg.norm(eye))
     for sign in (-1.0, 1.0):
         if sign * eye[0] - body.half_width_m > reach:
             z = body.bottom_m + (0.15 + 0.85 * along) * (body.top_m - body.bottom_m)  # the foot lies in shadow
@@ -130,10 +149,11 @@ def _back_edges(body: Body, photo: Photo, depths_m: np.ndarray) -> list[Points]:
 
 def _top_edges(body: Body, photo: Photo, tops_m: np.ndarray) -> list[Points]:
     """The edges of the top that are its outline, at every height: the front one from below, else the back and the sides'."""
+    params = tuned(Params)
     eye = _eye(body, photo)
-    along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    along = (np.arange(params.samples) + 0.5) / params.samples
     x, y = (2 * along - 1) * body.half_width_m, along * body.depth_m
-    reach = _LEAST_SIGHT * float(np.linalg.norm(eye))
+    reach = params.least_sight * float(np.linalg.norm(eye))
     from_above = eye[2] > body.top_m
     edges = [_line(body, x[None], body.depth_m if from_above else 0.0, tops_m[:, None])]
     for sign in (-1.0, 1.0):
@@ -158,6 +178,7 @@ def _contrasts(photo: Photo, edges: list[Points]) -> np.ndarray | None:
 
 
 def _contrast(photo: Photo, edge: Points) -> np.ndarray | None:
+    params = tuned(Params)
     in_camera = photo.world_from_camera.inverse.apply(edge.reshape(-1, 3))
     if in_camera[:, 2].min() < 0.1:
         return None
@@ -165,11 +186,11 @@ def _contrast(photo: Photo, edge: Points) -> np.ndarray | None:
     shift = np.linalg.norm(uv[-1] - uv[0], axis=1)
     inside = (uv > 4).all(axis=2) & (uv < [photo.camera.width - 4, photo.camera.height - 4]).all(axis=2)
     inside &= ~hidden(photo, uv, in_camera[:, 2].reshape(inside.shape))
-    if np.median(shift) < _LEAST_SHIFT_PX or inside.mean() < 0.7:
+    if np.median(shift) < params.least_shift_px or inside.mean() < 0.7:
         return None
     direction = uv[:, -1] - uv[:, 0]
     direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
-    normal = np.stack([-direction[:, 1], direction[:, 0]], axis=1)[:, None] * _NORMAL_PX
+    normal = np.stack([-direction[:, 1], direction[:, 0]], axis=1)[:, None] * params.normal_px
     sides = [_colours_at(photo.lab, uv + sign * normal) for sign in (-1.0, 1.0)]
     difference = np.linalg.norm(sides[1] - sides[0], axis=2)
     return np.asarray(np.where(inside, np.minimum(difference, 60.0), 0.0).sum(axis=1) / np.maximum(inside.sum(axis=1), 1))
@@ -181,7 +202,7 @@ def hidden(photo: Photo, uv_px: np.ndarray, z_m: np.ndarray) -> np.ndarray:
     row = np.clip(uv_px[..., 1] * rows / photo.camera.height, 0, rows - 1).astype(int)
     column = np.clip(uv_px[..., 0] * columns / photo.camera.width, 0, columns - 1).astype(int)
     seen = photo.depth_m[row, column]
-    return photo.noise.occluded(seen, z_m, _HIDDEN_M)
+    return photo.noise.occluded(seen, z_m, tuned(Params).hidden_m)
 
 
 def _colours_at(lab: Image, uv_px: np.ndarray) -> np.ndarray:
@@ -191,12 +212,13 @@ def _colours_at(lab: Image, uv_px: np.ndarray) -> np.ndarray:
 
 def _clearest(contrasts: list[np.ndarray | None], values_m: np.ndarray, clear: float, widest_m: float) -> float | None:
     """The value of the highest mean contrast over the frames, each by its own usual contrast; None for a blunt peak."""
+    params = tuned(Params)
     known = np.array([row / max(float(np.median(row)), 2.0) for row in contrasts if row is not None])
-    if len(known) < _LEAST_FRAMES:
+    if len(known) < params.least_frames:
         return None
-    mean = np.minimum(known, _MOST_CONTRAST).mean(axis=0)
+    mean = np.minimum(known, params.most_contrast).mean(axis=0)
     best = int(np.argmax(mean))
-    rivals = np.abs(values_m[mean > _PEAK_SHARE * mean[best]] - values_m[best])
+    rivals = np.abs(values_m[mean > params.peak_share * mean[best]] - values_m[best])
     if mean[best] < clear * np.median(mean) or rivals.max() > widest_m or best in (0, len(values_m) - 1):
         return None
     a, b, c = mean[best - 1 : best + 2]

@@ -10,14 +10,21 @@ from r2c2r_core.segment.fronts.front import Front, front_middle
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
+from r2c2r_core.tuning import param, tuned
 
-_SHELL_M = 0.05  # how far the rectangle may be off
-_FACING = 0.85  # cosine: normals of noisy scans scatter
-_LEAST_SHARE = 0.07  # of a face, that depth must have seen to measure anything by it
-_STRAY_M, _LEAST_NOISE_M = 0.008, 0.003  # of fused depth; it goes together over about _PATCH_M2
-_PATCH_M2 = 9e-4
-_SURE_RAD = np.radians(0.7)
-_MOST_RAD = np.radians(8)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a rectangle is squared with its body."""
+
+    stray_m: float = param(0.008, "m", "off a face, beyond which surface is something else", gt=0)
+    least_noise_m: float = param(0.003, "m", "of fused depth, at least", gt=0)
+    shell_m: float = param(0.05, "m", "how far the rectangle may be off")
+    facing: float = param(0.85, "cosine", "with a face's direction", source="normals of noisy scans scatter")
+    least_share: float = param(0.07, "share", "of a face that depth must have seen to measure anything by it")
+    patch_m2: float = param(9e-4, "m²", "over which the noise of fused depth goes together", gt=0)
+    sure_rad: float = param(float(np.radians(0.7)), "rad", "spread of a turn that is believed")
+    most_rad: float = param(float(np.radians(8)), "rad", "of a turn that is believed")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,28 +40,34 @@ class _Faces:
 
     def enough(self, width_m: float, height_m: float) -> bool:
         """Whether a good part of a face of that size was seen."""
-        return bool(self.areas.sum() > _LEAST_SHARE * width_m * height_m)
+        return bool(self.areas.sum() > tuned(Params).least_share * width_m * height_m)
 
 
 def squared(front: Front, scene: Scene) -> Front:
     """The front turned and its edges moved to where the body's faces are; as it was where depth saw none of them."""
+    params = tuned(Params)
     grid, cell = front.run.grid, front.cell
     middle = front_middle(front)
     centred = Rigid3(grid.world_from_plane.rotation, middle)
     half_w, half_h = cell.width * grid.cell_m / 2, cell.height * grid.cell_m / 2
-    reach = np.array([half_w + _SHELL_M, front.depth_m, half_h + _SHELL_M])
+    reach = np.array([half_w + params.shell_m, front.depth_m, half_h + params.shell_m])
     faces = _faces_inside(scene, centred, reach * [-1, 0, -1] - [0, 0.02, 0], reach)
     level = np.abs(faces.centres[:, 2]) < half_h - 0.02
     behind = (faces.centres[:, 1] > 0.03) & (faces.centres[:, 1] < front.depth_m)
     x, y = faces.centres[:, 0], faces.centres[:, 1]
-    face = faces.where((faces.normals[:, 1] < -_FACING) & (np.abs(y) < 0.02) & (np.abs(x) < half_w - 0.01) & level)
+    face = faces.where((faces.normals[:, 1] < -params.facing) & (np.abs(y) < 0.02) & (np.abs(x) < half_w - 0.01) & level)
     sides = {
-        sign: faces.where((sign * faces.normals[:, 0] > _FACING) & (np.abs(sign * x - half_w) < _SHELL_M) & behind & level)
+        sign: faces.where(
+            (sign * faces.normals[:, 0] > params.facing) & (np.abs(sign * x - half_w) < params.shell_m) & behind & level
+        )
         for sign in (-1, 1)
     }
     turn, side_at = _turn(face, {sign: part for sign, part in sides.items() if part.enough(front.depth_m, 2 * half_h)})
     top = faces.where(
-        (faces.normals[:, 2] > _FACING) & (np.abs(faces.centres[:, 2] - half_h) < _SHELL_M) & behind & (np.abs(x) < half_w)
+        (faces.normals[:, 2] > params.facing)
+        & (np.abs(faces.centres[:, 2] - half_h) < params.shell_m)
+        & behind
+        & (np.abs(x) < half_w)
     )
     left, right = side_at.get(-1, -half_w), side_at.get(1, half_w)
     upper = _median(top) if top.enough(2 * half_w, front.depth_m) else half_h
@@ -86,6 +99,7 @@ def _turn(face: _Faces, sides: dict[int, _Faces]) -> tuple[float, dict[int, floa
 
     Least squares of y = t x + c on the front and x = -t y + c on the sides, reweighted against strays.
     """
+    params = tuned(Params)
     groups = [(0, face), *sides.items()] if len(face.areas) else list(sides.items())
     if not groups:
         return 0.0, {}
@@ -103,11 +117,11 @@ def _turn(face: _Faces, sides: dict[int, _Faces]) -> tuple[float, dict[int, floa
         normal = (system * weight[:, None]).T @ system
         solution = np.linalg.lstsq(normal, (system * weight[:, None]).T @ values, rcond=None)[0]
         stray = values - system @ solution
-        weight = area / (1 + (stray / _STRAY_M) ** 2)
-    noise = max(float(np.sqrt(np.average(stray**2, weights=weight))), _LEAST_NOISE_M)
-    spread = noise * np.sqrt(np.linalg.pinv(normal / _PATCH_M2)[-1, -1])
+        weight = area / (1 + (stray / params.stray_m) ** 2)
+    noise = max(float(np.sqrt(np.average(stray**2, weights=weight))), params.least_noise_m)
+    spread = noise * np.sqrt(np.linalg.pinv(normal / params.patch_m2)[-1, -1])
     turn = float(solution[-1])
-    if abs(turn) > _MOST_RAD or spread > _SURE_RAD:
+    if abs(turn) > params.most_rad or spread > params.sure_rad:
         return 0.0, {sign: _median_at(part) for sign, part in sides.items()}
     return turn, {sign: float(solution[k]) for k, (sign, _) in enumerate(groups) if sign != 0}
 

@@ -1,5 +1,6 @@
 """Articulation state of a front in one frame: how far a drawer is drawn out, or at what angle a door stands open."""
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,56 +11,69 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import Swing
 from r2c2r_core.segment.fronts.front import Front, front_corners
 from r2c2r_core.segment.scene import Scene
-
-_CLOSED_M = 0.03  # nearer its place it is closed: pose error and handles
-_FARTHEST_M = 0.6
-_FLAT_M = 0.015  # a front is this flat, what else stands before one is not
-_MOST = 0.6  # of the depth points before the front, that must lie on the flat
-_SPAN = 0.7  # of the front's width and height, that they must span
-_BESIDE_M, _BESIDE_SHARE = 0.05, 0.35  # beyond its edges the flat must end: the same outline, not a board before it
-_BEHIND_M, _LEAST_BEHIND = 0.05, 30  # depth points this far behind its place show that a door is not there
-_LEAST_SWING_RAD = np.deg2rad(12.0)
-_BIN_RAD = np.deg2rad(3.0)
-_EDGE_M = 0.04  # of a leaf's free edge: what its width may be measured short, in part from frames where it is open
-_LEAF_SPAN = 0.6  # of a door's width that its flat must span: its hinge side may be hidden
-_OFF_HINGE_M = 0.05  # the open leaf's plane passes the hinge this near: its thickness, and what the edge was measured off
-
+from r2c2r_core.tuning import param, tuned
 
 _EDGES: tuple[tuple[Literal["left", "right"], float], ...] = (("left", 1.0), ("right", -1.0))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a front stands open."""
+
+    closed_m: float = param(0.03, "m", "nearer its place it is closed: pose error and handles")
+    farthest_m: float = param(0.6, "m", "that a drawer is drawn out")
+    flat_m: float = param(0.015, "m", "a front is this flat, what else stands before one is not")
+    most: float = param(0.6, "share", "of the depth points before the front that must lie on the flat")
+    span: float = param(0.7, "share", "of the front's width and height that they must span")
+    beside_m: float = param(0.05, "m", "beyond its edges the flat must end: the same outline, not a board before it")
+    beside_share: float = param(0.35, "ratio", "of the points in that strip to those on the flat, at most")
+    least_swing_rad: float = param(float(np.deg2rad(12.0)), "rad", "of a door that counts as open")
+    bin_rad: float = param(float(np.deg2rad(3.0)), "rad", "of angles that are counted together", gt=0)
+    behind_m: float = param(0.05, "m", "behind a door's place: depth there shows that it is not there")
+    least_behind: int = param(30, "count", "depth points behind its place")
+    edge_m: float = param(
+        0.04, "m", "of a leaf's free edge: what its width may be measured short, in part from frames where it is open"
+    )
+    leaf_span: float = param(0.6, "share", "of a door's width that its flat must span: its hinge side may be hidden")
+    off_hinge_m: float = param(
+        0.05, "m", "from the hinge to the open leaf's plane: its thickness, and what the edge was measured off"
+    )
+
+
 def drawn_out(front: Front, scene: Scene, frame: Frame) -> float:
     """Metres a flat of the front's own outline stands before its place; 0 where closed, hidden or not to be told."""
+    params = tuned(Params)
     grid = front.run.grid
     closed = front_corners(front.cell, grid, (0.0, 0.0))
-    lift, x, z = _points_about(front, scene, frame, np.concatenate([closed, closed + grid.outward * _FARTHEST_M]))
+    lift, x, z = _points_about(front, scene, frame, np.concatenate([closed, closed + grid.outward * params.farthest_m]))
     half_w, half_h = _halves(front)
     inside = (np.abs(x) < 0.95 * half_w) & (np.abs(z) < 0.95 * half_h)
-    shown = lift[inside & (lift > -_CLOSED_M)]
-    if len(shown) < 60 or (np.abs(shown) < _CLOSED_M).mean() > 0.4:
+    shown = lift[inside & (lift > -params.closed_m)]
+    if len(shown) < 60 or (np.abs(shown) < params.closed_m).mean() > 0.4:
         return 0.0
-    counts, edges = np.histogram(shown, bins=np.arange(_CLOSED_M, _FARTHEST_M, 0.005))
+    counts, edges = np.histogram(shown, bins=np.arange(params.closed_m, params.farthest_m, 0.005))
     peak = int(np.argmax(np.convolve(counts, np.ones(5), mode="same")))
     out = float(edges[peak] + 0.0025)
-    flat = np.abs(lift - out) < _FLAT_M
-    own, beside = flat & inside, flat & ~inside & (np.abs(x) > half_w + 0.01) & (np.abs(x) < half_w + _BESIDE_M)
+    flat = np.abs(lift - out) < params.flat_m
+    own, beside = flat & inside, flat & ~inside & (np.abs(x) > half_w + 0.01) & (np.abs(x) < half_w + params.beside_m)
     spans = np.ptp(np.quantile(np.stack([x[own], z[own]]), [0.03, 0.97], axis=1), axis=0) if own.sum() > 60 else np.zeros(2)
     density = own.sum() / (4 * 0.95**2 * half_w * half_h)
-    around = beside.sum() / (4 * half_h * (_BESIDE_M - 0.01))
-    is_front = own.sum() > _MOST * len(shown) and (spans > _SPAN * 1.9 * np.array([half_w, half_h])).all()
-    return out if is_front and around < _BESIDE_SHARE * density else 0.0
+    around = beside.sum() / (4 * half_h * (params.beside_m - 0.01))
+    is_front = own.sum() > params.most * len(shown) and (spans > params.span * 1.9 * np.array([half_w, half_h])).all()
+    return out if is_front and around < params.beside_share * density else 0.0
 
 
 def swung(front: Front, scene: Scene, frame: Frame) -> Swing | None:
     """How a door stands open: a flat of its size that hangs on its left or right edge; None where closed or not to be told."""
+    params = tuned(Params)
     half_w, half_h = _halves(front)
     lift, x, z = _points_about(front, scene, frame, front_corners(front.cell, front.run.grid, (0.0, 0.0)))
     place = (np.abs(x) < 0.9 * half_w) & (np.abs(z) < 0.9 * half_h)
-    closed, behind = int((place & (np.abs(lift) < _CLOSED_M)).sum()), int((place & (lift < -_BEHIND_M)).sum())
-    if behind < _LEAST_BEHIND or closed > 0.4 * (closed + behind):
+    closed, behind = int((place & (np.abs(lift) < params.closed_m)).sum()), int((place & (lift < -params.behind_m)).sum())
+    if behind < params.least_behind or closed > 0.4 * (closed + behind):
         return None
     lift, x, z = _points_about(front, scene, frame, _swept(front))
-    before = (lift > _CLOSED_M) & (np.abs(z) < 0.95 * half_h)
+    before = (lift > params.closed_m) & (np.abs(z) < 0.95 * half_h)
     leaves = [
         (leaf, Swing(hinge=hinge, angle_rad=leaf[1]))
         for hinge, sign in _EDGES
@@ -81,31 +95,36 @@ def swung_corners(front: Front, swing: Swing) -> Points:
 
 def _leaf(across: np.ndarray, lift: np.ndarray, z: np.ndarray, half_w: float, half_h: float) -> tuple[int, float] | None:
     """Points on, and opening angle of, the flat that hangs on the origin of (across, lift); None where none is a door's."""
+    params = tuned(Params)
     angle, radius = np.arctan2(lift, across), np.hypot(across, lift)
-    reach = (radius > 0.2 * half_w) & (radius < 2 * half_w) & (angle > _LEAST_SWING_RAD)
+    reach = (radius > 0.2 * half_w) & (radius < 2 * half_w) & (angle > params.least_swing_rad)
     if reach.sum() < 60:
         return None
-    counts, edges = np.histogram(angle[reach], bins=np.arange(0.0, np.pi, _BIN_RAD))
-    guess = float(edges[int(np.argmax(np.convolve(counts, np.ones(3), mode="same")))] + _BIN_RAD / 2)
+    counts, edges = np.histogram(angle[reach], bins=np.arange(0.0, np.pi, params.bin_rad))
+    guess = float(edges[int(np.argmax(np.convolve(counts, np.ones(3), mode="same")))] + params.bin_rad / 2)
     off, along = _turned(across, lift, guess)
-    near = reach & (np.abs(off) < 1.5 * _OFF_HINGE_M)
+    near = reach & (np.abs(off) < 1.5 * params.off_hinge_m)
     for _ in range(3):  # a line of its own: the camera may see the leaf's back, beside the hinge by its thickness
         if near.sum() < 60:
             return None
         slope, offset = np.polyfit(along[near], off[near], 1)
         guess, shift = guess + float(np.arctan(slope)), float(offset * np.cos(np.arctan(slope)))
         off, along = _turned(across, lift, guess)
-        near = reach & (np.abs(off - shift) < _FLAT_M)
+        near = reach & (np.abs(off - shift) < params.flat_m)
     own = near & (along < 2 * half_w)
-    beyond = (np.abs(off - shift) < _FLAT_M) & (along > 2 * half_w + _EDGE_M) & (along < 2 * half_w + _EDGE_M + _BESIDE_M)
-    if own.sum() < 60 or abs(shift) > _OFF_HINGE_M or guess < _LEAST_SWING_RAD:
+    beyond = (
+        (np.abs(off - shift) < params.flat_m)
+        & (along > 2 * half_w + params.edge_m)
+        & (along < 2 * half_w + params.edge_m + params.beside_m)
+    )
+    if own.sum() < 60 or abs(shift) > params.off_hinge_m or guess < params.least_swing_rad:
         return None
     spans = np.ptp(np.quantile(np.stack([along[own], z[own]]), [0.03, 0.97], axis=1), axis=0)
-    if (spans < [_LEAF_SPAN * 2 * half_w, _SPAN * 1.9 * half_h]).any() or own.sum() < _MOST * near.sum():
+    if (spans < [params.leaf_span * 2 * half_w, params.span * 1.9 * half_h]).any() or own.sum() < params.most * near.sum():
         return None
     density = own.sum() / spans.prod()
-    around = beyond.sum() / (_BESIDE_M * spans[1])
-    return (int(own.sum()), guess) if around < _BESIDE_SHARE * density else None
+    around = beyond.sum() / (params.beside_m * spans[1])
+    return (int(own.sum()), guess) if around < params.beside_share * density else None
 
 
 def _turned(across: np.ndarray, lift: np.ndarray, angle_rad: float) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,14 @@ from r2c2r_core.segment.found import View
 from r2c2r_core.segment.fronts.articulation import drawn_out, swung, swung_corners
 from r2c2r_core.segment.fronts.front import Front, front_corners, front_mask, front_panel
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_BORDER_M = 0.006  # how far borders were off, on samples and the real kitchen
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well a front's borders are known."""
+
+    border_m: float = param(0.006, "m", "how far borders are off", source="measured on samples and the real kitchen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +39,7 @@ class FoundFront:
         if swing is not None:
             opened = swung_corners(self.front, swing)
         mask, share = front_mask(self.front, self.scene, frame, opened)
-        trust = expected_iou(mask, share, frame, corners if opened is None else opened, _BORDER_M)
+        trust = expected_iou(mask, share, frame, corners if opened is None else opened, tuned(Params).border_m)
         return View(mask, trust, out_m, swing)
 
     def panel(self) -> FrontPanel | None:

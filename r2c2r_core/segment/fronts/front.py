@@ -18,15 +18,32 @@ from r2c2r_core.segment.runs.handles import GridHandle, find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_USUAL_PROTRUSION_M = 0.035
-_PAIR_WIDTH_SHARE = 0.08  # the two doors of a pair are equally wide
-_MET_WIDTH_SHARE, _HANDLES_MEET = 0.2, 0.5  # a cell may hold the gap beside its door
-_SUPPORTED_SHARE = 0.25  # of a column or row of cells, for it to belong to the panel
-_OFF_PLANE_M = 0.06  # handles stand out by up to 5 cm
-_STEADY_M = 0.012  # clicks this near a border are within pose error of it
-_BORDER_M = 0.035  # and those this near correct it: no panel is so narrow
-_HULL_SHARE = 1.3  # two panels whose rectangle is larger than this times theirs do not belong together
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which panel clicks mean."""
+
+    usual_protrusion_m: float = param(
+        0.035, "m", "of a handle whose relief tells nothing", source="bar handles stand out 25-40 mm"
+    )
+    pair_width_share: float = param(
+        0.08, "share", "by which the two doors of a pair may differ in width: they are equally wide"
+    )
+    met_width_share: float = param(
+        0.2, "share", "by which they may differ where their handles meet: a cell may hold the gap beside its door"
+    )
+    handles_meet: float = param(0.5, "score", "of a pair whose handles meet")
+    supported_share: float = param(0.25, "share", "of a column or row of cells, for it to belong to the panel")
+    off_plane_m: float = param(
+        0.06, "m", "off the plane, within which a click is on the panel", source="handles stand out by up to 5 cm"
+    )
+    steady_m: float = param(0.012, "m", "clicks this near a border are within pose error of it")
+    border_m: float = param(0.035, "m", "clicks this near a border correct it: no panel is so narrow")
+    hull_share: float = param(
+        1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +159,8 @@ def _partner(run: Run, cell: Cell) -> Cell | None:
 
 def _width_slack(run: Run, cell: Cell, other: Cell) -> float:
     """How differently wide two doors of a pair may have been cut, as a share: more where their handles meet at the seam."""
-    return _MET_WIDTH_SHARE if _pair_score(run, cell, other) > _HANDLES_MEET else _PAIR_WIDTH_SHARE
+    params = tuned(Params)
+    return params.met_width_share if _pair_score(run, cell, other) > params.handles_meet else params.pair_width_share
 
 
 def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
@@ -160,20 +178,21 @@ def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
 def near_plane(run: Run, clicks: Points) -> Points:
     """The clicks that lie on the panels' plane: others are on sides, or on things in front, and say nothing about panels."""
     away = run.grid.world_from_plane.inverse.apply(clicks)[:, 1]
-    return clicks[np.abs(away) < _OFF_PLANE_M]
+    return clicks[np.abs(away) < tuned(Params).off_plane_m]
 
 
 def nudged(cell: Cell, column: float, row: float, label: int, cell_m: float) -> Cell | None:
     """The cell with its border moved to a click beside it, or left where that is within pose error; None for other clicks."""
+    params = tuned(Params)
     if (label == 1) == cell.contains(column, row):
         return cell
     edges = np.array([cell.left, cell.top, cell.right, cell.bottom])
     beyond = np.array([cell.left - column, cell.top - row, column - cell.right, row - cell.bottom])
     moved = np.flatnonzero(beyond > 0) if label == 1 else np.array([int(np.argmax(beyond))])
     off = np.abs(beyond[moved]).max() * cell_m
-    if off > _BORDER_M:
+    if off > params.border_m:
         return None
-    if off > _STEADY_M:
+    if off > params.steady_m:
         edges[moved] = np.array([column, row, column, row])[moved]
     return Cell(*edges.tolist())
 
@@ -188,7 +207,7 @@ def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[C
         return corrected, []
     other = run.cell_at(column, row)
     both = joined([cell, other]) if other is not None else cell
-    if other is None or _area(both) > _HULL_SHARE * (_area(cell) + _area(other)):
+    if other is None or _area(both) > tuned(Params).hull_share * (_area(cell) + _area(other)):
         return joined([cell, Cell(column, row, column, row)]), []
     return both, [other]
 
@@ -236,10 +255,11 @@ def _profile(run: Run, cell: Cell, axis: int) -> np.ndarray:
 
 def _supported(cell: Cell, run: Run) -> Cell:
     """The cell without margins the scan never saw as part of the plane."""
+    params = tuned(Params)
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     seen = run.seen[rows, columns]
-    across = np.flatnonzero(seen.mean(axis=0) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
-    down = np.flatnonzero(seen.mean(axis=1) > _SUPPORTED_SHARE * max(seen.mean(), 1e-6))
+    across = np.flatnonzero(seen.mean(axis=0) > params.supported_share * max(seen.mean(), 1e-6))
+    down = np.flatnonzero(seen.mean(axis=1) > params.supported_share * max(seen.mean(), 1e-6))
     if len(across) == 0 or len(down) == 0:
         return cell
     slack = 0.03 / run.grid.cell_m  # seen depth stops short of an edge by about its own resolution
@@ -265,7 +285,7 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
         right_m=(handle.right - middle_x) * cell_m,
         bottom_m=(middle_z - handle.bottom) * cell_m,
         top_m=(middle_z - handle.top) * cell_m,
-        protrusion_m=handle.protrusion_m or _USUAL_PROTRUSION_M,
+        protrusion_m=handle.protrusion_m or tuned(Params).usual_protrusion_m,
         confidence=handle.confidence,
     )
 

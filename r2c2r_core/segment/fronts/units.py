@@ -1,26 +1,40 @@
 """Panel choice with a prior on size: a dishwasher is one front whatever lines it carries, a drawer is one of a stack."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.tuning import param, tuned
 
-_USUAL_WORTH = 0.6  # a usual size weighs as much as two and a half clear edges
-_ROW_WORTH = 0.15
-_SAME_AREA = 0.85  # less is nested, more differs by a strip of shadow
-_NESTED_WORTH = 0.08  # a window and its frame lie inside a front, as clear as it: of equals the outermost is the front
-_ROW_M = 0.015  # how exactly the fronts of a row line up
-_TALL_M = 0.35
-_LOWEST_DRAWER_M = 0.09
-_DRAWN_SHARE = 0.3  # quantile over the blocks beside a handle: a seam shows in most of them
-_PROMINENT = 5.0  # robust deviations
-_LEAST_Z = 0.35
 _RIM_M = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What sizes and rows say for a panel."""
+
+    usual_worth: float = param(
+        0.6, "score", "of a usual size, beside 1 for an edge's clarity", source="as much as two and a half clear edges"
+    )
+    row_worth: float = param(0.15, "score", "of being one of a row")
+    same_area: float = param(0.85, "share", "of the largest area: less is nested, more differs by a strip of shadow")
+    nested_worth: float = param(
+        0.08, "score", "by which a window inside a front may be clearer: of equals the outermost is the front"
+    )
+    row_m: float = param(0.015, "m", "how exactly the fronts of a row line up")
+    tall_m: float = param(0.35, "m", "height from which a front is one of a row upright")
+    lowest_drawer_m: float = param(0.09, "m", "height of the lowest drawer that is looked for")
+    drawn_share: float = param(0.3, "share", "quantile over the blocks beside a handle: a seam shows in most of them")
+    prominent: float = param(5.0, "σ", "robust, of a seam over its surroundings")
+    least_z: float = param(0.35, "σ", "of a seam")
 
 
 def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
     """The rectangle between lines of the run around a click of the size of such a unit, with the clearest edges."""
+    params = tuned(Params)
     cell_m = run.grid.cell_m
     widest, tallest = unit.width.high / cell_m, unit.height.high / cell_m
     lefts = sorted({cell.left for cell in run.cells if cell.left < column and column - cell.left < widest})
@@ -38,9 +52,9 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
     ]
     rated = [(_worth(run, cell, unit), cell) for cell in options]
     best = max((worth for worth, _ in rated), default=0.0)
-    equal = [(worth, cell) for worth, cell in rated if worth > best - _NESTED_WORTH]
+    equal = [(worth, cell) for worth, cell in rated if worth > best - params.nested_worth]
     largest = max((cell.width * cell.height for _, cell in equal), default=0.0)
-    outer = [(worth, cell) for worth, cell in equal if cell.width * cell.height > _SAME_AREA * largest]
+    outer = [(worth, cell) for worth, cell in equal if cell.width * cell.height > params.same_area * largest]
     return max(outer, key=lambda option: option[0])[1] if outer else None
 
 
@@ -67,15 +81,17 @@ def line_clarity(run: Run, cell: Cell) -> tuple[float, ...]:
 
 
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
+    params = tuned(Params)
     cell_m = run.grid.cell_m
     off = np.array([unit.width.deviation(cell.width * cell_m), unit.height.deviation(cell.height * cell_m)])
     usual = float(np.exp(-0.5 * (off @ off)))
-    return float(np.mean(line_clarity(run, cell))) + _USUAL_WORTH * usual + _ROW_WORTH * _in_row(run, cell)
+    return float(np.mean(line_clarity(run, cell))) + params.usual_worth * usual + params.row_worth * _in_row(run, cell)
 
 
 def _in_row(run: Run, cell: Cell) -> int:
     """How many of a rectangle's upper and lower edges a front beside it shares: units are made to fit a row of cupboards."""
-    slack, tall = _ROW_M / run.grid.cell_m, _TALL_M / run.grid.cell_m
+    params = tuned(Params)
+    slack, tall = params.row_m / run.grid.cell_m, params.tall_m / run.grid.cell_m
     beside = [
         other
         for other in run.cells
@@ -88,21 +104,23 @@ def _in_row(run: Run, cell: Cell) -> int:
 
 def _seam(run: Run, cell: Cell) -> float | None:
     """The row of the clearest line that shows on both sides of the handles; None when none stands out."""
+    params = tuned(Params)
     profile = _beside_handles(run, cell)
-    smallest = round(_LOWEST_DRAWER_M / run.grid.cell_m)
+    smallest = round(params.lowest_drawer_m / run.grid.cell_m)
     if len(profile) <= 2 * smallest:
         return None
     middle = float(np.median(profile))
     spread = 1.4826 * float(np.median(np.abs(profile - middle))) + 0.03
     inner = profile[smallest:-smallest]
     at = int(np.argmax(inner))
-    if inner[at] < max(_LEAST_Z, middle + _PROMINENT * spread):
+    if inner[at] < max(params.least_z, middle + params.prominent * spread):
         return None
     return round(cell.top) + smallest + at + 0.5
 
 
 def _beside_handles(run: Run, cell: Cell) -> np.ndarray:
     """At each row of a panel, how surely a line runs through both its left and its right third."""
+    params = tuned(Params)
     evidence = run.horizontal
     first, last = round(cell.left / evidence.block), round(cell.right / evidence.block)
     rows = slice(round(cell.top), round(cell.bottom))
@@ -112,5 +130,5 @@ def _beside_handles(run: Run, cell: Cell) -> np.ndarray:
         score = np.where(evidence.known[blocks, rows], evidence.score[blocks, rows], 0.0)
         if not score.size:
             return np.zeros(0)
-        sides.append(np.quantile(score, _DRAWN_SHARE, axis=0))
+        sides.append(np.quantile(score, params.drawn_share, axis=0))
     return np.asarray(np.minimum(*sides))

@@ -1,6 +1,6 @@
 """Clicks to an object: the method the category suggests first (front, appliance, thing), then what the scan suggests."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +18,14 @@ from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundThing
 from r2c2r_core.segment.things.thing import ThingConfig, find_thing, sized_as
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
+from r2c2r_core.tuning import param, tuned
 
-_SMALL_M = 0.25  # things below this radius are carved by silhouettes
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which things are small."""
+
+    small_m: float = param(0.25, "m", "radius below which things are carved by silhouettes")
 
 
 def find_object(prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits) -> Found:
@@ -53,7 +59,7 @@ def glimpse_object(
     if category.kind == "appliance":
         return _appliance(prepared, prompt, category, negatives.points, glimpse=True)
     config = sized_as(category)
-    if category.kind != "thing" or config.radius_m >= _SMALL_M or not positives.clicks:
+    if category.kind != "thing" or config.radius_m >= tuned(Params).small_m or not positives.clicks:
         return None
     small = glimpse_small(
         prepared.scene, positives.points, negatives.points, config, _structure_off(prepared, positives.points[0])
@@ -91,7 +97,7 @@ def _thing(
 ) -> FoundThing | None:
     config = sized_as(category)
     positives = _on_thing(prepared, hits, config)
-    if config.radius_m < _SMALL_M:
+    if config.radius_m < tuned(Params).small_m:
         small = find_small(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
         if small is not None:
             return FoundThing(replace(small, clicks=prompt.points), prepared.scene, small=True, round=config.round)

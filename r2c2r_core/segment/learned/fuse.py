@@ -21,13 +21,22 @@ from r2c2r_core.segment.learned.voting import Body
 from r2c2r_core.segment.occlusion import refine_border
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import Thing, thing_mask
+from r2c2r_core.tuning import param, tuned
 
-LEAST_OVERLAP = 0.4  # of the colour mask that the intersection must keep
-_OFF_BODY_M, _OFF_BODY_SHARE = 0.04, 0.01  # a pixel this far from the agreed surface is not the object (handles: 4 cm)
-_LEAK_SHARE = 0.01  # of the mask: fewer pixels off the body are noise of depth, not a leak
-_LOST_SHARE = 0.25  # of the agreed surface's visible pixels: a smaller mask has lost the object
-_IN_PLAIN_VIEW = 0.5  # of the agreed surface's projection that must be visible to fill it in
-_FILLED_CONFIDENCE = 0.3
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What of a learned mask depth believes."""
+
+    least_overlap: float = param(0.4, "share", "of the colour mask that the paper's intersection must keep")
+    off_body_m: float = param(
+        0.04, "m", "from the agreed surface, beyond which a pixel is not the object", source="handles: 4 cm"
+    )
+    off_body_share: float = param(0.01, "share", "of the pixels that may be so")
+    leak_share: float = param(0.01, "share", "of the mask: fewer pixels off the body are noise of depth, not a leak")
+    lost_share: float = param(0.25, "share", "of the agreed surface's visible pixels: a smaller mask has lost the object")
+    in_plain_view: float = param(0.5, "share", "of the agreed surface's projection that must be visible to fill it in")
+    filled_confidence: float = param(0.3, "score", "confidence, 0 to 1, of a mask that was filled in")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,12 +91,13 @@ def both_masks(colour: Mask, depth: Mask) -> tuple[Mask, bool]:
         size = (colour.shape[1], colour.shape[0])
         depth = cv2.resize(depth.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     both = colour & depth
-    agreed = np.count_nonzero(both) >= LEAST_OVERLAP * np.count_nonzero(colour)
+    agreed = np.count_nonzero(both) >= tuned(Params).least_overlap * np.count_nonzero(colour)
     return (both, True) if agreed else (colour, False)
 
 
 def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) -> Fused:
     """The masks without their leaks over depth edges, and with the frames the model lost; unchanged without a surface."""
+    params = tuned(Params)
     if not body.exists:
         return found
     from scipy.spatial import cKDTree
@@ -103,8 +113,8 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) ->
             mask = without_leaks(unpack_mask(found.masks[frame.index]), scene, frame, near)
         outline, share = thing_mask(thing, scene, frame, refine=False)
         lost = np.count_nonzero(mask) if mask is not None else 0
-        if share > _IN_PLAIN_VIEW and lost < _LOST_SHARE * np.count_nonzero(outline):
-            mask, trust, filled = _snapped(outline, scene, frame), _FILLED_CONFIDENCE, filled + 1
+        if share > params.in_plain_view and lost < params.lost_share * np.count_nonzero(outline):
+            mask, trust, filled = _snapped(outline, scene, frame), params.filled_confidence, filled + 1
         if mask is not None and np.count_nonzero(mask) >= least_area_px:
             masks[frame.index], confidence[frame.index] = pack_mask(mask), trust
     if not masks:
@@ -115,6 +125,7 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) ->
 
 def without_leaks(mask: Mask, scene: Scene, frame: Frame, near: object) -> Mask:
     """The mask without pixels whose measured depth lies off the agreed surface (`near` is its cKDTree)."""
+    params = tuned(Params)
     depth = scene.depth(frame.index)
     small = cv2.resize(mask.astype(np.uint8), (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
     row, column = np.nonzero(small & (depth > 0))
@@ -122,12 +133,12 @@ def without_leaks(mask: Mask, scene: Scene, frame: Frame, near: object) -> Mask:
         return mask
     metres = depth[row, column].astype(np.float64)
     points = unproject(np.stack([column + 0.5, row + 0.5], axis=1), metres, frame.depth_camera)
-    limit = _OFF_BODY_M + _OFF_BODY_SHARE * metres
+    limit = params.off_body_m + params.off_body_share * metres
     away, _ = near.query(frame.world_from_camera.apply(points), distance_upper_bound=float(limit.max()))  # type: ignore[attr-defined]  # scipy has no types
     off = np.zeros(depth.shape, np.uint8)
     off[row, column] = away > limit
     off = cv2.morphologyEx(off, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))  # single pixels of mixed depth
-    if off.sum() < _LEAK_SHARE * small.sum():
+    if off.sum() < params.leak_share * small.sum():
         return mask
     wide = cv2.resize(off, (mask.shape[1], mask.shape[0]), interpolation=cv2.INTER_LINEAR) > 0
     kept = mask & ~wide

@@ -25,19 +25,30 @@ from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.thing import sized_as, support_height
+from r2c2r_core.tuning import param, tuned
 
-_GRID_STEP_M = 0.01  # of the votes on a plane
-_COVERED = 0.6  # of the votes: what some views add at one side stays out
-_ON_PLANE_M = 0.03
-_LEAST_ON_PLANE = 0.08  # of a body's surface that a clicked plane must hold
-_MAINLY_ON_PLANE = 0.25  # and one that nobody clicked
-_LEAST_OF_PLANE = 0.3  # of a plane that must be the body, for a click without depth to mean it: not the wall behind
-_FARTHEST_M, _GLASS_M = 10.0, 1.0  # along a click's ray; from where it meets a plane to what depth saw of it
-_SAME_PANEL = 0.8  # overlap from which the voted rectangle is the panel the lines cut, whose edges are finer
-_POINT_FRAMES = 20
-_WIDEST_FRAMES = 7
-_GRID_PAD_M = 0.06  # the plane's grid reaches a little further than this anyway
-_MOST_BEYOND_M = 1.0
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How learned masks become measures."""
+
+    grid_step_m: float = param(0.01, "m", "between the votes on a plane", gt=0)
+    covered: float = param(0.6, "share", "of the votes: what some views add at one side stays out")
+    on_plane_m: float = param(0.03, "m", "off a plane, within which a body is on it")
+    least_on_plane: float = param(0.08, "share", "of a body's surface that a clicked plane must hold")
+    mainly_on_plane: float = param(0.25, "share", "of a body's surface that a plane nobody clicked must hold")
+    least_of_plane: float = param(
+        0.3, "share", "of a plane that must be the body, for a click without depth to mean it: not the wall behind"
+    )
+    same_panel: float = param(
+        0.8, "share", "overlap from which the voted rectangle is the panel the lines cut, whose edges are finer"
+    )
+    point_frames: int = param(20, "count", "that give points", ge=1)
+    widest_frames: int = param(7, "count", "that tell how far a mask reaches", ge=1)
+    grid_pad_m: float = param(0.06, "m", "by which the plane's grid reaches a little further anyway")
+    most_beyond_m: float = param(1.0, "m", "that a front may reach beyond what depth saw of its plane")
+    farthest_m: float = param(10.0, "m", "along a click's ray")
+    glass_m: float = param(1.0, "m", "from where a click's ray meets a plane to what depth saw of it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,9 +99,10 @@ def _front(
 
 def _front_plane(prepared: PreparedCapture, prompt: ObjectPrompt, body: Body) -> PlaneRegion | None:
     """The clicked plane among those the body lies on (where glass returns no depth, its side may be larger), or the largest."""
+    params = tuned(Params)
     shares = [(plane, _share_on(plane, body)) for plane in prepared.planes] if body.exists else []
-    on_body = tuple(plane for plane, share in shares if share > _LEAST_ON_PLANE)
-    mostly_body = tuple(plane for plane, share in shares if share * body.area_m2 > _LEAST_OF_PLANE * plane.area_m2)
+    on_body = tuple(plane for plane, share in shares if share > params.least_on_plane)
+    mostly_body = tuple(plane for plane, share in shares if share * body.area_m2 > params.least_of_plane * plane.area_m2)
     for click in prompt.points:
         if click.label != 1:
             continue
@@ -98,23 +110,26 @@ def _front_plane(prepared: PreparedCapture, prompt: ObjectPrompt, body: Body) ->
         if point is not None and prepared.scene.has_depth(click.frame, click.x, click.y):
             clicked = region_at(on_body, point)
         else:
-            met = region_along(mostly_body, *prepared.scene.ray(click.frame, click.x, click.y), _FARTHEST_M, _GLASS_M)
+            met = region_along(
+                mostly_body, *prepared.scene.ray(click.frame, click.x, click.y), params.farthest_m, params.glass_m
+            )
             clicked = met[0] if met is not None else None
         if clicked is not None:
             return clicked
     plane, share = max(shares, key=lambda entry: entry[1], default=(None, 0.0))
-    return plane if share > _MAINLY_ON_PLANE else None
+    return plane if share > params.mainly_on_plane else None
 
 
 def _share_on(plane: PlaneRegion, body: Body) -> float:
     """The share of a body's surface that lies on a plane."""
     off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
-    return float(((off < _ON_PLANE_M) & plane.supports(body.vertices, 0.02)).mean())
+    return float(((off < tuned(Params).on_plane_m) & plane.supports(body.vertices, 0.02)).mean())
 
 
 def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) -> float:
     """How far the masks reach beyond what depth saw of the plane, metres: glass and gloss return nothing."""
-    largest = sorted(masks, key=lambda index: -masks[index].area_px)[:_WIDEST_FRAMES]
+    params = tuned(Params)
+    largest = sorted(masks, key=lambda index: -masks[index].area_px)[: params.widest_frames]
     reaches = []
     for index in largest:
         mask, frame = masks[index], scene.frame(index)
@@ -130,16 +145,17 @@ def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) 
         over = np.abs(met[:, [0, 2]]) - [region.width_m / 2, region.height_m / 2]
         reaches.append(float(over.max()))
     reach = float(np.quantile(reaches, 0.25)) if reaches else 0.0  # seen from the side, the mask holds the side too
-    return round(min(reach + 0.05, _MOST_BEYOND_M), 2) if reach > _GRID_PAD_M else 0.0
+    return round(min(reach + 0.05, params.most_beyond_m), 2) if reach > params.grid_pad_m else 0.0
 
 
 def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Cell | None:
     """The rectangle of a run's plane (grid cells) that most masks cover, where the body is."""
-    step = max(1, round(_GRID_STEP_M / run.grid.cell_m))
+    params = tuned(Params)
+    step = max(1, round(params.grid_step_m / run.grid.cell_m))
     columns, rows = np.arange(step / 2, run.grid.columns, step), np.arange(step / 2, run.grid.rows, step)
     at = np.stack([grid.ravel() for grid in np.meshgrid(columns, rows)], axis=1)
     inside, seen = vote(scene, _frontal(masks, run.region, scene), run.grid.points_at(at))
-    covered = ((seen > 0) & (inside > _COVERED * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
+    covered = ((seen > 0) & (inside > params.covered * seen)).reshape(len(rows), len(columns)).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(covered, connectivity=4)
     if count <= 1:
         return None
@@ -163,7 +179,7 @@ def _frontal(masks: Mapping[int, PackedMask], region: PlaneRegion, scene: Scene)
 
 def _part_of(labels: np.ndarray, stats: np.ndarray, body: Body, run: Run, step: int) -> int:
     """The label that most of the body's surface on the plane falls into, else the largest."""
-    on_plane = body.vertices[np.abs(run.grid.world_from_plane.inverse.apply(body.vertices)[:, 1]) < _ON_PLANE_M]
+    on_plane = body.vertices[np.abs(run.grid.world_from_plane.inverse.apply(body.vertices)[:, 1]) < tuned(Params).on_plane_m]
     column, row = (run.grid.cells_of(on_plane) / step).astype(int).T
     inside = (column >= 0) & (row >= 0) & (column < labels.shape[1]) & (row < labels.shape[0])
     held = np.bincount(labels[row[inside], column[inside]], minlength=len(stats))
@@ -179,7 +195,7 @@ def _as_cut(run: Run, voted: Cell) -> Cell:
     cut = joined(within)
     shared = _overlap(cut, voted)
     union = cut.width * cut.height + voted.width * voted.height - shared
-    return cut if shared > _SAME_PANEL * union else voted
+    return cut if shared > tuned(Params).same_panel * union else voted
 
 
 def _overlap(a: Cell, b: Cell) -> float:
@@ -207,8 +223,9 @@ def _thing_box(
 
 def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:
     """World points of depth pixels well inside the masks, near the body where there is one."""
+    params = tuned(Params)
     found = [np.zeros((0, 3))]
-    for index in voting_frames(masks, _POINT_FRAMES):
+    for index in voting_frames(masks, params.point_frames):
         frame, depth = scene.frame(index), scene.depth(index)
         mask = unpack_mask(masks[index]).astype(np.uint8)
         small = cv2.resize(mask, (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_AREA)

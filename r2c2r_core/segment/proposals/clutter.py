@@ -8,16 +8,22 @@ from scipy import ndimage
 from r2c2r_core.arrays import Points
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.tuning import param, tuned
 
-_VOXEL_M = 0.02
-_MAP_M = 0.04  # of the heights of level surfaces
-_LEVEL_COS = 0.85
-_LEAST_LEVEL_M2 = 0.05  # glossy worktops lose most of their depth
-_BESIDE_M = 0.20  # a thing stands this near to where its support was seen: it hides the rest
-_CLEARANCE_M = 0.012
-_STANDS_M = 0.06  # the seen part of a thing starts this near its support
-_OFF_PLANE_M = 0.03
-_STRUCTURE_M2 = 0.12  # smaller upright planes may be the face of a box
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What stands free."""
+
+    voxel_m: float = param(0.02, "m", "side of the voxels that connect a thing", gt=0)
+    map_m: float = param(0.04, "m", "side of the cells of the map of level surfaces", gt=0)
+    level_cos: float = param(0.85, "cosine", "with up, of a level surface")
+    least_level_m2: float = param(0.05, "m²", "of a support", source="glossy worktops lose most of their depth")
+    beside_m: float = param(0.20, "m", "to where its support was seen: a thing hides the rest")
+    clearance_m: float = param(0.012, "m", "above its support, from where surface is a thing's")
+    stands_m: float = param(0.06, "m", "above its support, within which the seen part of a thing starts")
+    off_plane_m: float = param(0.03, "m", "from an upright plane, beyond which surface is free of it")
+    structure_m2: float = param(0.12, "m²", "of an upright plane: smaller ones may be the face of a box")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +38,7 @@ class Clump:
 
 def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump]:
     """Things on level surfaces, surest first."""
+    params = tuned(Params)
     surface = capture.surface
     corners = surface.vertices_world[surface.faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -45,9 +52,9 @@ def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump
         return []
     free = np.ones(len(centres), bool)
     for plane in planes:
-        if plane.area_m2 > _STRUCTURE_M2:
+        if plane.area_m2 > params.structure_m2:
             off = np.abs((centres - plane.world_from_plane.translation) @ plane.outward)
-            free &= ~((off < _OFF_PLANE_M) & plane.supports(centres, 0.04))
+            free &= ~((off < params.off_plane_m) & plane.supports(centres, 0.04))
     found = []
     for height, mask, origin in levels:
         found += _standing_on(height, mask, origin, centres[free], turned[free], areas[free])
@@ -62,7 +69,8 @@ def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump
 
 def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Level surfaces as (height, map of where they are, map origin); overlapping heights are one."""
-    level = up > _LEVEL_COS
+    params = tuned(Params)
+    level = up > params.level_cos
     if not level.any():
         return []
     heights = points[level, 2]
@@ -71,15 +79,15 @@ def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[flo
     smooth = ndimage.uniform_filter1d(np.pad(profile, 3), 3) * 3
     highest = ndimage.maximum_filter1d(smooth, 7)
     origin = points[:, :2].min(axis=0)
-    shape = tuple(((points[:, :2].max(axis=0) - origin) / _MAP_M).astype(int) + 2)
+    shape = tuple(((points[:, :2].max(axis=0) - origin) / params.map_m).astype(int) + 2)
     found = []
-    for peak in np.flatnonzero((smooth == highest) & (smooth > _LEAST_LEVEL_M2)):
+    for peak in np.flatnonzero((smooth == highest) & (smooth > params.least_level_m2)):
         height = low + (peak - 3 + 0.5) * 0.01
         near = level & (np.abs(points[:, 2] - height) < 0.02)
-        cells = ((points[near, :2] - origin) / _MAP_M).astype(int)
+        cells = ((points[near, :2] - origin) / params.map_m).astype(int)
         seen = np.zeros(shape, bool)
         seen[cells[:, 0], cells[:, 1]] = True
-        beside = np.asarray(ndimage.binary_dilation(seen, iterations=round(_BESIDE_M / _MAP_M)))
+        beside = np.asarray(ndimage.binary_dilation(seen, iterations=round(params.beside_m / params.map_m)))
         found.append((float(np.average(points[near, 2], weights=areas[near])), beside, origin))
     return found
 
@@ -87,13 +95,14 @@ def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[flo
 def _standing_on(
     height: float, seen: np.ndarray, origin: np.ndarray, centres: Points, turned: Points, areas: np.ndarray
 ) -> list[Clump]:
-    cells = ((turned[:, :2] - origin) / _MAP_M).astype(int)
-    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + _CLEARANCE_M) & (turned[:, 2] < height + 1.3)
+    params = tuned(Params)
+    cells = ((turned[:, :2] - origin) / params.map_m).astype(int)
+    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + params.clearance_m) & (turned[:, 2] < height + 1.3)
     if above.sum() < 10:
         return []
     points, local, area = centres[above], turned[above], areas[above]
-    low = local.min(axis=0) - _VOXEL_M
-    index = ((local - low) / _VOXEL_M).astype(int)
+    low = local.min(axis=0) - params.voxel_m
+    index = ((local - low) / params.voxel_m).astype(int)
     filled = np.zeros(index.max(axis=0) + 3, bool)
     filled[index[:, 0] + 1, index[:, 1] + 1, index[:, 2] + 1] = True
     labels, count = ndimage.label(filled, np.ones((3, 3, 3)))
@@ -106,7 +115,7 @@ def _standing_on(
         bottom, top = np.quantile(local[member], 0.01, axis=0), np.quantile(local[member], 0.99, axis=0)
         extent = top - bottom
         extent[2] = top[2] - height
-        if bottom[2] > height + _STANDS_M or not _thing_sized(extent, height):
+        if bottom[2] > height + params.stands_m or not _thing_sized(extent, height):
             continue
         # Half of a thing is seen at best: its surface compared with half that of its box.
         shown = float(area[member].sum() / max(extent[0] * extent[1] / 2 + extent[2] * (extent[0] + extent[1]), 1e-4))

@@ -11,20 +11,35 @@ from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front, f
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.tuning import param, tuned
 
-_SHALLOWEST_M = 0.15  # nearer to a wall is the wall, what hangs flat on it, or the back of a sink
-_DARK_LIGHTNESS = 60.0  # of 255
-_SMALLEST_M = 0.09
-_CORNER_M = 0.06  # how exactly a side starts where a front ends
-_DEEPEST_M = 0.8  # of a carcass
-_ROW_M = 0.03  # how exactly the fronts of a row line up
-_MATE_WORTH = 0.5  # how much a sure front beside it says for a panel
-_SUREST = 0.99
-_LEAST_MATE = 0.1  # confidence below which a panel is no company
-_SMALL_M2, _ALONE_WORTH = 0.15, 0.4  # drawers come in stacks: a lone small panel is part of a chair, or a book
 _NO_POINTS = np.zeros((0, 3))
-_EQUAL_DOORS_M = 0.012  # the doors of one cabinet are cut alike; two cabinets beside each other seldom are
-_WIDEST_CABINET_M = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which panels pass as fronts."""
+
+    shallowest_m: float = param(0.15, "m", "nearer to a wall is the wall, what hangs flat on it, or the back of a sink")
+    dark_lightness: float = param(60.0, "grey", "below it a cell is dark")
+    smallest_m: float = param(0.09, "m", "side of a front")
+    small_m2: float = param(0.15, "m²", "of a panel that is small")
+    alone_worth: float = param(
+        0.4, "ratio", "of a lone small panel's confidence", source="drawers come in stacks: it is part of a chair, or a book"
+    )
+    corner_m: float = param(0.06, "m", "how exactly a side starts where a front ends")
+    deepest_m: float = param(0.8, "m", "of a carcass")
+    row_m: float = param(0.03, "m", "how exactly the fronts of a row line up")
+    mate_worth: float = param(0.5, "share", "how much a sure front beside it says for a panel")
+    surest: float = param(0.99, "score", "confidence, 0 to 1, at most")
+    least_mate: float = param(0.1, "score", "confidence, 0 to 1, below which a panel is no company")
+    equal_doors_m: float = param(
+        0.012,
+        "m",
+        "by which the doors of one cabinet may differ",
+        source="they are cut alike; two cabinets beside each other seldom are",
+    )
+    widest_cabinet_m: float = param(0.95, "m", "of two doors that are one cabinet")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,10 +76,11 @@ class Panel:
 
 def find_panels(run: Run, room: Room) -> list[Panel]:
     """The run's panels that could be fronts, the doors of a pair joined."""
+    params = tuned(Params)
     found: list[Panel] = []
     mates: list[Cell] = []
     for cell in sorted(run.cells, key=lambda cell: (cell.left, cell.top)):
-        if cell in mates or min(cell.width, cell.height) * run.grid.cell_m < _SMALLEST_M:
+        if cell in mates or min(cell.width, cell.height) * run.grid.cell_m < params.smallest_m:
             continue
         panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=False), room)
         mate = _mate(run, cell)
@@ -94,7 +110,7 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
         return None
     run, cell, cell_m = front.run, front.cell, front.run.grid.cell_m
     area = (slice(max(round(cell.top), 0), round(cell.bottom)), slice(max(round(cell.left), 0), round(cell.right)))
-    if min(cell.width, cell.height) * cell_m < _SMALLEST_M or not run.seen[area].size:
+    if min(cell.width, cell.height) * cell_m < tuned(Params).smallest_m or not run.seen[area].size:
         return None
     bottom = float(run.grid.points_at(np.array([[cell.left, cell.bottom]]))[0, 2]) if room.floor_found else None
     look = FrontLook(
@@ -111,18 +127,21 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
 
 def _beside(panel: Panel, others: list[Panel]) -> Panel:
     """The panel in the light of its run: fronts stand in rows and stacks, and small flat things stand alone."""
-    slack = _ROW_M / panel.run.grid.cell_m
+    params = tuned(Params)
+    slack = params.row_m / panel.run.grid.cell_m
     mates = [
-        other for other in others if other.confidence > _LEAST_MATE and _aligned(panel.front.cell, other.front.cell, slack)
+        other
+        for other in others
+        if other.confidence > params.least_mate and _aligned(panel.front.cell, other.front.cell, slack)
     ]
     category = panel.category
     if category == "dishwasher" and not _odd_one_out(mates):
         category = "cabinet"
     if mates:
         best = max(other.confidence for other in mates)
-        unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - _MATE_WORTH * best)
-        return replace(panel, category=category, confidence=min(panel.usual * (1 - unsure), _SUREST))
-    alone = _ALONE_WORTH if _area(panel) < _SMALL_M2 else 1.0
+        unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - params.mate_worth * best)
+        return replace(panel, category=category, confidence=min(panel.usual * (1 - unsure), params.surest))
+    alone = params.alone_worth if _area(panel) < params.small_m2 else 1.0
     return replace(panel, category=category, confidence=alone * panel.confidence)
 
 
@@ -148,10 +167,10 @@ def outlined(front: Front) -> float:
 def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
     """0..1: outlined, flat where depth saw it, and no wall."""
     flat = np.clip((front.run.seen[area].mean() - 0.3) / 0.5, 0, 1)
-    return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room) else 1.0))
+    return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room, tuned(Params).shallowest_m) else 1.0))
 
 
-def is_on_wall(run: Run, room: Room, shallowest_m: float = _SHALLOWEST_M) -> bool:
+def is_on_wall(run: Run, room: Room, shallowest_m: float) -> bool:
     """Whether a run is a wall, or too near one that faces the same way to have a carcass behind it."""
     middle = run.region.world_from_plane.translation
     return any(abs(distance) < shallowest_m for distance in distances_behind(room.walls, middle, run.grid.outward))
@@ -163,6 +182,7 @@ def _middle(run: Run, cell: Cell) -> Points:
 
 def _mate(run: Run, cell: Cell) -> Cell | None:
     """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
+    params = tuned(Params)
     slack = 0.02 / run.grid.cell_m
     for other in run.cells:
         beside = abs(other.left - cell.right) < slack
@@ -171,8 +191,8 @@ def _mate(run: Run, cell: Cell) -> Cell | None:
         left, right = (find_front(run, _middle(run, door), _NO_POINTS, pair=False) for door in (cell, other))
         if left is None or right is None or left.handle is None or right.handle is None:
             continue
-        equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < _EQUAL_DOORS_M
-        one_cabinet = (left.cell.width + right.cell.width) * run.grid.cell_m < _WIDEST_CABINET_M
+        equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < params.equal_doors_m
+        one_cabinet = (left.cell.width + right.cell.width) * run.grid.cell_m < params.widest_cabinet_m
         if equal and one_cabinet and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
             return other
     return None
@@ -187,7 +207,7 @@ def _handle_at(front: Front) -> float:
 def _dark_share(run: Run, area: tuple[slice, slice]) -> float:
     colours = run.mosaic[area]
     known = colours.any(axis=2)
-    return float((colours[known].mean(axis=1) < _DARK_LIGHTNESS).mean()) if known.any() else 0.0
+    return float((colours[known].mean(axis=1) < tuned(Params).dark_lightness).mean()) if known.any() else 0.0
 
 
 def _area(panel: Panel) -> float:
@@ -197,6 +217,7 @@ def _area(panel: Panel) -> float:
 
 def _is_side_of(side: Panel, front: Panel) -> bool:
     """Whether a panel lies on the face that starts at a front's left or right edge and runs backwards."""
+    params = tuned(Params)
     normal = front.run.grid.outward
     if abs(float(normal @ side.run.grid.outward)) > 0.3:
         return False
@@ -204,8 +225,8 @@ def _is_side_of(side: Panel, front: Panel) -> bool:
     local = front.run.region.world_from_plane.rotation.T @ (side.corners - front.centre).T
     x, behind, z = local
     outward = float(front.run.region.world_from_plane.rotation[:, 0] @ side.run.grid.outward)
-    at_edge = abs(abs(float(x.mean())) - width / 2) < _CORNER_M and float(x.mean()) * outward > 0
+    at_edge = abs(abs(float(x.mean())) - width / 2) < params.corner_m and float(x.mean()) * outward > 0
     # The side may end short of the front: a door stands before its carcass, or the cut took a piece of it.
-    is_behind = behind.min() > -_CORNER_M and behind.min() < 0.35 and behind.max() < _DEEPEST_M
+    is_behind = behind.min() > -params.corner_m and behind.min() < 0.35 and behind.max() < params.deepest_m
     overlap = min(float(z.max()), height / 2) - max(float(z.min()), -height / 2)
     return at_edge and bool(is_behind) and overlap > 0.5 * min(height, float(np.ptp(z)))

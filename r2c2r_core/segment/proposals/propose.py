@@ -1,7 +1,7 @@
 """Object proposals before any click: fronts, appliances and free-standing things, each with the click that confirms it."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,22 +23,36 @@ from r2c2r_core.segment.proposals.clutter import Clump, find_clumps
 from r2c2r_core.segment.proposals.naming import name_thing
 from r2c2r_core.segment.proposals.panels import Panel, find_panels, is_on_wall, outlined, without_sides
 from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.tuning import param, tuned
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
 
-_LEAST_CONFIDENCE, _LEAST_OF_BOXES, _LEAST_OF_THINGS = 0.3, 0.5, 0.4
-_LEAST_PLANE_M2, _LEAST_SIDE_M = 0.02, 0.09
-_MOST_THINGS = 24
-_SHALLOWEST_BOX_M = 0.25  # microwaves are 0.3 m deep and more; what stands on a shelf is not
-_SAME_PLANE_M = 0.12
-_BOX_SLACK_M = 0.03
-_TAKEN_SHARE = 0.4
-_TALL_M, _FOOT_M = 1.25, 0.4  # the front of a refrigerator: how high at least, and how near to the floor
-_ON_WORKTOP_M, _LEAST_SEEN_M = (0.7, 1.5), 0.12  # the front of a microwave, of which glass may leave little
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which proposals are shown."""
+
+    most_things: int = param(24, "count", "that are looked at")
+    least_confidence: float = param(0.3, "score", "0 to 1, of a front")
+    least_of_boxes: float = param(0.5, "score", "confidence, 0 to 1, of an appliance")
+    least_of_things: float = param(0.4, "score", "confidence, 0 to 1, of a thing")
+    least_plane_m2: float = param(0.02, "m²", "of a plane that is cut")
+    least_side_m: float = param(0.09, "m", "of a plane that is cut")
+    shallowest_box_m: float = param(
+        0.25, "m", "of an appliance", source="microwaves are 0.3 m deep and more; what stands on a shelf is not"
+    )
+    same_plane_m: float = param(0.12, "m", "between two fronts of one place")
+    box_slack_m: float = param(0.03, "m", "about a box, within which a point is its own")
+    taken_share: float = param(0.4, "share", "of an outline that other proposals may cover")
+    tall_m: float = param(1.25, "m", "height of a refrigerator's front, at least")
+    foot_m: float = param(0.4, "m", "from the floor to a refrigerator's front, at most")
+    on_worktop_m: tuple[float, float] = param((0.7, 1.5), "m", "least and most height of a microwave's front")
+    least_seen_m: float = param(0.12, "m", "side of a microwave's front, of which glass may leave little")
 
 
 def propose_steps(prepared: PreparedCapture) -> Steps:
     """Proposals so far, surest first, after each bit of work, with the share of the work done. The last step has them all."""
+    params = tuned(Params)
     panels: list[Panel] = []
     planes = [plane for plane in prepared.planes if _worth_cutting(plane)]
     for position, plane in enumerate(planes):
@@ -46,7 +60,7 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
         panels += find_panels(run, prepared.scene.capture.room) if run is not None else []
         panels += _boxes(prepared, plane)
         yield 0.5 * (position + 1) / len(planes), ()
-    fronts = without_sides([panel for panel in panels if panel.confidence > 0.5 * _LEAST_CONFIDENCE])
+    fronts = without_sides([panel for panel in panels if panel.confidence > 0.5 * params.least_confidence])
     wanted = _apart([panel for panel in fronts if panel.confidence >= _least(panel.category)])
     found: list[Proposal] = []
     shown: list[tuple[Proposal, Panel]] = []
@@ -56,7 +70,7 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
             found.append(proposal)
             shown.append((proposal, panel))
         yield 0.5 + 0.3 * (position + 1) / len(wanted), _ranked(found)
-    clumps = find_clumps(prepared.scene.capture, prepared.planes)[:_MOST_THINGS]
+    clumps = find_clumps(prepared.scene.capture, prepared.planes)[: params.most_things]
     for position, clump in enumerate(clumps):
         inside = any(_holds(proposal, panel, clump) for proposal, panel in shown)
         proposal = None if inside else _present_clump(prepared, clump, found)
@@ -67,12 +81,13 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
 
 def is_taken(outline: Mask, masks: Iterable[Mask]) -> bool:
     """Whether one of the masks (of clicked objects, in the proposal's frame, at the outline's size) already covers it."""
-    enough = _TAKEN_SHARE * np.count_nonzero(outline)
+    enough = tuned(Params).taken_share * np.count_nonzero(outline)
     return any(np.count_nonzero(outline & mask) > enough for mask in masks)
 
 
 def _least(category: str) -> float:
-    return _LEAST_OF_BOXES if _is_box(category) else _LEAST_CONFIDENCE
+    params = tuned(Params)
+    return params.least_of_boxes if _is_box(category) else params.least_confidence
 
 
 def _is_box(category: str) -> bool:
@@ -84,7 +99,8 @@ def _ranked(found: list[Proposal]) -> tuple[Proposal, ...]:
 
 
 def _worth_cutting(plane: PlaneRegion) -> bool:
-    return plane.area_m2 > _LEAST_PLANE_M2 and min(plane.width_m, plane.height_m) > _LEAST_SIDE_M
+    params = tuned(Params)
+    return plane.area_m2 > params.least_plane_m2 and min(plane.width_m, plane.height_m) > params.least_side_m
 
 
 def _apart(panels: list[Panel]) -> list[Panel]:
@@ -106,14 +122,15 @@ def _same_box(panel: Panel, other: Panel) -> bool:
 def _covers(panel: Panel, point: Vector3) -> bool:
     local = panel.run.region.world_from_plane.rotation.T @ (point - panel.centre)
     width, height = panel.size_m
-    return bool(abs(local[1]) < _SAME_PLANE_M and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
+    return bool(abs(local[1]) < tuned(Params).same_plane_m and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
 
 
 def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
     """Whether a clump is part of the box behind a front."""
+    params = tuned(Params)
     x, behind, z = panel.run.region.world_from_plane.rotation.T @ (clump.points.mean(axis=0) - panel.centre)
-    width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + _BOX_SLACK_M
-    return bool(abs(x) < width and abs(z) < height and -2 * _BOX_SLACK_M < behind < depth)
+    width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + params.box_slack_m
+    return bool(abs(x) < width and abs(z) < height and -2 * params.box_slack_m < behind < depth)
 
 
 # Boxes: refrigerators of several doors, microwaves
@@ -121,24 +138,25 @@ def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
 
 def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     """The appliance whose front a whole plane could be."""
+    params = tuned(Params)
     room = prepared.scene.capture.room
     if not room.floor_found:
         return []
     middle = plane.world_from_plane.translation
     bottom = float(middle[2]) - plane.height_m / 2
     tall, small = category_of("refrigerator"), category_of("microwave")
-    if tall.width.holds(plane.width_m) and _TALL_M < plane.height_m < tall.height.high and bottom < _FOOT_M:
+    if tall.width.holds(plane.width_m) and params.tall_m < plane.height_m < tall.height.high and bottom < params.foot_m:
         kind = tall
     elif (
-        _LEAST_SEEN_M < plane.width_m < small.width.high
-        and _LEAST_SEEN_M < plane.height_m < small.height.high
-        and _ON_WORKTOP_M[0] < bottom < _ON_WORKTOP_M[1]
+        params.least_seen_m < plane.width_m < small.width.high
+        and params.least_seen_m < plane.height_m < small.height.high
+        and params.on_worktop_m[0] < bottom < params.on_worktop_m[1]
     ):
         kind = small
     else:
         return []
     found = _confirmed(prepared, kind.name, click_on(prepared.scene, middle, plane.outward))
-    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, _SHALLOWEST_BOX_M):
+    if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, params.shallowest_box_m):
         return []
     cell, cell_m = found.front.cell, found.front.run.grid.cell_m
     off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
@@ -180,6 +198,7 @@ def _proposal(
 
 
 def _present_clump(prepared: PreparedCapture, clump: Clump, others: list[Proposal]) -> Proposal | None:
+    params = tuned(Params)
     scene = prepared.scene
     for click in clump_clicks(scene, clump):
         frame = scene.frame(click.frame)
@@ -195,7 +214,7 @@ def _present_clump(prepared: PreparedCapture, clump: Clump, others: list[Proposa
             return None
         width, depth, height = box.dimensions_m
         confidence = clump.confidence * _agreement(clump, box.dimensions_m)
-        if confidence < _LEAST_OF_THINGS:
+        if confidence < params.least_of_things:
             continue
         return Proposal(
             kind="thing",
@@ -247,7 +266,7 @@ def _overlap(panel: Panel, found: FoundFront | FoundAppliance) -> float:
     cell = other.cell
     ends = other.run.grid.points_at(np.array([[cell.left, cell.top], [cell.right, cell.bottom]]))
     (x0, y0, z1), (x1, y1, z0) = (panel.run.region.world_from_plane.rotation.T @ (end - panel.centre) for end in ends)
-    if max(abs(y0), abs(y1)) > _SAME_PLANE_M:
+    if max(abs(y0), abs(y1)) > tuned(Params).same_plane_m:
         return 0.0
     across = max(min(x1, width / 2) - max(x0, -width / 2), 0.0)
     down = max(min(z1, height / 2) - max(z0, -height / 2), 0.0)

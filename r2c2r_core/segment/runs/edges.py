@@ -1,16 +1,25 @@
 """Panel edges refined by colour: the first clear change met from inside, near the cut or where depth ends."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.tuning import param, tuned
 
-_INSIDE_M, _OUTSIDE_M = 0.010, 0.010  # how far around the cut an edge is looked for
-_DEPTH_ENDS_M = 0.008  # depth that stops this far short of the cut moves the search there
-_HALF_GAP_M = 0.0015  # gaps are 2-4 mm: assumed where no edge is clear
-_WIDEST_GAP_M = 0.012  # as blurred as it looks
-_CLEAR = 3.5  # times the panel's own median gradient
-_SHARE = 0.45  # of the strongest gradient nearby
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a cut is refined by colour."""
+
+    inside_m: float = param(0.010, "m", "inside the cut, where an edge is looked for")
+    outside_m: float = param(0.010, "m", "outside the cut, where an edge is looked for")
+    depth_ends_m: float = param(0.008, "m", "depth that stops this far short of the cut moves the search there")
+    half_gap_m: float = param(0.0015, "m", "half a gap, assumed where no edge is clear", source="gaps are 2-4 mm")
+    widest_gap_m: float = param(0.012, "m", "of a gap, as blurred as it looks")
+    clear: float = param(3.5, "ratio", "to the panel's own median gradient, of an edge")
+    strong_share: float = param(0.45, "share", "of the strongest gradient nearby, of an edge")
 
 
 def panel_edges(cell: Cell, lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, cell_m: float) -> Cell:
@@ -59,24 +68,25 @@ def _end(
     low: float, high: float, gradient: np.ndarray, slope: np.ndarray, support: np.ndarray, own: float, cell_m: float
 ) -> float:
     """The lower edge, in positions where i + 0.5 is the middle of cell i."""
+    params = tuned(Params)
     usual = float(np.median(support[round(low) : round(high)]))
     covered = np.flatnonzero(support[round(low) : round((low + high) / 2)] > 0.4 * usual)
     start = low
-    if usual > 0.2 and len(covered) and covered[0] * cell_m > _DEPTH_ENDS_M:
+    if usual > 0.2 and len(covered) and covered[0] * cell_m > params.depth_ends_m:
         start = low + float(covered[0])  # the cut followed a shadow or an edge of something beside the panel
-    first = max(round(start - _OUTSIDE_M / cell_m), 1)
-    last = min(round(start + _INSIDE_M / cell_m) + 1, len(gradient) - 1)
+    first = max(round(start - params.outside_m / cell_m), 1)
+    last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     window = gradient[first:last]
-    if len(window) < 3 or window.max() < _CLEAR * own + 0.5:
-        return start + (_HALF_GAP_M / cell_m if start == low else 0.0)
-    clear = window >= max(_SHARE * window.max(), _CLEAR * own)
+    if len(window) < 3 or window.max() < params.clear * own + 0.5:
+        return start + (params.half_gap_m / cell_m if start == low else 0.0)
+    clear = window >= max(params.strong_share * window.max(), params.clear * own)
     peaks = [i for i in range(1, len(window) - 1) if clear[i] and window[i] >= window[i - 1] and window[i] >= window[i + 1]]
     if not peaks:
-        return start + (_HALF_GAP_M / cell_m if start == low else 0.0)
+        return start + (params.half_gap_m / cell_m if start == low else 0.0)
     i = peaks[-1]  # the innermost
-    gap = _gap_centre(slope[first:last], i, round(_WIDEST_GAP_M / cell_m))
+    gap = _gap_centre(slope[first:last], i, round(params.widest_gap_m / cell_m))
     if gap is not None:
-        return first + gap + 0.5 + _HALF_GAP_M / cell_m
+        return first + gap + 0.5 + params.half_gap_m / cell_m
     a, b, c = (float(value) for value in window[i - 1 : i + 2])
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0

@@ -6,12 +6,24 @@ import cv2
 import numpy as np
 
 from r2c2r_core.segment.runs.orthomosaic import Tile
+from r2c2r_core.tuning import param, tuned
 
-BLOCK_M = 0.03
 """Evidence is pooled over this much of the line's length, so that a line must be seen along most of its span."""
-_SCALES_M = (0.005, 0.0075)  # widths of the dark ridge and of the colour step
-_NOISE_FLOOR = 0.35  # grey levels: below this, differences mean nothing
-_MAX_SHIFT_M = 0.03  # pose error between frames (30 mm on a KinectFusion trajectory)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How lines are scored."""
+
+    block_m: float = param(
+        0.03,
+        "m",
+        "of the line's length over which evidence is pooled, so that a line must be seen along most of its span",
+        gt=0,
+    )
+    scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "widths of the dark ridge and of the colour step")
+    noise_floor: float = param(0.35, "grey", "below this, differences mean nothing", gt=0)
+    max_shift_m: float = param(0.03, "m", "pose error between frames, at most", source="30 mm on a KinectFusion trajectory")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +42,7 @@ def gather(tiles: list[Tile], axis: int, cell_m: float, allowed: np.ndarray | No
     Axis 0 looks for vertical lines (positions are columns), axis 1 for horizontal ones. The slide is one-dimensional on
     purpose: two-dimensional correlation on flat panels suffers from the aperture problem.
     """
-    reach = round(_MAX_SHIFT_M / cell_m)
+    reach = round(tuned(Params).max_shift_m / cell_m)
     scored = [tile_scores(tile, axis, cell_m, allowed) for tile in tiles]
     placed: list[np.ndarray] = []  # of each tile: its weighted score and its weight, slid
     slides: list[int] = []
@@ -73,7 +85,7 @@ def tile_scores(tile: Tile, axis: int, cell_m: float, allowed: np.ndarray | None
     strength, known = _strength(means, seen, cell_m)
     known[known.sum(axis=1) < 20] = False
     middle = _row_medians(strength, known)
-    spread = 1.4826 * _row_medians(np.abs(strength - middle), known) + _NOISE_FLOOR
+    spread = 1.4826 * _row_medians(np.abs(strength - middle), known) + tuned(Params).noise_floor
     score = np.where(known, np.clip((strength - middle) / spread, -2, 6), np.float32(0))
     quality = float(np.median(total[known])) if known.any() else 0.0
     return score, np.where(known, np.float32(quality), np.float32(0))
@@ -101,9 +113,10 @@ def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
     """The stronger of a dark ridge and a colour step, in grey levels, over two widths."""
+    params = tuned(Params)
     best = np.full(means.shape[:2], -9.0, np.float32)
     known = seen.copy()
-    for scale_m in _SCALES_M:
+    for scale_m in params.scales_m:
         k = max(1, round(scale_m / cell_m))
         left, right = np.roll(means, 2 * k, axis=1), np.roll(means, -2 * k, axis=1)
         centre = cv2.blur(means, (k | 1, 1))
@@ -147,7 +160,7 @@ def frame_slide(tile: Tile, axis: int, cell_m: float, evidence: Evidence) -> flo
     score, weight = tile_scores(tile, axis, cell_m)
     seen = np.where(weight > 0, np.clip(score, 0, 4), 0)
     reference = np.where(evidence.known, np.clip(evidence.score, 0, 4), 0)
-    reach = round(_MAX_SHIFT_M / cell_m)
+    reach = round(tuned(Params).max_shift_m / cell_m)
     values = [
         float((np.roll(seen, slide, axis=1) * reference).sum()) * (1 - 0.15 * abs(slide) / reach)
         for slide in range(-reach, reach + 1)
@@ -176,7 +189,7 @@ def _sheared_energy(evidence: Evidence, angle_rad: float) -> float:
 
 
 def _block(cell_m: float) -> int:
-    return max(1, round(BLOCK_M / cell_m))
+    return max(1, round(tuned(Params).block_m / cell_m))
 
 
 def _smooth(profile: np.ndarray) -> np.ndarray:

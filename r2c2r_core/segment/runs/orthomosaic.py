@@ -11,12 +11,22 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_PAD_M = 0.08  # around the seen part, so that its outer edges lie inside
-_BORDER_SHARE = 0.004  # of the width: a tile is shifted by pixels to meet the others, and what lies at its border is gone then
-_VIEW_IN_FRONT_M = 0.08  # nearer by more hides the plane from a view: handles (5 cm) and the fused surface's error do not
-_IN_FRONT_M = 0.05  # nearer than the plane by more is an occluder (handles are not)
-_LEAST_COSINE = 0.12
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which frames show a plane, and how far it is drawn."""
+
+    pad_m: float = param(0.08, "m", "around the seen part, so that its outer edges lie inside")
+    border_share: float = param(
+        0.004, "share", "of the width left out at an image's border: a tile is shifted by pixels to meet the others"
+    )
+    view_in_front_m: float = param(
+        0.08, "m", "nearer by more hides the plane from a view", source="handles (5 cm) and the fused surface's error do not"
+    )
+    in_front_m: float = param(0.05, "m", "nearer than the plane by more is an occluder", source="handles are not")
+    least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,11 +103,12 @@ class Tile:
 
 def make_grid(region: PlaneRegion, cell_m: float, roll_rad: float = 0.0, margin_m: float = 0.0) -> PlaneGrid:
     """The grid over a region and a margin, its axes turned in the plane by `roll_rad` (positive lifts the right side)."""
+    params = tuned(Params)
     c, s = np.cos(roll_rad), np.sin(roll_rad)
     turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     rotation = region.world_from_plane.rotation @ turn
-    half_w = region.width_m / 2 * c + region.height_m / 2 * abs(s) + _PAD_M + margin_m
-    half_h = region.height_m / 2 * c + region.width_m / 2 * abs(s) + _PAD_M + margin_m
+    half_w = region.width_m / 2 * c + region.height_m / 2 * abs(s) + params.pad_m + margin_m
+    half_h = region.height_m / 2 * c + region.width_m / 2 * abs(s) + params.pad_m + margin_m
     return PlaneGrid(
         Rigid3(rotation, region.world_from_plane.translation),
         -half_w,
@@ -136,6 +147,7 @@ def choose_frames(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int
 
 
 def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) -> np.ndarray:
+    params = tuned(Params)
     to_camera = frame.world_from_camera.translation - points
     cosine = (to_camera @ outward) / np.linalg.norm(to_camera, axis=1)
     width, height = _stored_size(scene, frame)
@@ -143,9 +155,9 @@ def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) 
     local = frame.world_from_camera.inverse.apply(points)
     uv, z = project(local, camera), local[:, 2]
     seen, _ = sample_nearest(scene.surface_depth(frame.index, (width, height)), uv)
-    border = _BORDER_SHARE * width
+    border = params.border_share * width
     inside = (z > 0.15) & (uv > border).all(axis=1) & (uv < [width - border, height - border]).all(axis=1)
-    good = inside & (cosine > _LEAST_COSINE) & ~scene.noise.occluded(seen, z, _VIEW_IN_FRONT_M)
+    good = inside & (cosine > params.least_cosine) & ~scene.noise.occluded(seen, z, params.view_in_front_m)
     return np.where(good, cosine * np.sqrt(max(frame.sharpness, 1e-3)) / np.maximum(z, 0.4), 0)
 
 
@@ -190,7 +202,7 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
     to_depth = grid.pixel_from_cell(frame, frame.depth_camera, out_m)
     seen = cv2.warpPerspective(depth, _for_opencv(to_depth), (grid.columns, grid.rows), flags=flags)
-    occluded = scene.noise.occluded(seen, z, _IN_FRONT_M)
+    occluded = scene.noise.occluded(seen, z, tuned(Params).in_front_m)
     grown = cv2.dilate(occluded.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     return inside & ~grown, z
 

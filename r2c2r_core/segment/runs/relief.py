@@ -8,14 +8,22 @@ import numpy as np
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.segment.runs.orthomosaic import PlaneGrid
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_RAISED_M, _HIGHEST_M = 0.012, 0.10  # a handle: above depth noise, below things that stand in front
-_DEEPEST_M = 0.04
-_HANDLE_THICK_M = 0.05
-_LEDGE_M = 0.035
-_END_WINDOW_M = 0.02  # beyond an end of the plane there are no points of it for this far
 STEP = 2
 """Grid cells in a cell of the relief: depth is coarser than colour."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth is a plane's relief."""
+
+    deepest_m: float = param(0.04, "m", "behind the plane that is kept")
+    raised_m: float = param(0.012, "m", "before the plane, from where it is a handle: above depth noise")
+    highest_m: float = param(0.10, "m", "before the plane that is kept: below things that stand in front")
+    handle_thick_m: float = param(0.05, "m", "of a handle, whose holes are closed")
+    ledge_m: float = param(0.035, "m", "width of what is long and raised and no handle")
+    end_window_m: float = param(0.02, "m", "beyond an end of the plane there are no points of it for this far")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,24 +41,27 @@ class Relief:
         flat = _box_mean(self.count * (1 - self.raised), 2)
         around = _box_mean(flat, round(0.10 / self.cell_m))
         filled = ((flat > 0.4 * around) & (flat > 0.3)).astype(np.uint8)
-        size = 2 * round(_HANDLE_THICK_M / self.cell_m / 2) + 1  # handles leave holes: closed, without growing outwards
+        size = (
+            2 * round(tuned(Params).handle_thick_m / self.cell_m / 2) + 1
+        )  # handles leave holes: closed, without growing outwards
         element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
         closed = cv2.morphologyEx(np.pad(filled, size), cv2.MORPH_CLOSE, element)[size:-size, size:-size]
         return np.asarray(cv2.medianBlur(closed, 5) > 0)
 
     def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
         """Where the plane begins or ends, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
+        params = tuned(Params)
         flat = self._blocks(_box_mean(self.count * (1 - self.raised), 1), axis, block, columns, rows)
         raised = self._blocks(_box_mean(self.count * self.raised, 1), axis, block, columns, rows)
         share = raised / np.maximum(flat + raised, 0.05)
-        reach = max(2, round(_END_WINDOW_M / self.cell_m) * STEP)
+        reach = max(2, round(params.end_window_m / self.cell_m) * STEP)
         before, after = _windows(flat, reach)
         high, low = np.maximum(before, after), np.minimum(before, after)
         usual = float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
         step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
         score = 6 * np.clip((step - 0.55) / 0.3, 0, 1)
         # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
-        ledge = _windows(share, round(_LEDGE_M / self.cell_m) * STEP)
+        ledge = _windows(share, round(params.ledge_m / self.cell_m) * STEP)
         beside = _windows(share, reach)
         rise = np.maximum(ledge[0] - beside[1], ledge[1] - beside[0])
         score = np.maximum(score, 6 * np.clip((rise - 0.5) / 0.2, 0, 1))
@@ -72,6 +83,7 @@ class Relief:
 
 def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> Relief:
     """The relief of a plane on cells of STEP grid cells."""
+    params = tuned(Params)
     step = STEP
     shape = (grid.rows // step + 1, grid.columns // step + 1)
     size = shape[0] * shape[1]
@@ -84,10 +96,10 @@ def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> R
         lift = -local[:, 1]
         column = np.floor((local[:, 0] - grid.left_m) / (grid.cell_m * step)).astype(int)
         row = np.floor((grid.top_m - local[:, 2]) / (grid.cell_m * step)).astype(int)
-        near = (lift > -_DEEPEST_M) & (lift < _HIGHEST_M)
+        near = (lift > -params.deepest_m) & (lift < params.highest_m)
         near &= (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
         cell, lift = row[near] * shape[1] + column[near], lift[near]
-        high = lift > _RAISED_M
+        high = lift > params.raised_m
         count += np.bincount(cell, minlength=size)
         raised += np.bincount(cell[high], minlength=size)
         lifts += np.bincount(cell[high], lift[high], minlength=size)

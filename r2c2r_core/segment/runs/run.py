@@ -13,11 +13,18 @@ from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, Tile, blend, ch
 from r2c2r_core.segment.runs.relief import STEP, Relief, measure_relief
 from r2c2r_core.segment.runs.xy_cut import cut_panels
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
-_ALLOWED_M = 0.08  # evidence counts this far beyond what the scan saw of the plane
-_ROLL_WORTH_RAD = np.radians(0.2)
-_RELIEF_FRAMES = 60
 _STEADY_CELLS = 1.0  # slides below this are measurement noise: poses agree
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a run is prepared."""
+
+    allowed_m: float = param(0.08, "m", "beyond what the scan saw of the plane, within which evidence counts")
+    roll_worth_rad: float = param(float(np.radians(0.2)), "rad", "of a roll that is taken out")
+    relief_frames: int = param(60, "count", "that make the relief", ge=1)
 
 
 @dataclass(slots=True, eq=False)
@@ -59,20 +66,21 @@ class Run:
 
 def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, margin_m: float = 0.0) -> Run | None:
     """Warp, gather evidence, level the axes to the lines, cut. `margin_m` reaches beyond what the scan saw of the plane."""
+    params = tuned(Params)
     grid = make_grid(region, cell_m, 0.0, margin_m)
     tiles = _tiles(grid, region, scene, max(frame_count // 2, 4))
     if not tiles:
         return None
     vertical, horizontal = _evidence(tiles, grid, region, margin_m)
     roll = find_roll(vertical, horizontal)
-    if abs(roll) > _ROLL_WORTH_RAD:
+    if abs(roll) > params.roll_worth_rad:
         grid = make_grid(region, cell_m, roll, margin_m)
     else:
         roll = 0.0
     tiles = _tiles(grid, region, scene, frame_count)
     if not tiles:
         return None
-    relief = measure_relief(grid, scene, choose_frames(grid, region, scene, _RELIEF_FRAMES))
+    relief = measure_relief(grid, scene, choose_frames(grid, region, scene, params.relief_frames))
     vertical, horizontal = _evidence(tiles, grid, region, margin_m)
     vertical, horizontal = _with_edges(vertical, relief, 0, grid), _with_edges(horizontal, relief, 1, grid)
     spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
@@ -95,7 +103,7 @@ def _tiles(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> li
 
 
 def _evidence(tiles: list[Tile], grid: PlaneGrid, region: PlaneRegion, margin_m: float) -> tuple[Evidence, Evidence]:
-    allowed = cv2.blur(support_on(grid, region, _ALLOWED_M + margin_m).astype(np.float32), (3, 3)) > 0.5
+    allowed = cv2.blur(support_on(grid, region, tuned(Params).allowed_m + margin_m).astype(np.float32), (3, 3)) > 0.5
     return gather(tiles, 0, grid.cell_m, allowed), gather(tiles, 1, grid.cell_m, allowed)
 
 

@@ -1,15 +1,23 @@
 """Gravity-aligned bounding boxes of partly seen things."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.boxes import box_at_yaw, upright_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.track import ThingBox
+from r2c2r_core.tuning import param, tuned
 
-_TRIM = 0.01
-_SNAP_RAD = np.radians(6.0)
-_SNAP_AREA = 1.06  # a Manhattan box this much larger than the smallest is still preferred
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a thing stands square with the room."""
+
+    trim: float = param(0.01, "share", "of the points at either end", ge=0, lt=0.5)
+    snap_rad: float = param(float(np.radians(6.0)), "rad", "off the room's directions, within which it is square with them")
+    snap_area: float = param(1.06, "ratio", "to the smallest box, of a square one that is still preferred")
 
 
 def box_of(
@@ -24,12 +32,13 @@ def box_of(
 
     A round thing is as deep as it is wide: only its width is measured across the view, its back is not seen.
     """
+    params = tuned(Params)
     if round_thing:
         return _round_box(points_world, support_z_m, towards_world)
-    smallest = upright_box(points_world, trim=_TRIM)
-    aligned = box_at_yaw(points_world, manhattan_yaw_rad, trim=_TRIM)
+    smallest = upright_box(points_world, trim=params.trim)
+    aligned = box_at_yaw(points_world, manhattan_yaw_rad, trim=params.trim)
     off = abs((smallest.yaw_rad - manhattan_yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
-    snap = off < _SNAP_RAD or aligned.size_m[:2].prod() < _SNAP_AREA * smallest.size_m[:2].prod()
+    snap = off < params.snap_rad or aligned.size_m[:2].prod() < params.snap_area * smallest.size_m[:2].prod()
     box = aligned if snap else smallest
     centre = box.world_from_box.translation.copy()
     bottom, top = centre[2] - box.size_m[2] / 2, centre[2] + box.size_m[2] / 2
@@ -54,10 +63,11 @@ def _facing(rotation: np.ndarray, towards: Vector3) -> Vector3:
 
 
 def _round_box(points_world: Points, support_z_m: float | None, towards_world: Vector3) -> ThingBox:
+    params = tuned(Params)
     towards = towards_world - points_world.mean(axis=0)
     rotation = front_rotation(towards)
     local = points_world @ rotation
-    low, high = np.quantile(local, [_TRIM / 2, 1 - _TRIM / 2], axis=0)
+    low, high = np.quantile(local, [params.trim / 2, 1 - params.trim / 2], axis=0)
     width, top = high[0] - low[0], high[2]
     bottom = support_z_m if support_z_m is not None and support_z_m < top else low[2]
     centre = rotation @ np.array([(low[0] + high[0]) / 2, low[1] + width / 2, (bottom + top) / 2])

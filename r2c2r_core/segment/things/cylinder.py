@@ -1,6 +1,6 @@
 """A cylinder fitted to silhouettes: for small upright things where the poses disagree too much to carve a hull."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,8 +9,16 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.silhouettes import colours_of, hull_view, small_mask
 from r2c2r_core.segment.things.thing import Thing, ThingConfig
+from r2c2r_core.tuning import param, tuned
 
-WANDERS_M = 0.05  # how far small things were seen to wander between frames of such recordings
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Things whose poses disagree."""
+
+    wanders_m: float = param(
+        0.05, "m", "how far a small thing wanders between frames", source="seen on KinectFusion recordings of the real kitchen"
+    )
 
 
 def upright_shape(
@@ -50,13 +58,13 @@ def _cylinder(centre: Vector3, base: float, width: float, height: float, support
     polar = np.array(side + lids)
     vertices = np.stack([polar[:, 0] * np.cos(polar[:, 1]), polar[:, 0] * np.sin(polar[:, 1]), polar[:, 2]], axis=1)
     placed = vertices + np.array([centre[0], centre[1], base])
-    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=WANDERS_M, border_m=0.010)
+    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=tuned(Params).wanders_m, border_m=0.010)
 
 
 def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
     """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
     mask, share = small_mask(thing, scene, frame, 0.015)
-    view = hull_view(thing, scene, frame, pad_m=WANDERS_M + 0.03)
+    view = hull_view(thing, scene, frame, pad_m=tuned(Params).wanders_m + 0.03)
     if share < 0.9 or view is None or not mask.any():
         return None
     hull, _, area, scale = view

@@ -13,8 +13,14 @@ from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.silhouettes import small_mask
 from r2c2r_core.segment.things.thing import Thing, thing_mask
+from r2c2r_core.tuning import param, tuned
 
-_BORDER_M = 0.01  # how far borders were off, on samples and the real kitchen
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How well a thing's borders are known."""
+
+    border_m: float = param(0.01, "m", "how far borders are off", source="measured on samples and the real kitchen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +37,7 @@ class FoundThing:
     def see(self, frame: Frame) -> View:
         """Its pixels."""
         mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
-        border_m = 0.5 * self.thing.border_m if self.small else _BORDER_M
+        border_m = 0.5 * self.thing.border_m if self.small else tuned(Params).border_m
         sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, border_m))
 

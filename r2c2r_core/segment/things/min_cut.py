@@ -6,10 +6,19 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Points, Vector3
+from r2c2r_core.tuning import param, tuned
 
 _CAPACITY_SCALE = 1000.0
-_CONVEX_COST, _CONCAVE_COST, _COLOUR_COST = 2.0, 9.0, 0.6
 _LARGE = 1e5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What cutting a surface costs."""
+
+    convex_cost: float = param(2.0, "score", "of a convex crease, where things seldom part")
+    concave_cost: float = param(9.0, "score", "of a concave crease, where things meet")
+    colour_cost: float = param(0.6, "score", "of a colour edge")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,14 +127,15 @@ def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m:
 
 
 def _capacities(graph: VoxelGraph) -> np.ndarray:
+    params = tuned(Params)
     a, b = graph.edges.T
     towards = graph.positions[b] - graph.positions[a]
     length = np.linalg.norm(towards, axis=1)
     cosine = np.clip(_dot(graph.normals[a], graph.normals[b]), -1, 1)
     bend = _dot(graph.normals[b] - graph.normals[a], towards) / np.maximum(length, 1e-9)
     colour = _dot(graph.lab[a] - graph.lab[b], graph.lab[a] - graph.lab[b]) / 40**2
-    weight = np.arccos(cosine) + _COLOUR_COST * colour
-    cost = np.where(bend > 0.02, _CONVEX_COST, _CONCAVE_COST)
+    weight = np.arccos(cosine) + params.colour_cost * colour
+    cost = np.where(bend > 0.02, params.convex_cost, params.concave_cost)
     share = np.minimum(graph.area_m2[a], graph.area_m2[b]) / graph.size_m**2  # slivers hold little together
     return np.asarray(graph.size_m * 100 * (np.exp(-cost * weight) + 0.02) * np.clip(share, 0.05, 1.0) / 2)
 

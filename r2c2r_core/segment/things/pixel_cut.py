@@ -6,13 +6,20 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image, Mask
+from r2c2r_core.tuning import param, tuned
 
 _BINS = (16, 32, 32)  # of Lab: lightness changes with the light, hue does not
-_LARGEST_PX = 110  # a longer side is cut at a lower resolution, its border drawn at the full one
-_SMOOTH = 2.5  # cost of a border between equal colours, in log-odds a pixel
-_MOST_ODDS = 2.5  # a colour alone decides no pixel
-_UNSEEN = 2e-4  # share of a colour that neither side showed
 _CAPACITY_SCALE = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What cutting a picture costs."""
+
+    largest_px: int = param(110, "px", "a longer side is cut at a lower resolution, its border drawn at the full one", ge=16)
+    smooth: float = param(2.5, "score", "cost of a border between equal colours, in log-odds a pixel")
+    most_odds: float = param(2.5, "log", "of a colour: alone it decides no pixel")
+    unseen: float = param(2e-4, "share", "of a colour that neither side showed", gt=0, le=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,17 +35,18 @@ class ColourModel:
 
 def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
     """The model of (8-bit Lab image, pixels surely on the thing, pixels surely off it)."""
+    params = tuned(Params)
     on = sum((_histogram(lab[sure]) for lab, sure, _ in samples), np.zeros(_BINS))
     off = sum((_histogram(lab[sure]) for lab, _, sure in samples), np.zeros(_BINS))
     on, off = on / np.maximum(on.sum(), 1.0), off / np.maximum(off.sum(), 1.0)
-    odds = np.log((on + _UNSEEN) / (off + _UNSEEN))
-    return ColourModel(np.clip(odds, -_MOST_ODDS, _MOST_ODDS).astype(np.float32))
+    odds = np.log((on + params.unseen) / (off + params.unseen))
+    return ColourModel(np.clip(odds, -params.most_odds, params.most_odds).astype(np.float32))
 
 
 def cut_pixels(rgb: Image, odds: np.ndarray) -> Mask:
     """The mask of least cost: log-odds of being the thing (h, w) for each pixel, and borders that prefer colour edges."""
     height, width = odds.shape
-    shrink = max(1.0, max(height, width) / _LARGEST_PX)
+    shrink = max(1.0, max(height, width) / tuned(Params).largest_px)
     size = (max(4, round(width / shrink)), max(4, round(height / shrink)))
     small_odds = cv2.resize(odds.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     small_rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
@@ -50,6 +58,7 @@ def cut_pixels(rgb: Image, odds: np.ndarray) -> Mask:
 
 
 def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
+    params = tuned(Params)
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
@@ -62,7 +71,7 @@ def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
     flat = lab.reshape(-1, 3)
     steps = [((flat[a.ravel()] - flat[b.ravel()]) ** 2).sum(axis=1) for a, b, _ in pairs]
     usual = 2 * float(np.mean(np.concatenate(steps[:2]))) + 1e-6
-    weights = [_SMOOTH * w * (np.exp(-step / usual) + 0.04) for step, (_, _, w) in zip(steps, pairs, strict=True)]
+    weights = [params.smooth * w * (np.exp(-step / usual) + 0.04) for step, (_, _, w) in zip(steps, pairs, strict=True)]
     a = np.concatenate([first.ravel() for first, _, _ in pairs])
     b = np.concatenate([second.ravel() for _, second, _ in pairs])
     weight = np.concatenate(weights)

@@ -1,5 +1,7 @@
 """Silhouettes of small things: a hull rendered into a frame, shifted by that frame's pose error, snapped to colour edges."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -10,15 +12,23 @@ from r2c2r_core.segment.occlusion import colour_gradient
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
 from r2c2r_core.segment.things.thing import Thing
+from r2c2r_core.tuning import param, tuned
 
-_ATTACHED_M, _ATTACHED_ODDS = 0.035, 3.2  # handles and caps that hulls lack: depth and colour together may add them
-_SURE_ODDS = 9.0
-_ON_SUPPORT_M = 0.008  # above it: lower points are the support's
-_POSE_ERROR_M = 0.04  # of the height of a support between frames, at most
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a small thing's outline is drawn."""
+
+    sure_odds: float = param(9.0, "log", "of a pixel that is known")
+    on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
+    pose_error_m: float = param(0.04, "m", "of the height of a support between frames, at most")
+    attached_m: float = param(0.035, "m", "from the hull: handles and caps that it lacks")
+    attached_odds: float = param(3.2, "log", "of such a place: depth and colour together may add it")
 
 
 def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None) -> tuple[Mask, float]:
     """The visible pixels of a small thing: where its hull, this frame's depth and its colours say, cut along colour edges."""
+    params = tuned(Params)
     camera = frame.rgb_camera
     empty = np.zeros((camera.height, camera.width), bool)
     view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
@@ -31,8 +41,8 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
     rgb = scene.rgb(frame.index)[area]
     odds = seen_odds(thing, scene, frame, area)
     hull = _moved(hull, _best_shift(hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale)))
-    odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), _ATTACHED_M * scale)
-    odds[hidden] = -_SURE_ODDS
+    odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), params.attached_m * scale)
+    odds[hidden] = -params.sure_odds
     for click in thing.clicks:
         if click.frame == frame.index:
             _mark(odds, click.x - area[1].start, click.y - area[0].start, 0.004 * scale, click.label)
@@ -42,9 +52,10 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
 
 def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: int) -> None:
     """Settle the pixels under a click."""
+    params = tuned(Params)
     row, column = np.ogrid[: odds.shape[0], : odds.shape[1]]
     near = np.hypot(column + 0.5 - x_px, row + 0.5 - y_px) < max(radius_px, 2.0)
-    odds[near] = _SURE_ODDS if label else -_SURE_ODDS
+    odds[near] = params.sure_odds if label else -params.sure_odds
 
 
 def seen_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
@@ -74,6 +85,7 @@ def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) ->
 
 def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
     """How much higher than it stands one frame's depth shows the support around the thing: that frame's pose error."""
+    params = tuned(Params)
     if support_z_m is None:
         return 0.0
     depth = scene.depth(frame.index)
@@ -91,10 +103,12 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
     row, column = np.nonzero(patch > 0)
     uv = np.stack([columns.start + 2 * column + 0.5, rows.start + 2 * row + 0.5], axis=1)
     heights = frame.world_from_camera.apply(unproject(uv, patch[row, column].astype(np.float64), camera))[:, 2] - support_z_m
-    near = heights[np.abs(heights) < _POSE_ERROR_M]
+    near = heights[np.abs(heights) < params.pose_error_m]
     if len(near) < 60:
         return 0.0
-    counts, edges = np.histogram(near, bins=round(2 * _POSE_ERROR_M / 0.004), range=(-_POSE_ERROR_M, _POSE_ERROR_M))
+    counts, edges = np.histogram(
+        near, bins=round(2 * params.pose_error_m / 0.004), range=(-params.pose_error_m, params.pose_error_m)
+    )
     peak = float(edges[int(np.argmax(np.convolve(counts, [1, 2, 1], mode="same")))] + 0.002)
     return float(np.median(near[np.abs(near - peak) < 0.008]))
 
@@ -171,7 +185,7 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, sli
     if thing.support_z_m is not None:
         offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
         standing = ((points[..., :2] > low[:2]) & (points[..., :2] < high[:2])).all(axis=-1)
-        on_support = points[..., 2] < thing.support_z_m + offset + _ON_SUPPORT_M
+        on_support = points[..., 2] < thing.support_z_m + offset + tuned(Params).on_support_m
         verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # the foot of it is as low
     coarse = max(frame.rgb_camera.width / camera.width, 1.0)
     odds = np.where(patch > 0, verdict, 0.0) * (2.0 / np.sqrt(coarse))
@@ -186,12 +200,13 @@ def _depth_index(span: slice, colour_size: int, depth_size: int) -> np.ndarray:
 
 def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
     """Log-odds by the hull: little near its outline, and not everything where a handle may be (`attached_px` around it)."""
+    params = tuned(Params)
     outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
     inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     deep = min(band_px, 0.5 * float(inside.max()))
     steps = np.where(hull, (inside - 0.5) / max(deep, 0.5), (0.5 - outside) / band_px)
-    odds = np.clip(steps * (1 + steps**2 / 4), -_ATTACHED_ODDS, _SURE_ODDS)
-    odds[outside > attached_px] = -_SURE_ODDS
+    odds = np.clip(steps * (1 + steps**2 / 4), -params.attached_odds, params.sure_odds)
+    odds[outside > attached_px] = -params.sure_odds
     return np.asarray(odds)
 
 

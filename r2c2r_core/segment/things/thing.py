@@ -15,16 +15,26 @@ from r2c2r_core.segment.occlusion import refine_border
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.min_cut import VoxelGraph, build_graph, cut
 from r2c2r_core.segment.things.pixel_cut import ColourModel
+from r2c2r_core.tuning import param, tuned
 
-_SUPPORT_REACH_M = 0.35
-_BIN_M = 0.005  # of heights
-_SECTORS = 16
-_AROUND = 0.4  # share of the directions in which a support goes on: walls and edges bound it, neighbours stand on it
-_CLEARANCE_M = 0.012
-_SEEN_THROUGH_M = 0.10
-_FURNITURE_GAP_M = 0.08  # legs and seats are lost in part
-_LEVEL_COS = 0.92
-_FARTHEST_M = 1.0  # from a click: of what is larger, as a worktop, that much is found
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What belongs to a thing."""
+
+    support_reach_m: float = param(0.35, "m", "from the clicks, where a support is looked for")
+    bin_m: float = param(0.005, "m", "of heights that are counted together", gt=0)
+    sectors: int = param(16, "count", "directions about the clicks", ge=4)
+    around: float = param(
+        0.4, "share", "of the directions in which a support goes on: walls and edges bound it, neighbours stand on it"
+    )
+    clearance_m: float = param(0.012, "m", "above its support, from where surface is a thing's")
+    seen_through_m: float = param(
+        0.10, "m", "behind the surface: the sensor looked through it, between slats, which the surface closes"
+    )
+    furniture_gap_m: float = param(0.08, "m", "that a thing on the floor may be parted by: legs and seats are lost in part")
+    level_cos: float = param(0.92, "cosine", "with up, of a support")
+    farthest_m: float = param(1.0, "m", "from a click: of what is larger, as a worktop, that much is found")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +50,7 @@ class ThingConfig:
 def sized_as(category: Category) -> ThingConfig:
     """How large things of a category may be."""
     return ThingConfig(
-        radius_m=min(category.longest_m / 2, _FARTHEST_M),
+        radius_m=min(category.longest_m / 2, tuned(Params).farthest_m),
         width_m=category.width.usual if category.round else None,
         round=category.round,
         on_floor=category.on_floor,
@@ -70,6 +80,7 @@ def find_thing(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, *, voxel_m: float | None = None
 ) -> Thing | None:
     """The surface that the clicks (world points) belong to; None when there is none within reach."""
+    params = tuned(Params)
     reach = 2.2 * config.radius_m + 0.15
     vertices, faces, colours = _local_surface(scene, positives, reach, voxel_m)
     if len(faces) < 20:
@@ -78,7 +89,7 @@ def find_thing(
     keep = np.ones(len(faces), bool)
     if support is not None:
         height = vertices[:, 2]
-        keep = (height[faces[:, 0]] + height[faces[:, 1]] + height[faces[:, 2]]) / 3 > support + _CLEARANCE_M
+        keep = (height[faces[:, 0]] + height[faces[:, 1]] + height[faces[:, 2]]) / 3 > support + params.clearance_m
     if keep.sum() < 10:
         return None
     faces = faces[keep]
@@ -89,7 +100,7 @@ def find_thing(
         return None
     refused = [graph.nearest(point) for point in negatives]
     refused = [voxel for voxel in refused if voxel not in seeds]
-    gap_m = _FURNITURE_GAP_M if config.on_floor else 0.0
+    gap_m = params.furniture_gap_m if config.on_floor else 0.0
     structure = _structure(graph, seeds)
     chosen, _ = cut(graph, seeds, refused, config.radius_m, structure, gap_m=gap_m, upright=config.on_floor)
     return _extract(vertices, faces, chosen[graph.voxel_of_face], support)
@@ -113,7 +124,7 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
     depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
     hidden = projected & scene.noise.occluded(depth, model, 0.05)
     sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
-    through = scene.noise.seen_through(sensor, model, _SEEN_THROUGH_M)  # between slats, which the surface closes
+    through = scene.noise.seen_through(sensor, model, tuned(Params).seen_through_m)  # between slats, which the surface closes
     shown = projected & ~hidden & ~through
     shown = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     share = float(shown.sum() / projected.sum())
@@ -143,29 +154,30 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
 
     Around: in enough directions, farther off than the thing reaches. Where there is none, the highest large level one below.
     """
+    params = tuned(Params)
     if config.on_floor:
         return 0.0 if scene.capture.room.floor_found else None
     lowest = positives[np.argmin(positives[:, 2])]
-    centres, areas = _level_faces(scene, lowest, _SUPPORT_REACH_M + 1.5 * config.radius_m)
+    centres, areas = _level_faces(scene, lowest, params.support_reach_m + 1.5 * config.radius_m)
     below = centres[:, 2] < lowest[2] - 0.004
     centres, areas = centres[below], areas[below]
     if len(centres) == 0:
         return None
     away = centres[:, :2] - lowest[:2]
     distance = np.hypot(away[:, 0], away[:, 1])
-    height_bin = np.floor((centres[:, 2] - centres[:, 2].min()) / _BIN_M).astype(int)
-    sector = np.floor((np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) % 1.0) * _SECTORS).astype(int) % _SECTORS
+    height_bin = np.floor((centres[:, 2] - centres[:, 2].min()) / params.bin_m).astype(int)
+    sector = np.floor((np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) % 1.0) * params.sectors).astype(int) % params.sectors
     ring = distance > config.radius_m
-    spread = np.zeros((height_bin.max() + 1, _SECTORS))
+    spread = np.zeros((height_bin.max() + 1, params.sectors))
     np.add.at(spread, (height_bin[ring], sector[ring]), areas[ring])
     around = (_over_bins(spread) > 5e-4).mean(axis=1)
-    near = distance < _SUPPORT_REACH_M + config.radius_m
+    near = distance < params.support_reach_m + config.radius_m
     profile = _over_bins(np.bincount(height_bin[near], areas[near], len(spread))[:, None])[:, 0]
     enough = max(0.005, 0.15 * np.pi * (0.7 * config.radius_m) ** 2)
     peaks = [i for i in range(len(profile)) if profile[i] > enough and profile[i] == profile[max(0, i - 4) : i + 5].max()]
     if not peaks:
         return None
-    reaching = [i for i in peaks if around[i] >= _AROUND]
+    reaching = [i for i in peaks if around[i] >= params.around]
     top = (reaching or peaks)[-1]
     chosen = near & (np.abs(height_bin - top) <= 2)
     return float(np.average(centres[chosen, 2], weights=areas[chosen]))
@@ -175,7 +187,7 @@ def _level_faces(scene: Scene, point: Vector3, reach_m: float) -> tuple[Points, 
     """Centres and areas of the surface's level faces around a point, in plan."""
     parts = scene.parts
     near = parts.faces_near(point, reach_m, any_height=True)
-    near = near[parts.upward[near] > _LEVEL_COS]
+    near = near[parts.upward[near] > tuned(Params).level_cos]
     near = near[np.linalg.norm(parts.middles[near, :2] - point[:2], axis=1) < reach_m]
     return parts.middles[near], parts.areas_m2[near]
 

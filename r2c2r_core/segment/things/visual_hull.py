@@ -1,6 +1,6 @@
 """Visual hull of small things: space carved by depth (free space), then by colour silhouettes, which forgives coarse depth."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,35 +10,48 @@ from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.cylinder import WANDERS_M, upright_shape
+from r2c2r_core.segment.things.cylinder import Params as CylinderParams
+from r2c2r_core.segment.things.cylinder import upright_shape
 from r2c2r_core.segment.things.silhouettes import colours_of, occluders, raised, small_mask, support_offset, usual_shift
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, support_height
 from r2c2r_core.segment.things.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 from r2c2r_core.segment.viewpoints import best_views
+from r2c2r_core.tuning import param, tuned
 
-_FRAMES = 18
-_GLIMPSE_FRAMES = 6
-_VOXELS, _GLIMPSE_VOXELS = 100_000, 25_000
-_POSES_AGREE_M = 0.006  # phones: below 0.005; KinectFusion on the real kitchen: 0.009
-_NEAR_SUPPORT_M = 0.05  # more than a frame's height may be off
-_OFF_SUPPORT_M, _OFF_WALL_M = 0.012, 0.03  # nearer points are the structure's
-_DEPTH_SLACK_M = 0.022  # what coarse depth of a curved thing is off by
-_SEEN_THROUGH = 0.12  # share of the views that may err before a voxel counts as empty
-_SEEN_SHARE, _AGREED_SHARE = 0.05, 0.35  # of the views, that must hit a cell: where poses agree, and where each smears it
-_INSIDE = 0.85  # share of silhouettes that must hold a voxel
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How small things are carved."""
+
+    frames: int = param(18, "count", "that carve", ge=1)
+    glimpse_frames: int = param(6, "count", "that carve for a first look", ge=1)
+    voxels: int = param(100_000, "count", "of a grid", ge=1000)
+    glimpse_voxels: int = param(25_000, "count", "of a grid for a first look", ge=1000)
+    poses_agree_m: float = param(
+        0.006, "m", "spread of poses that fusing bears", source="phones: below 0.005; KinectFusion on the real kitchen: 0.009"
+    )
+    near_support_m: float = param(0.05, "m", "about the grid", source="more than a frame's height may be off")
+    off_support_m: float = param(0.012, "m", "above the support: nearer points are the support's")
+    off_wall_m: float = param(0.03, "m", "before a wall: nearer points are the wall's")
+    depth_slack_m: float = param(0.022, "m", "what coarse depth of a curved thing is off by")
+    seen_through: float = param(0.12, "share", "of the views that may err before a voxel counts as empty")
+    seen_share: float = param(0.05, "share", "of the views that must hit a cell where poses agree")
+    agreed_share: float = param(0.35, "share", "of the views that must hit a cell where each smears it")
+    inside: float = param(0.85, "share", "of silhouettes that must hold a voxel", gt=0, lt=1)
 
 
 def find_small(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Thing | None:
     """A small thing's visual hull; None when depth shows nothing that stands apart at the clicks."""
+    params = tuned(Params)
     support = support_height(scene, positives, config)
-    voxels = _voxels_around(scene, positives, config, support)
-    views = best_views(scene, positives.mean(axis=0), _FRAMES)
+    voxels = _voxels_around(scene, positives, config, support, params.voxels)
+    views = best_views(scene, positives.mean(axis=0), params.frames)
     if len(views) < 2:
         return None
     spread = _pose_spread(scene, views, support, positives.mean(axis=0))
-    if spread > _POSES_AGREE_M:  # by more than fusing bears
+    if spread > params.poses_agree_m:  # by more than fusing bears
         return _loose(scene, positives, views, config, voxels, support, structure)
     solid = _depth_hull(scene, views, voxels, positives, negatives, support, structure)
     if solid is None:
@@ -51,13 +64,13 @@ def find_small(
     for band_m in (0.012, 0.007):  # the first silhouettes start from coarse depth, the next from the first
         thing = replace(thing, colours=colours_of(thing, scene, views, band_m))
         share = np.where(room, _silhouette_share(thing, fine, scene, views, band_m), 0)
-        inside = part_at(share > _INSIDE, fine, positives, negatives, reach_m=0.03)
-        better = mesh_of(np.where(grown(inside), share, 0), _INSIDE, fine, support) if inside is not None else None
+        inside = part_at(share > params.inside, fine, positives, negatives, reach_m=0.03)
+        better = mesh_of(np.where(grown(inside), share, 0), params.inside, fine, support) if inside is not None else None
         if better is None:
             break
         thing = replace(better, colours=thing.colours)
     if (
-        spread + usual_shift(thing, scene, views) > _POSES_AGREE_M
+        spread + usual_shift(thing, scene, views) > params.poses_agree_m
         or _too_wide(thing, config)
         or _lost(thing, scene, views, positives)
     ):
@@ -69,11 +82,12 @@ def glimpse_small(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Thing | None:
     """The same from the depth of a few frames alone: a first look within the time of a click."""
+    params = tuned(Params)
     support = support_height(scene, positives, config)
-    views = best_views(scene, positives.mean(axis=0), _GLIMPSE_FRAMES)[:_GLIMPSE_FRAMES]
+    views = best_views(scene, positives.mean(axis=0), params.glimpse_frames)[: params.glimpse_frames]
     if len(views) < 2:
         return None
-    voxels = _voxels_around(scene, positives, config, support, _GLIMPSE_VOXELS)
+    voxels = _voxels_around(scene, positives, config, support, params.glimpse_voxels)
     solid = _depth_hull(scene, views, voxels, positives, negatives, support, structure)
     return mesh_of(solid.astype(np.float32), 0.5, voxels, support) if solid is not None else None
 
@@ -88,7 +102,7 @@ def _depth_hull(
     structure: tuple[PlaneRegion, ...],
 ) -> np.ndarray | None:
     """The solid that depth leaves at the clicks; None where it shows nothing that stands apart."""
-    front = _seen_points(scene, views, voxels, positives, support, structure, _SEEN_SHARE)
+    front = _seen_points(scene, views, voxels, positives, support, structure, tuned(Params).seen_share)
     if len(front) < 12:
         return None
     solid = _carve(voxels, scene, views, support) & _as_deep_as_wide(voxels, front, views)
@@ -105,7 +119,7 @@ def _loose(
     structure: tuple[PlaneRegion, ...],
 ) -> Thing | None:
     """A rough shape where frames disagree about poses: a cylinder for round things, else what depth saw, filled below."""
-    front = _seen_points(scene, views, voxels, positives, support, structure, _AGREED_SHARE)
+    front = _seen_points(scene, views, voxels, positives, support, structure, tuned(Params).agreed_share)
     if config.round or len(front) < 12:
         return upright_shape(scene, positives, views, config, support)
     at = np.floor((front - voxels.origin) / voxels.size_m).astype(int).clip(0, np.array(voxels.shape) - 1)
@@ -115,7 +129,7 @@ def _loose(
     thing = mesh_of(_closed(solid).astype(np.float32), 0.5, voxels, support)
     if thing is None:
         return None
-    thing = replace(thing, pose_error_m=WANDERS_M, border_m=0.012)
+    thing = replace(thing, pose_error_m=tuned(CylinderParams).wanders_m, border_m=0.012)
     for _ in range(2):
         thing = replace(thing, colours=colours_of(thing, scene, views, 0.015))
     return thing
@@ -149,7 +163,7 @@ def _from_hull(thing: Thing, click: Vector3, views: list[Frame]) -> float:
     offset = thing.vertices - click
     along = offset @ sight
     across = np.linalg.norm(offset - along[:, None] * sight, axis=1)
-    return float(np.hypot(across, np.maximum(np.abs(along) - _DEPTH_SLACK_M, 0)).min())
+    return float(np.hypot(across, np.maximum(np.abs(along) - tuned(Params).depth_slack_m, 0)).min())
 
 
 def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre: Vector3) -> float:
@@ -158,7 +172,7 @@ def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre
     return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0
 
 
-def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None, count: int = _VOXELS) -> Voxels:
+def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None, count: int) -> Voxels:
     reach = 1.25 * config.radius_m + 0.02
     low, high = positives.min(axis=0) - reach, positives.max(axis=0) + reach
     low[2], high[2] = positives[:, 2].min() - 2.2 * config.radius_m, positives[:, 2].max() + 2.2 * config.radius_m
@@ -179,6 +193,7 @@ def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support
 
 def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | None) -> np.ndarray:
     """Voxels that depth does not show to be empty, and that some frame's depth touches or hides."""
+    params = tuned(Params)
     centres = voxels.centres
     empty, known = np.zeros(len(centres), np.int32), np.zeros(len(centres), np.int32)
     for frame in views:
@@ -186,9 +201,9 @@ def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | No
         offset = support_offset(scene, frame, support, centres.mean(axis=0))
         z, seen, _ = look_up(raised(centres, offset), frame.world_from_camera, frame.depth_camera, depth)
         valid = (z > 0.1) & (seen > 0)
-        empty += valid & (seen > z + _DEPTH_SLACK_M)
+        empty += valid & (seen > z + params.depth_slack_m)
         known += valid & (seen > z - 0.15)
-    return np.asarray((empty <= np.maximum(1, _SEEN_THROUGH * known)) & (known > 0)).reshape(voxels.shape)
+    return np.asarray((empty <= np.maximum(1, params.seen_through * known)) & (known > 0)).reshape(voxels.shape)
 
 
 def _seen_points(
@@ -201,22 +216,23 @@ def _seen_points(
     share: float,
 ) -> Points:
     """Depth points of the thing, each in a `share` of the views: connected to the clicks, off its support and off walls."""
+    params = tuned(Params)
     from scipy import ndimage
 
     cell = max(voxels.size_m, 0.008)
     extent = np.array(voxels.shape) * voxels.size_m
     shape = np.ceil(extent / cell).astype(int)
-    low, high = voxels.origin - _NEAR_SUPPORT_M, voxels.origin + shape * cell + _NEAR_SUPPORT_M
+    low, high = voxels.origin - params.near_support_m, voxels.origin + shape * cell + params.near_support_m
     hits = np.zeros(shape, np.int32)
     for frame in views:
         points = frame.world_from_camera.apply(_depth_points_near(scene, frame, low, high))
         points = raised(points, -support_offset(scene, frame, support, positives.mean(axis=0)))
         at = np.floor((points - voxels.origin) / cell).astype(int)
-        at[:, 2] = np.where(points[:, 2] < voxels.origin[2] + _OFF_SUPPORT_M, -1, at[:, 2])
+        at[:, 2] = np.where(points[:, 2] < voxels.origin[2] + params.off_support_m, -1, at[:, 2])
         inside = ((at >= 0) & (at < shape)).all(axis=1)
         points, at = points[inside], at[inside]
         for plane in structure:
-            off = np.abs((points - plane.world_from_plane.translation) @ plane.outward) > _OFF_WALL_M
+            off = np.abs((points - plane.world_from_plane.translation) @ plane.outward) > params.off_wall_m
             off |= ~plane.supports(points, 0.10)
             points, at = points[off], at[off]
         once = np.unique(at @ [shape[1] * shape[2], shape[2], 1])

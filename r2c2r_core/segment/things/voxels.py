@@ -6,8 +6,14 @@ import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.segment.things.thing import Thing
+from r2c2r_core.tuning import param, tuned
 
-_HEADROOM_M = 0.025
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Room about a thing."""
+
+    headroom_m: float = param(0.025, "m", "above what was seen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +35,7 @@ def with_headroom(solid: np.ndarray, voxels: Voxels) -> np.ndarray:
     """The solid, and the space just above its parts: depth loses thin tops such as caps."""
     from scipy import ndimage
 
-    tall = round(_HEADROOM_M / voxels.size_m)
+    tall = round(tuned(Params).headroom_m / voxels.size_m)
     up = np.zeros((3, 3, 2 * tall + 1), bool)
     up[1, 1, :] = True
     up[:, :, tall] = True
@@ -42,7 +48,7 @@ def cropped(voxels: Voxels, solid: np.ndarray) -> tuple[Voxels, np.ndarray]:
     """Finer voxels around the solid part alone."""
     filled = np.argwhere(solid)
     low, high = np.maximum(filled.min(axis=0) - 2, 0), np.minimum(filled.max(axis=0) + 3, solid.shape)
-    high[2] = min(high[2] + round(_HEADROOM_M / voxels.size_m), solid.shape[2])
+    high[2] = min(high[2] + round(tuned(Params).headroom_m / voxels.size_m), solid.shape[2])
     origin, extent = voxels.origin + low * voxels.size_m, (high - low) * voxels.size_m
     size = max(0.0025, float(np.prod(extent) / 80_000) ** (1 / 3))
     fine = Voxels(origin, size, tuple(np.ceil(extent / size).astype(int).tolist()))

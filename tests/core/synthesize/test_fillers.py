@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
-from r2c2r_core.kitchen.fillers import PARAMS
+from r2c2r_core.kitchen.fillers import Params
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -45,7 +45,7 @@ def corner(width: float) -> list[MeasuredObject]:
 
 def test_a_door_does_not_reach_behind_the_run_it_meets() -> None:
     a, b = leave_fillers(corner(0.63))
-    assert right_edge(a)[0] == pytest.approx(0.60 - PARAMS.width_m, abs=1e-9)
+    assert right_edge(a)[0] == pytest.approx(0.60 - Params().width_m, abs=1e-9)
     assert a.front_centre[1] == pytest.approx(0.0, abs=1e-9)  # the plane stays
     assert a.sources == ("inferred", "inferred", "measured")
     assert "80 mm" in a.warnings[0]
