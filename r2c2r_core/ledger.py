@@ -17,7 +17,7 @@ from r2c2r_core.errors import EnvironmentProblem, PromptError, R2C2RError, Stage
 from r2c2r_core.pool import Failed, Pool, Task
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.sources import source_key
-from r2c2r_core.tuning import Changes, changed, tuning
+from r2c2r_core.tuning import in_force, tuning
 from r2c2r_core.workspace import Workspace, content_key
 
 T = TypeVar("T")
@@ -101,7 +101,6 @@ class Ledger:
     progress: Progress
     until: Stage = "export"
     pool: Pool = field(default_factory=lambda: Pool(1))
-    numbers: Changes = field(default_factory=dict)  # tuned numbers that this run sets
     seconds: dict[str, float] = field(default_factory=dict)  # by stage: what its results took when they were computed
     failures: dict[str, str] = field(default_factory=dict)  # by object: one line
 
@@ -145,8 +144,7 @@ class Ledger:
         results: dict[str, T] = {}
         for name, item in items.items():
             try:
-                with tuning(changed(self.numbers)):
-                    results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
+                results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
             except _OBJECT_FAILS as error:
                 self._failed(stage, name, error)
         return results
@@ -168,8 +166,7 @@ class Ledger:
         opening, rest = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
         shared = {input.key: input for job in jobs.values() for input in job.inputs if isinstance(input, Shared)}
         for input in shared.values():
-            with tuning(changed(self.numbers)):
-                _open(input, opening)
+            _open(input, opening)
         _opened.cache_clear()
         results = {}
         tasks = {name: Task(store_noun, (job,)) for name, job in jobs.items()}
@@ -187,7 +184,7 @@ class Ledger:
         return results
 
     def _job(self, stage: Stage, name: str, compute: Callable[..., Any], inputs: tuple[Any, ...]) -> "_Job":
-        return _Job(self.work.root, stage, name, compute, inputs, self.numbers)
+        return _Job(self.work.root, stage, name, compute, inputs, in_force(*_rooms(stage)))
 
     def _found(self, job: "_Job") -> Kept[Any] | None:
         found = self.work.find(job.stage, job.name, job.key)
@@ -227,24 +224,28 @@ class _Job:
     name: str
     compute: Callable[..., Any]
     inputs: tuple[Any, ...]
-    numbers: Changes  # tuned numbers that the run sets
+    numbers: Mapping[str, Any]  # tuned numbers that the run sets, by module, of the stage and what it stands on
 
     @property
     def key(self) -> str:
         """Of the stage's source, of the geometry and nouns it stands on, of its tuned numbers, and of the inputs."""
-        rooms = (self.stage, *_STANDS_ON.get(self.stage, ()), "kitchen", "geometry", "model")
-        numbers = {path: values for path, values in self.numbers.items() if path.partition(".")[0] in rooms}
-        return content_key(self.stage, self.name, self.compute.__name__, source_key(*rooms), numbers, _keys(self.inputs))
+        source = source_key(*_rooms(self.stage), "model")
+        return content_key(self.stage, self.name, self.compute.__name__, source, self.numbers, _keys(self.inputs))
+
+
+def _rooms(stage: str) -> tuple[str, ...]:
+    """The packages whose code and numbers decide what a stage makes."""
+    return (stage, *_STANDS_ON.get(stage, ()), "kitchen", "geometry")
 
 
 def store_noun(job: _Job, *, progress: Progress) -> None:
     """Make a noun in a worker process, and store it."""
-    _compute(Workspace(job.root), job, progress)
+    with tuning({type(params): params for params in job.numbers.values()}):
+        _compute(Workspace(job.root), job, progress)
 
 
 def _compute(work: Workspace, job: _Job, progress: Progress) -> tuple[Any, float]:
-    with tuning(changed(job.numbers)):
-        return work.once(job.stage, job.name, job.key, lambda: job.compute(*_values(job.inputs, progress), progress=progress))
+    return work.once(job.stage, job.name, job.key, lambda: job.compute(*_values(job.inputs, progress), progress=progress))
 
 
 def _own(name: str, inputs: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -33,6 +33,7 @@ from r2c2r_core.segment.stage import SEGMENTERS, open_session, track_object
 from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
 from r2c2r_core.synthesize.stage import build_scene
+from r2c2r_core.tuning import changed, tuning
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace, content_key, file_key
 
@@ -79,8 +80,8 @@ def reconstruct(
     Objects are computed side by side in `workers` processes (0: as many as cores and memory allow); 1 starts none.
     """
     reconstruction, certificate = None, None
-    with work.locked(), Pool(workers or usual_workers()) as pool, suppress(Reached):
-        run = Ledger(work, progress, until, pool, request.config.numbers)
+    with work.locked(), tuning(changed(request.config.numbers)), Pool(workers or usual_workers()) as pool, suppress(Reached):
+        run = Ledger(work, progress, until, pool)
         reconstruction, certificate = _run(request, run)
         work.keep_seconds(run.seconds)
     return Outcome(

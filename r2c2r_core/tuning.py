@@ -74,9 +74,10 @@ def changed(changes: Changes) -> dict[type, Any]:
     return {(of := params_of(path)): dataclasses.replace(of(), **values) for path, values in changes.items()}
 
 
-def in_force() -> list[Any]:
-    """The numbers that a run has set, for the key of what it keeps."""
-    return [[path_of(of), numbers] for of, numbers in sorted(_active.get().items(), key=lambda item: path_of(item[0]))]
+def in_force(*rooms: str) -> dict[str, Any]:
+    """By module path: the numbers of these packages that are set here, for other processes and for the key of what is kept."""
+    found = {path_of(of): numbers for of, numbers in _active.get().items()}
+    return {path: numbers for path, numbers in found.items() if path.partition(".")[0] in rooms}
 
 
 def params_of(path: str) -> type[Any]:

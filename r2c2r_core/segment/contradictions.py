@@ -19,28 +19,46 @@ from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.tuning import param, tuned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """What counts as a contradiction."""
 
-    frames: int = 12  # of those both are seen in, spread over the recording, in which two objects' masks are compared
-    overlap: float = 0.1  # of the smaller mask: of the sample kitchens' right masks neighbours share at most 0.02
-    same: float = 0.5  # of the smaller mask, from which two objects are one
-    near_click: float = 0.01  # of the image's width: a click this near to a mask is on it, as fingers and borders go
-    unlikely: float = 0.37  # Size.fit below which a size is none of its category's: a tenth beyond what is sold
-    floor_m: float = 0.15  # above the floor, that what stands on it may seem to be: 0.03 m is the worst seen on the samples
-    in_wall_m: float = 0.04  # of a front from a wall's plane: the shallowest wall unit sold is 0.2 m deep
-
-
-PARAMS = Params()
+    frames: int = param(
+        12, "count", "of those both are seen in, spread over the recording, in which two objects' masks are compared", ge=1
+    )
+    overlap: float = param(
+        0.1,
+        "share",
+        "of the smaller mask that two objects may share",
+        source="of the sample kitchens' right masks neighbours share at most 0.02",
+    )
+    same: float = param(0.5, "share", "of the smaller mask, from which two objects are one")
+    near_click: float = param(
+        0.01, "share", "of the image's width: a click this near to a mask is on it", source="as fingers and borders go"
+    )
+    unlikely: float = param(
+        0.37,
+        "score",
+        "Size.fit, 0 to 1, below which a size is none of its category's",
+        source="a tenth beyond what is sold",
+    )
+    floor_m: float = param(
+        0.15,
+        "m",
+        "above the floor, that what stands on it may seem to be",
+        source="0.03 m is the worst seen on the sample kitchens",
+    )
+    in_wall_m: float = param(0.04, "m", "of a front from a wall's plane", source="the shallowest wall unit sold is 0.2 m deep")
 
 
 def find_contradictions(
-    tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], walls: Sequence[Wall], params: Params = PARAMS
+    tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], walls: Sequence[Wall]
 ) -> tuple[Contradiction, ...]:
     """All of them, those between two objects first; objects without a track are left out."""
+    params = tuned(Params)
     known = [prompt for prompt in prompts if prompt.name in tracks]
     found = list(_between(tracks, known, params))
     for prompt in known:

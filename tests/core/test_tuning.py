@@ -16,7 +16,7 @@ from r2c2r_core.ledger import Kept, Ledger, Shared
 from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.surface import in_threads
-from r2c2r_core.tuning import UNITS, Changes, modules_with_numbers, params_of, tuned, tuning
+from r2c2r_core.tuning import UNITS, Changes, changed, modules_with_numbers, params_of, tuned, tuning
 from r2c2r_core.workspace import Workspace
 
 ROOMS = ("ingest", "segment", "generate", "align", "synthesize", "warp", "kitchen", "geometry")
@@ -36,8 +36,8 @@ def opened(*_: Any, progress: Progress) -> float:
 def areas(root: Path, numbers: Changes, workers: int = 1) -> tuple[list[int], list[str]]:
     """What two objects were given, and what was computed for it."""
     work, items = Workspace(root), {"a": Kept(1, "a"), "b": Kept(2, "b")}
-    with Pool(workers) as pool:
-        ledger = Ledger(work, SILENT, "export", pool, numbers)
+    with tuning(changed(numbers)), Pool(workers) as pool:
+        ledger = Ledger(work, SILENT, "export", pool)
         found = ledger.each("segment", noun_of_number, items, items, Shared(opened, ()))
     return [kept.value.area_px for kept in found.values()], work.computed
 

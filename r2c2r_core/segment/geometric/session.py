@@ -221,7 +221,7 @@ def _cache_key(capture: Capture, config: SegmentConfig) -> str:
         source_key("segment", "kitchen", "geometry", "model"),
         capture.sha256,
         config,
-        in_force(),
+        in_force("segment", "kitchen", "geometry"),
         capture.world_from_capture.matrix.round(9).tolist(),
         len(capture.surface.vertices_world),
         len(capture.surface.faces),
