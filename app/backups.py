@@ -15,6 +15,7 @@ from app.files import folder_bytes, only_server, require_free
 from app.settings import DATABASE, Settings
 from r2c2r_core.disk import keep_private, resolved
 from r2c2r_core.errors import InputError
+from r2c2r_core.progress import SILENT, Progress
 
 LEFT_OUT = {"previews"}  # of a project's folder: made again when somebody looks
 
@@ -29,7 +30,7 @@ class Moved:
     files_bytes: int
 
 
-def backup(data_dir: Path, target: Path) -> Moved:
+def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> Moved:
     """Copy the database, and with it the projects' files unless `target` ends in .db; the server may run meanwhile.
 
     Raises InputError where the target exists or there is no database, NoSpace, DatabaseUnusable for a damaged one.
@@ -41,19 +42,20 @@ def backup(data_dir: Path, target: Path) -> Moved:
         raise InputError(f"{settings.database}: no such file", hint="name the data folder: r2c2r backup DATA -o OUT")
     require_usable(settings.database)
     only_database = target.suffix == ".db"
-    needed = settings.database.stat().st_size + (0 if only_database else folder_bytes(_projects(settings)))
-    require_free(target.parent, needed, settings.min_free_bytes)
+    files = 0 if only_database else folder_bytes(_projects(settings))
+    require_free(target.parent, settings.database.stat().st_size + files, settings.min_free_bytes)
+    progress.at(0.0, "copying the database")
     if only_database:
         copy_database(settings.database, target)
         return Moved(target.stat().st_size, 0, 0, 0)
     part = target.with_name(f".{target.name}.part")
     copy_database(settings.database, part / DATABASE)  # first: what it names is there, for files come before their rows
-    moved = _copy_missing(_projects(settings), part / "projects")
+    moved = _copy_missing(_projects(settings), part / "projects", files, progress.part(0.1, 1.0))
     part.rename(target)
     return Moved((target / DATABASE).stat().st_size, *moved)
 
 
-def restore(source: Path, data_dir: Path) -> Moved:
+def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Moved:
     """Put a backup's database in place, and those of its files that are missing; what is there stays.
 
     The database that was there is kept in backups/. Raises EnvironmentProblem while a server runs on the folder.
@@ -69,11 +71,14 @@ def restore(source: Path, data_dir: Path) -> Moved:
     with only_server(settings.data_dir):
         files = folder_bytes(source / "projects") if source.is_dir() else 0
         require_free(settings.data_dir, database.stat().st_size + files, 0)
+        progress.at(0.0, "copying the database")
         arriving = settings.data_dir / f".{DATABASE}.arriving"
         copy_database(database, arriving)
         _keep_replaced(settings)
         arriving.rename(settings.database)
-        moved = _copy_missing(source / "projects", _projects(settings)) if source.is_dir() else (0, 0, 0)
+        moved = (0, 0, 0)
+        if source.is_dir():
+            moved = _copy_missing(source / "projects", _projects(settings), files, progress.part(0.1, 1.0))
     return Moved(settings.database.stat().st_size, *moved)
 
 
@@ -89,10 +94,11 @@ def _keep_replaced(settings: Settings) -> None:
         path.rename(kept / path.name)
 
 
-def _copy_missing(source: Path, target: Path) -> tuple[int, int, int]:
-    """Copy files that are not there; how many projects they are of, how many they are, and their bytes."""
+def _copy_missing(source: Path, target: Path, there: int, progress: Progress) -> tuple[int, int, int]:
+    """Copy files that are not there, of `there` bytes in all; of how many projects, how many they are, and their bytes."""
     projects, files, size = set(), 0, 0
     for path in source.rglob("*"):
+        progress.at(size / max(there, 1), f"copying files {files}")
         parts = path.relative_to(source).parts
         place = target.joinpath(*parts)
         if path.is_symlink() or not path.is_file() or place.exists() or len(parts) < 2 or parts[1] in LEFT_OUT:

@@ -1,20 +1,25 @@
 """`r2c2r check-data`: whether the database and the files agree, both ways, and who may read them."""
 
 import hashlib
+import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from sqlmodel import Session, select
 
 from app.db.description import changed, read_description
-from app.db.engine import opened, reading
-from app.db.sqlite import connected
+from app.db.engine import opened, opened_to_read, reading
+from app.db.migrations import revisions
+from app.db.sqlite import connected, copy_database
 from app.db.tables import Bundle, Override, Project, Upload
+from app.db.usable import require_usable
 from app.files import ProjectFiles, half_received, project_files
 from app.settings import Settings
 from r2c2r_core.disk import open_to_others, resolved
 from r2c2r_core.errors import InputError
+from r2c2r_core.progress import SILENT, Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +35,49 @@ class DataFinding:
         return asdict(self)
 
 
-def check_data(data_dir: Path) -> list[DataFinding]:
-    """All findings; the server may run meanwhile. Raises InputError where there is no data folder, DatabaseUnusable."""
+def check_data(data_dir: Path, *, progress: Progress = SILENT) -> list[DataFinding]:
+    """All findings; nothing is changed, and the server may run meanwhile.
+
+    Raises InputError where there is no data folder or no database in it, DatabaseUnusable for one that cannot be read.
+    """
     settings = Settings(data_dir=resolved(data_dir))
     if not settings.data_dir.is_dir():
         raise InputError(f"{data_dir}: no such folder", hint="name the data folder")
-    found = list(_modes(settings))
-    with opened(settings.database) as engine, reading(engine) as session:
-        found += [*_damage(settings.database), *_missing(session, settings), *_unknown(session, settings)]
+    revision = require_usable(settings.database, to_write=False)
+    if revision is None:
+        raise InputError(f"{settings.database}: no database yet", hint="r2c2r serve begins one; is it the right folder?")
+    progress.at(0.0, "reading the database")
+    found = [*_modes(settings), *_revision(settings.database, revision), *_damage(settings.database)]
+    with (
+        _newest_tables(settings.database, revision) as database,
+        opened_to_read(database) as engine,
+        reading(engine) as session,
+    ):
+        found += [*_missing(session, settings, progress.part(0.1, 1.0)), *_unknown(session, settings)]
     return found
+
+
+@contextmanager
+def _newest_tables(database: Path, revision: str) -> Iterator[Path]:
+    """The database itself, or where it is of an older revision a copy of it that was brought to the newest."""
+    if revision == revisions()[-1]:
+        yield database
+        return
+    with tempfile.TemporaryDirectory(prefix="r2c2r-check-data-") as folder:
+        copy = Path(folder) / database.name
+        copy_database(database, copy)
+        with opened(copy):
+            pass
+        yield copy
+
+
+def _revision(database: Path, revision: str) -> Iterator[DataFinding]:
+    newest = revisions()[-1]
+    if revision != newest:
+        said = (
+            f"revision {revision}, compared in a copy of {newest}; r2c2r serve brings it there and keeps a copy of it as it is"
+        )
+        yield DataFinding("outdated", str(database), said)
 
 
 def _modes(settings: Settings) -> Iterator[DataFinding]:
@@ -56,9 +95,9 @@ def _damage(database: Path) -> Iterator[DataFinding]:
             yield DataFinding("damaged", str(database), f"row {row} of {table} belongs to a row of {parent} that is not there")
 
 
-def _missing(session: Session, settings: Settings) -> Iterator[DataFinding]:
+def _missing(session: Session, settings: Settings, progress: Progress) -> Iterator[DataFinding]:
     """Files that rows tell of and that are not there, or are not what the rows say."""
-    for project in session.exec(select(Project)):
+    for project in progress.each(session.exec(select(Project)).all(), "files of project"):
         files = project_files(settings.data_dir, project.id, project.work_path)
         named = [("recording", Path(project.source_path))] if project.source_path else []
         if project.status == "ready":

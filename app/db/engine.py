@@ -2,7 +2,7 @@
 
 import logging
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,7 @@ def open_engine(database: Path, *, anew: bool = False) -> Engine:
     is no file beside projects (an empty one would hide them), unless it is to be made `anew`.
     """
     require_usable(database, anew=anew)
-    engine = create_engine(f"sqlite:///{database}", connect_args={"check_same_thread": False, "timeout": 10})
-    event.listen(engine, "connect", _prepare)
-    event.listen(engine, "begin", _begin)
+    engine = _engine(database, _prepare)
     with _said_plainly(engine):
         migrate(engine)
         require_tables(engine)
@@ -40,6 +38,16 @@ def open_engine(database: Path, *, anew: bool = False) -> Engine:
 def opened(database: Path, *, anew: bool = False) -> Iterator[Engine]:
     """`open_engine` for as long as the block lasts."""
     engine = open_engine(database, anew=anew)
+    try:
+        yield engine
+    finally:
+        engine.dispose()
+
+
+@contextmanager
+def opened_to_read(database: Path) -> Iterator[Engine]:
+    """The engine of a database of the newest tables, which nothing can be written with, while the block lasts."""
+    engine = _engine(database, _prepare_to_read)
     try:
         yield engine
     finally:
@@ -95,6 +103,18 @@ def _said_plainly(engine: Engine) -> Iterator[None]:
             raise
         _log.warning("the database: %s", error.orig)
         raise said from error
+
+
+def _engine(database: Path, prepare: Callable[[sqlite3.Connection, Any], None]) -> Engine:
+    engine = create_engine(f"sqlite:///{database}", connect_args={"check_same_thread": False, "timeout": 10})
+    event.listen(engine, "connect", prepare)
+    event.listen(engine, "begin", _begin)
+    return engine
+
+
+def _prepare_to_read(connection: sqlite3.Connection, _record: Any) -> None:
+    connection.isolation_level = None
+    connection.execute("PRAGMA query_only=ON")
 
 
 def _prepare(connection: sqlite3.Connection, _record: Any) -> None:

@@ -8,20 +8,22 @@ from app.db.sqlite import RESTORE, connected, require_sound
 from app.errors import DatabaseUnusable
 
 
-def require_usable(database: Path, *, anew: bool = False, to_write: bool = True) -> None:
-    """Raise DatabaseUnusable unless the file is a sound database that this r2c2r knows, or may be begun.
+def require_usable(database: Path, *, anew: bool = False, to_write: bool = True) -> str | None:
+    """The revision of its tables, None where there are none yet; raises DatabaseUnusable unless the file is a sound database
+    that this r2c2r knows, or may be begun.
 
     Beside projects none is begun unless `anew` says that they will be adopted. `to_write`: it has to be writable too.
     """
     if database.is_dir():
         raise DatabaseUnusable(f"{database}: a folder, where the database should be", hint="move it away")
-    begun = database.is_file() and database.stat().st_size > 0 and _checked_tables(database, to_write)
-    if not begun and not anew:
+    revision = _checked(database, to_write) if database.is_file() and database.stat().st_size > 0 else None
+    if revision is None and not anew:
         _refuse_beside_projects(database)
+    return revision
 
 
-def _checked_tables(database: Path, to_write: bool) -> bool:
-    """Whether it has tables, once it was found sound, of a known revision and, where that is asked for, writable."""
+def _checked(database: Path, to_write: bool) -> str | None:
+    """Its revision, once it was found sound, of a known one and, where that is asked for, writable; None without tables."""
     with connected(database) as connection:
         require_sound(connection, database, "quick_check")
         if to_write:
@@ -29,13 +31,11 @@ def _checked_tables(database: Path, to_write: bool) -> bool:
             connection.execute("CREATE TABLE of_a_moment (it)")  # BEGIN itself takes a file that may only be read
             connection.execute("ROLLBACK")
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-        if tables:
-            _require_known(connection, database, tables)
-    return bool(tables)
+        return _known_revision(connection, database, tables) if tables else None
 
 
-def _require_known(connection: sqlite3.Connection, database: Path, tables: set[str]) -> None:
-    """Raise DatabaseUnusable unless the tables say which of our revisions they are."""
+def _known_revision(connection: sqlite3.Connection, database: Path, tables: set[str]) -> str:
+    """Which of our revisions the tables are; raises DatabaseUnusable where they do not say, or are of none of ours."""
     row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if "alembic_version" in tables else None
     if row is None:
         raise DatabaseUnusable(f"{database}: tables that do not say which revision they are", hint=RESTORE)
@@ -45,6 +45,7 @@ def _require_known(connection: sqlite3.Connection, database: Path, tables: set[s
             f"{database}: revision {row[0]}, where this r2c2r knows {known[0]} to {known[-1]}",
             hint="use the r2c2r that made it, or a copy from the folder backups/ beside it",
         )
+    return str(row[0])
 
 
 def _refuse_beside_projects(database: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, web_module
+from r2c2r_core.terminal import show_progress
 
 
 def add(parsers: Parsers) -> None:
@@ -17,7 +18,8 @@ def add(parsers: Parsers) -> None:
 
 def backup(options: argparse.Namespace) -> int:
     """A copy of the data folder, also while it is served."""
-    moved = web_module("backups").backup(options.folder, options.target)
+    with show_progress() as progress:
+        moved = web_module("backups").backup(options.folder, options.target, progress=progress.for_stage("backup"))
     print(f"{options.target}: {described(moved)}; the database is sound")
     return 0
 

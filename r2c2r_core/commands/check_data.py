@@ -3,7 +3,7 @@
 import argparse
 
 from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, add_json, web_module, write_json
-from r2c2r_core.terminal import table
+from r2c2r_core.terminal import show_progress, table
 
 
 def add(parsers: Parsers) -> None:
@@ -15,7 +15,8 @@ def add(parsers: Parsers) -> None:
 
 def check_data(options: argparse.Namespace) -> int:
     """Whether the database is sound and agrees with the files, both ways; also while it is served."""
-    found = web_module("data_check").check_data(options.folder)
+    with show_progress() as progress:
+        found = web_module("data_check").check_data(options.folder, progress=progress.for_stage("check-data"))
     if options.json:
         write_json(options.json, {"version": 1, "findings": [finding.to_json() for finding in found]})
     print(table(("what", "where", "detail"), [(f.what, f.where, f.detail) for f in found]) if found else "all is well")

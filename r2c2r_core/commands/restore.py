@@ -5,6 +5,7 @@ from pathlib import Path
 
 from r2c2r_core.commands.backup import described
 from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, web_module
+from r2c2r_core.terminal import show_progress
 
 
 def add(parsers: Parsers) -> None:
@@ -16,6 +17,7 @@ def add(parsers: Parsers) -> None:
 
 def restore(options: argparse.Namespace) -> int:
     """A backup into a data folder that is not served; what is there stays, the older database in backups/."""
-    moved = web_module("backups").restore(options.source, options.folder)
+    with show_progress() as progress:
+        moved = web_module("backups").restore(options.source, options.folder, progress=progress.for_stage("restore"))
     print(f"{options.folder}: {described(moved)} put in place")
     return 0

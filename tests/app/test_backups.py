@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import create_engine, text
 
 from app.backups import backup
 from app.data_check import check_data
+from app.db.migrations import migrate, revisions
 from app.files import only_server
 from r2c2r_core.cli import main
 from tests.app.conftest import Running
@@ -134,6 +136,40 @@ def test_check_data_finds_what_is_missing_unknown_damaged_and_open(
     (data / "r2c2r.db").write_bytes(b"damaged" * 1000)
     assert main(["check-data", str(data)]) == 2
     assert main(["check-data", str(tmp_path / "nowhere")]) == 2
+
+
+def test_an_older_database_is_checked_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    older, path = revisions()[-2], tmp_path / "r2c2r.db"
+    engine = create_engine(f"sqlite:///{path}")
+    migrate(engine, older)
+    with engine.begin() as connection:
+        columns = "id, name, status, created, updated, source_name, media_version, capture, notices"
+        connection.execute(text(f"INSERT INTO projects ({columns}) VALUES ('lost', 'x', 'ready', 0, 0, 'x', '', '{{}}', '[]')"))
+    engine.dispose()
+    before = path.read_bytes()
+    assert findings(tmp_path) >= {("outdated", "r2c2r.db"), ("missing", "lost"), ("missing", "frames.json")}
+    assert main(["check-data", str(tmp_path)]) == 1
+    assert f"revision {older}" in capsys.readouterr().out
+    assert path.read_bytes() == before
+    assert [found.name for found in tmp_path.iterdir()] == ["r2c2r.db"]
+
+
+def test_a_folder_without_a_database_gets_none_by_being_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-data", str(tmp_path)]) == 2
+    assert "no database yet" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_takes_long_says_where_it_is(kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data, _ = kept
+    assert main(["backup", str(data), "-o", str(tmp_path / "copy")]) == 0
+    assert main(["restore", str(tmp_path / "copy"), str(data)]) == 0
+    assert main(["check-data", str(data)]) == 0
+    said = capsys.readouterr().err.splitlines()
+    for step in ("backup 0 % copying the database", "restore 0 % copying the database", "check-data 0 % reading the database"):
+        assert step in said
+    assert any(line.startswith("backup 10 % copying files") for line in said)
+    assert any(line.startswith("check-data 10 % files of project") for line in said)
 
 
 def test_rows_without_their_parents_are_told(kept: tuple[Path, str]) -> None:
