@@ -16,6 +16,8 @@ from app.services import bundles, marks
 from app.services.context import Context
 from app.viewer import proxy
 
+_CLOSING: dict[type[Exception], int] = {Forbidden: 4403, TooMany: 4429}  # as HTTP would say, in the range of applications
+
 
 def open_view(context: Context, project_id: str, session_id: str) -> schemas.ViewerSession:
     """Where the 3D view is, or what to show instead."""
@@ -81,13 +83,13 @@ async def page(context: Context, token: str, path: str, session_id: str) -> Resp
 
 async def socket(context: Context, token: str, connection: WebSocket) -> None:
     """The 3D view's connection."""
+    person = connection.state.person
     try:
-        port = await _port(replace(context, person=connection.state.person), token, connection.state.session)
+        with context.viewer.watched(token, person.name):
+            port = await _port(replace(context, person=person), token, connection.state.session)
+            await proxy.pump(connection, port, context.viewer.key, lambda: _session_end(context, connection))
     except (Forbidden, TooMany, Unavailable) as error:
-        await connection.close(4403 if isinstance(error, Forbidden) else 1013, error.message)
-        return
-    with context.viewer.watched(token):
-        await proxy.pump(connection, port, context.viewer.key, lambda: _session_end(context, connection))
+        await connection.close(_CLOSING.get(type(error), 1013), error.message)
 
 
 async def _port(context: Context, token: str, session_id: str) -> int:

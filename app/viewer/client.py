@@ -8,13 +8,14 @@ import queue
 import secrets
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.errors import Forbidden, Unavailable
+from app.errors import Forbidden, TooMany, Unavailable
 from app.process import Worker, python_module
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
@@ -22,6 +23,7 @@ from r2c2r_core.errors import InputError, R2C2RError
 ANSWER_S = 60.0
 TOKEN_S = 12 * 3600.0
 MOST_VIEWS = 24  # each holds what it shows
+MOST_CONNECTIONS = 12  # at a time, of one person: a tab has one, and one more while it connects anew
 WORKER = python_module("app.viewer.worker")
 
 
@@ -62,6 +64,7 @@ class Viewer:
         self._views: dict[tuple[str, str], Opened] = {}
         self._worker: Worker | None = None
         self._lock = threading.RLock()
+        self._connections: Counter[str] = Counter()  # by person; used on the event loop
         self._number = 0
         self._stopped = False
 
@@ -119,17 +122,22 @@ class Viewer:
                 self._views.pop(key, None)
 
     @contextmanager
-    def watched(self, token: str) -> Iterator[None]:
-        """Keep the view behind the token open while somebody is connected."""
+    def watched(self, token: str, who: str) -> Iterator[None]:
+        """Keep the view behind the token open while the person is connected; raises TooMany for one connection too many."""
         view = self._view_of(token)
         if view is None:
             raise Forbidden("this 3D view has been closed", hint="open the review page again")
+        if self._connections[who] >= MOST_CONNECTIONS:
+            raise TooMany(f"{MOST_CONNECTIONS} 3D views of yours are connected already", hint="close some tabs")
+        self._connections[who] += 1
         view.watching += 1
         try:
             yield
         finally:
             view.watching -= 1
             view.used = time.monotonic()
+            self._connections[who] -= 1
+            self._connections += Counter()  # forgets who has none left
 
     def stop(self) -> None:
         """End the process for good; takes no lock, for whoever waits for its answer holds it and is woken by this."""

@@ -53,6 +53,23 @@ def test_messages_go_both_ways_under_the_clients_own_protocol(seen: Running) -> 
         assert socket.receive_text() == "hello"
 
 
+def test_the_connections_of_a_person_to_3d_views_are_bounded(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.viewer.client.MOST_CONNECTIONS", 2)
+    url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
+
+    def connecting() -> Any:
+        return seen.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN})
+
+    with connecting(), connecting():
+        with pytest.raises(WebSocketDisconnect) as refused, connecting():
+            pass
+        assert (refused.value.code, "2 3D views of yours" in refused.value.reason) == (4429, True)
+    seen.until(lambda: not seen.context.viewer._connections)
+    with connecting() as again:
+        again.send_text("hello")
+        assert again.receive_text() == "hello"
+
+
 def test_signing_out_closes_the_3d_view(seen: Running) -> None:
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
     with seen.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
@@ -176,10 +193,10 @@ def test_the_view_used_least_makes_room(seen: Running, monkeypatch: pytest.Monke
     monkeypatch.setattr("app.viewer.client.MOST_VIEWS", 2)
     viewer, folder = seen.context.viewer, seen.settings.data_dir
     tokens = [viewer.open("p", folder, session) for session in ("a", "b")]
-    with viewer.watched(tokens[0]):
+    with viewer.watched(tokens[0], "ann"):
         viewer.open("p", folder, "c")
         assert [view.session for view in viewer._views.values() if view.port] == ["a", "c"]
-        with viewer.watched(viewer.open("p", folder, "c")), pytest.raises(Unavailable, match="2 people"):
+        with viewer.watched(viewer.open("p", folder, "c"), "bob"), pytest.raises(Unavailable, match="2 people"):
             viewer.open("p", folder, "d")
 
 
