@@ -125,6 +125,14 @@ class Hub:
         for told in {before, project}:
             self._people_changed(told)
 
+    def show_out(self, project: str) -> None:
+        """Tell the tabs at the project whose person does not see it any more: what they show is not theirs to see."""
+        with self._lock:
+            gone = self._message("gone", project, {"why": "is kept to its members now"})
+            for listener in tuple(self._listeners):
+                if listener.project == project and not listener.sees(project):
+                    self._hand(listener, gone)
+
     def watched(self, project: str) -> bool:
         """Whether any tab looks at the project."""
         with self._lock:

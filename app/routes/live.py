@@ -80,4 +80,6 @@ async def _follow_person(socket: WebSocket, listener: Listener, hub: Hub, people
     while (now := await people.until_other(socket.state.session, person)) is not None:
         person = socket.state.person = now
         hub.tell(listener, "you", name=person.name, role=person.role)
+        if listener.project is not None:
+            hub.show_out(listener.project)
     await socket.close(SESSION_ENDED, "the session has ended")

@@ -48,6 +48,7 @@ def set_members(context: Context, project_id: str, body: schemas.MembersIn) -> s
         session.add_all([row, event])
     context.access.look_again()
     context.viewer.close(project_id, lambda session: not _sees(context, session, project_id))
+    context.hub.show_out(project_id)
     projects.tell(context, project_id)
     return members(context, project_id)
 

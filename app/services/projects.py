@@ -127,6 +127,7 @@ def delete(context: Context, project_id: str) -> schemas.Deleted:
     freed = delete_folder(files.root)
     if files.work.is_relative_to(context.settings.data_dir):  # a workspace elsewhere is not ours to delete
         freed += delete_folder(files.work)
+    context.hub.publish("gone", project_id, why="was deleted")
     context.hub.publish("projects", None)
     return schemas.Deleted(freed_bytes=freed)
 

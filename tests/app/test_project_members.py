@@ -107,6 +107,41 @@ def test_live_connections_tell_members_only(kept: Kept) -> None:
         assert not {"comments", "job"} & set(until_last(carol))
 
 
+def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
+    address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
+
+    def told_gone(socket: Any) -> bool:
+        """Whether it was told until all that happened so far was told."""
+        kept.web.context.hub.publish("projects", None, last=True)
+        gone = False
+        while not (message := socket.receive_json()).get("last"):
+            gone |= message["type"] == "gone" and message["project"] == kept.project
+        return gone
+
+    with (
+        kept.of["carol"].websocket_connect(address, **sockets) as carol,
+        kept.of["bob"].websocket_connect(address, **sockets) as bob,
+        kept.of["root"].websocket_connect(address, **sockets) as root,
+    ):
+        assert not told_gone(carol)
+        kept.keep_to("bob")
+        assert [told_gone(each) for each in (carol, bob, root)] == [True, False, False]
+        accounts.add(kept.web.context.engine, "second", "admin", PASSWORD)
+        accounts.change(kept.web.context.engine, "root", role="reviewer")
+        kept.web.context.people.look_again()
+        while (message := root.receive_json())["type"] != "gone":
+            pass
+        assert message["project"] == kept.project
+
+
+def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
+    with kept.of["carol"].websocket_connect(f"{SOCKETS}/api/live?project={kept.project}", headers={"origin": ORIGIN}) as carol:
+        assert kept.of["root"].delete(f"/api/projects/{kept.project}").status_code == 200
+        while (message := carol.receive_json())["type"] != "gone":
+            pass
+        assert (message["project"], message["why"]) == (kept.project, "was deleted")
+
+
 def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
     kept.keep_to("bob")
     monkeypatch.setattr(type(kept.web.context.viewer), "project_of", lambda _, token: kept.project)

@@ -13,7 +13,7 @@ import { go } from "../router.js";
 import { CommandPalette } from "./command-palette.js";
 import { HelpOverlay } from "./help-overlay.js";
 import { stateChip } from "./review-state.js";
-import { sayError, sayWaiting, Toasts } from "./toasts.js";
+import { say, sayError, sayWaiting, Toasts } from "./toasts.js";
 import { WhoIsIn } from "./who.js";
 
 /** @typedef {import("../router.js").Route} Route */
@@ -85,6 +85,7 @@ export class AppShell extends LiveElement {
     outbox.addEventListener("refused", (event) => sayError(detailOf(event)), { signal });
     window.addEventListener("r2c2r-waits", (event) => sayWaiting(detailOf(event)), { signal });
     live.addEventListener("project", () => this.#route && this.#drawProject(this.#route), { signal });
+    live.addEventListener("gone", (event) => this.#leave(detailOf(event)), { signal });
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
   }
 
@@ -136,6 +137,16 @@ export class AppShell extends LiveElement {
       this.#state.hidden = false;
       document.title = `${project.name} · r2c2r`;
     }, sayError);
+  }
+
+  /**
+   * The open project is not there any more for who looks at it: say so, and show those that are.
+   * @param {{ project: string, why: string }} gone
+   */
+  #leave({ project, why }) {
+    if (this.#route?.project !== project) return;
+    say(`${this.#where.textContent || "This project"} ${why}.`, { kind: "bad" });
+    go("/");
   }
 
   /** Lost connections are said, with what still waits; it is sent by itself once the server answers. */
