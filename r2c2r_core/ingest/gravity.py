@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import OverrideError
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
 from r2c2r_core.ingest.planes import Plane, SurfaceSample, find_planes
+from r2c2r_core.ingest.up import choose_up
 from r2c2r_core.model.capture import Room, Wall
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.tuning import param, tuned
@@ -21,10 +22,6 @@ _UP = np.array([0.0, 0.0, 1.0])
 class Params:
     """How a room is levelled."""
 
-    most_correction_deg: float = param(3.0, "deg", "of a file's gravity", source="the real kitchen's is off by 1.5 degrees")
-    least_correction_deg: float = param(
-        1.0, "deg", "below which a file's gravity stays", source="a phone's gravity is better than fitted planes"
-    )
     aligned_deg: float = param(4.0, "deg", "planes farther off are not meant to be level, upright or along the room")
     floor_below_camera_m: float = param(
         0.75,
@@ -48,12 +45,19 @@ def level_room(
     file_up: Vector3 | None,
     overrides: Overrides | None,
     rng: np.random.Generator,
+    *,
+    other_ups: Sequence[Vector3] = (),
 ) -> Levelled:
-    """Level a recording: `sample` and `cameras` (capture_from_camera) are in its own world, and so is `file_up`."""
+    """Level a recording: `sample` and `cameras` (capture_from_camera) are in its own world, and so is `file_up`.
+
+    `other_ups`: what the file's gravity may mean instead.
+    """
     said = overrides or Overrides(objects={})
     planes = find_planes(sample, rng)
-    up, up_source, notices = _choose_up(planes, cameras, file_up, said.up_capture)
-    turn = Rigid3(rotation_between(up, _UP), np.zeros(3))
+    readings = () if file_up is None else (file_up, *other_ups)
+    up = choose_up(planes, cameras, readings, said.up_capture)
+    notices = [*up.notices]
+    turn = Rigid3(rotation_between(up.direction, _UP), np.zeros(3))
     turned = [_turned(p, turn) for p in planes]
     centres = np.array([c.translation for c in cameras]) @ turn.rotation.T
     points = turn.apply(sample.points)
@@ -66,8 +70,11 @@ def level_room(
     walls = find_walls(levelled, points + shift, centres + shift) if said.walls is None else _given_walls(said.walls)
     by_person = said.manhattan_yaw_rad is not None
     room = Room(
-        up_source=up_source,
+        up_source=up.source,
         up_spread_deg=_up_spread_deg(levelled),
+        up_file_off_deg=up.file_off_deg,
+        up_corrected=up.corrected,
+        up_rival_capture=up.rival,
         floor_found=floor_z is not None,
         floor_source=None if floor_z is None else "surface" if said.floor_m is None else "person",
         floor_spread_m=None if floor_z is None else _floor_spread_m(levelled),
@@ -78,33 +85,6 @@ def level_room(
         walls_source="surface" if said.walls is None else "person",
     )
     return Levelled(Rigid3(turn.rotation, shift), room, tuple(notices))
-
-
-def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple[Vector3, float] | None:
-    """The direction that makes planes horizontal or vertical, near `guess`, and the rms angle (deg) by which they disagree.
-
-    None when the planes do not settle it: no level plane, and no two upright ones that face differently.
-    """
-    up = guess / np.linalg.norm(guess)
-    for reach_deg in (within_deg + 5.0, within_deg + 2.0, 4.0, 4.0, 4.0):
-        matrix, weight_sum, miss = np.zeros((3, 3)), 0.0, 0.0
-        for plane in planes:
-            cosine = float(plane.normal @ up)
-            off_level = np.degrees(np.arccos(min(abs(cosine), 1.0)))
-            off_deg, sign = (off_level, 1.0) if off_level < 45.0 else (90.0 - off_level, -1.0)
-            if off_deg > reach_deg:
-                continue
-            weight = plane.area_m2 / (1.0 + (off_deg / 1.5) ** 2)
-            matrix += sign * weight * np.outer(plane.normal, plane.normal)
-            weight_sum += weight
-            miss += weight * off_deg**2
-        values, vectors = np.linalg.eigh(matrix)
-        # The winner must stand clear of the runner-up: one wall alone leaves a circle of directions
-        if weight_sum < 0.5 or values[2] - values[1] < 0.15:
-            return None
-        found = vectors[:, 2]
-        up = found if found @ up > 0 else -found
-    return up, float(np.sqrt(miss / weight_sum))
 
 
 def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> float | None:
@@ -178,64 +158,6 @@ def find_walls(planes: Sequence[Plane], points: Points, centres: Points) -> tupl
             spread_m = float(np.sqrt(np.mean((plane.points @ normal - offset) ** 2)))
             walls.append(Wall(normal=normal, offset_m=offset, area_m2=plane.area_m2, spread_m=spread_m))
     return tuple(walls)
-
-
-def _choose_up(
-    planes: Sequence[Plane], cameras: Sequence[Rigid3], file_up: Vector3 | None, said_up: Vector3 | None
-) -> tuple[Vector3, Literal["file", "floor", "person", "assumed"], list[str]]:
-    if said_up is not None:
-        length = float(np.linalg.norm(said_up))
-        if not np.isfinite(length) or length < 1e-6:
-            raise OverrideError("overrides: 'up' has no direction", hint="give three numbers, such as [0, 1, 0]")
-        return np.asarray(said_up) / length, "person", []
-    if file_up is not None:
-        return _corrected_up(planes, file_up)
-    best = _up_from_planes(planes, _mean_camera_up(cameras))
-    if best is not None:
-        return best, "floor", ["the recording does not know gravity; up was taken from its level and upright planes"]
-    return _mean_camera_up(cameras), "assumed", ["neither the recording nor its planes tell which way is up; check it"]
-
-
-def _corrected_up(planes: Sequence[Plane], file_up: Vector3) -> tuple[Vector3, Literal["file"], list[str]]:
-    """The file's gravity, corrected a little where level planes agree on it."""
-    params = tuned(Params)
-    found = find_up(planes, file_up, params.most_correction_deg)
-    level_m2 = sum(p.area_m2 for p in planes if abs(p.normal @ file_up) > np.cos(np.radians(8.0)))
-    if found is None or found[1] > 1.5 or level_m2 < 0.3:
-        return file_up, "file", []
-    off_deg = float(np.degrees(np.arccos(np.clip(found[0] @ file_up, -1.0, 1.0))))
-    if not params.least_correction_deg < off_deg <= params.most_correction_deg:
-        return file_up, "file", []
-    return found[0], "file", [f"the recording's gravity was corrected by {off_deg:.1f} deg, as its level planes agree"]
-
-
-def _up_from_planes(planes: Sequence[Plane], camera_up: Vector3) -> Vector3 | None:
-    """The direction near the cameras' own up that makes most area level or upright."""
-    candidates = [s * p.normal for p in planes for s in (1.0, -1.0)]
-    large = planes[:6]
-    candidates += [s * np.cross(a.normal, b.normal) for i, a in enumerate(large) for b in large[:i] for s in (1.0, -1.0)]
-    best, best_score = None, 0.0
-    for candidate in candidates:
-        length = float(np.linalg.norm(candidate))
-        if length < 0.5 or candidate @ camera_up < length * np.cos(np.radians(60.0)):
-            continue
-        found = find_up(planes, candidate / length, 4.0)
-        if found is None:
-            continue
-        up = found[0]
-        cosines = np.array([float(p.normal @ up) for p in planes])
-        areas = np.array([p.area_m2 for p in planes])
-        # What faces up counts double: floors and worktops are seen from above, ceilings and undersides rarely
-        share = areas @ ((np.abs(cosines) < 0.1) + 2.0 * (cosines > 0.995) + 0.5 * (cosines < -0.995))
-        score = float(share) * (0.5 + float(up @ camera_up))
-        if score > best_score:
-            best, best_score = up, score
-    return best
-
-
-def _mean_camera_up(cameras: Sequence[Rigid3]) -> Vector3:
-    total = -np.array([c.rotation[:, 1] for c in cameras]).mean(axis=0)
-    return np.asarray(total / max(float(np.linalg.norm(total)), 1e-9))
 
 
 def _given_walls(walls: Sequence[Vector3]) -> tuple[Wall, ...]:

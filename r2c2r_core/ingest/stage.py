@@ -106,7 +106,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
     noise = estimate_depth_noise(settled.frames, images, surface.vertices, surface.faces)
     progress.at(0.97, "hashing")
     sha256 = recording.files.sha256(recording.names)
-    up_capture = None if settled.evidence.source == "odometry" else recording.up_capture  # such a world is the first camera's
+    own_world = settled.evidence.source != "odometry"  # an estimated one is the first camera's
     progress.at(1.0, f"{len(frames)} frames")
     return Scan(
         name=source.stem if source.is_file() else source.name,
@@ -115,7 +115,8 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         frames=settled.frames,
         surface=SceneSurface(vertices_world=surface.vertices, faces=surface.faces, colours=surface.colours, voxel_m=voxel_m),
         images=images,
-        up_capture=up_capture,
+        up_capture=recording.up_capture if own_world else None,
+        other_ups=recording.other_ups if own_world else (),
         notices=(*registered, *recording.notices, *thinned, *unsure, *bad, *settled.notices),
         poses=settled.evidence,
         depth_noise=noise,
@@ -127,7 +128,8 @@ def level_scan(scan: Scan, overrides: Overrides, config: IngestConfig, *, progre
     progress.at(0.0, "levelling")
     rng = np.random.default_rng(config.seed)
     sample = sample_surface(scan.surface.vertices_world, scan.surface.faces, 30_000, rng)
-    levelled = level_room(sample, [f.world_from_camera for f in scan.frames], scan.up_capture, overrides, rng)
+    cameras = [f.world_from_camera for f in scan.frames]
+    levelled = level_room(sample, cameras, scan.up_capture, overrides, rng, other_ups=scan.other_ups)
     motion = levelled.world_from_capture
     return Capture(
         name=scan.name,

@@ -24,8 +24,8 @@ class Params:
 def upright(recording: Recording) -> Recording:
     """The recording with colour, depth, cameras and poses turned alike, by the turn most frames need; often itself."""
     turns = needed_turns(recording.frames, recording.up_capture)
-    if turns == 0:
-        return recording
+    if turns == 0 or any(needed_turns(recording.frames, up) != turns for up in recording.other_ups):
+        return recording  # upright, or it is not known yet which of its readings the scan supports
     original = {frame.index: frame for frame in recording.frames}
 
     def colour_of(frame: RawFrame) -> Colour:

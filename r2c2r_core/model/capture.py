@@ -50,6 +50,9 @@ class Room:
 
     up_source: Literal["file", "floor", "person", "assumed"]
     up_spread_deg: float | None = None  # of large level and upright planes
+    up_file_off_deg: float | None = None  # of what the file says of gravity, from what the planes say; None: unknown
+    up_corrected: bool = False  # whether the planes' was taken in place of the file's
+    up_rival_capture: Vector3 | None = None  # up in the capture frame if the images are stored sideways; None: ruled out
     floor_found: bool
     floor_source: Literal["surface", "person"] | None = None  # None: not found
     floor_spread_m: float | None = None  # of the surface near that height
@@ -101,6 +104,7 @@ class Scan:
     surface: SceneSurface
     images: FrameImages
     up_capture: Vector3 | None  # what the recording says of gravity
+    other_ups: tuple[Vector3, ...] = ()  # what that may mean instead
     notices: tuple[str, ...]
     poses: PoseEvidence
     depth_noise: DepthNoise

@@ -66,6 +66,9 @@ def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording
         poses_source=capture.poses.source if capture.poses else "file",
         up_source=room.up_source,
         up_spread_deg=room.up_spread_deg,
+        up_file_off_deg=room.up_file_off_deg,
+        up_corrected=room.up_corrected,
+        up_rival=None if room.up_rival_capture is None else _three(room.up_rival_capture),
         floor_found=room.floor_found,
         floor_source=room.floor_source,
         floor_spread_mm=None if room.floor_spread_m is None else 1000 * room.floor_spread_m,
@@ -101,6 +104,11 @@ def moments(capture: Capture, views: Views, pairs: Pairs, grey: Greys) -> tuple[
         )
         for k, frame in enumerate(frames)
     )
+
+
+def _three(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 4) for value in vector)
+    return x, y, z
 
 
 class _Heights(NamedTuple):

@@ -60,6 +60,9 @@ class CaptureFigures:
     poses_source: str
     up_source: str
     up_spread_deg: float | None
+    up_file_off_deg: float | None  # of the file's gravity, from what its level and upright planes say
+    up_corrected: bool  # whether the planes were taken in its place
+    up_rival: tuple[float, float, float] | None  # in the recording's world, if its images lie on their side; None: ruled out
     floor_found: bool
     floor_source: str | None
     floor_spread_mm: float | None

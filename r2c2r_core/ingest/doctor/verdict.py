@@ -9,6 +9,12 @@ PLAUSIBLE_M = (0.1, 10.0)  # of a recording's median depth; else its unit is ano
 _LEAST_DEPTH = 0.1  # of the median frame
 _MASKS_SUFFER_PX = 4.0  # of 640: a handle's width at 2 m; below, sizes and masks stay within their tolerances
 
+_FIRST = ("gravity_off",)  # heights, the floor and everything that stands follow from it
+_GRAVITY_OFF_DEG = 1.5  # a phone's is within half a degree, fitted planes within one
+_SMALL_TILT_DEG = 3.0  # a worktop of 60 cm is then 3 cm higher at its back; corrected, nothing is left of it
+_WORKTOP_M = 0.90  # 0.85 to 0.95 m
+_USUAL_M = (0.68, 0.98)  # tables (0.70 to 0.78 m) and worktops, and 2 to 3 cm of what a scan is off
+_FURNITURE_M = (0.5, 1.4)  # above seats, below shelves
 _REGISTER = "read it with --register-depth, which moves the depth there by this fit"
 _SCALE_OF_DRIFT = 0.075  # drift of 3 cm over 2.5 m of a real iPhone walk reads as 5 %
 
@@ -20,24 +26,25 @@ def judge(
     registration: Registration | None,
     unit: Unit | None = None,
 ) -> tuple[Remark, ...]:
-    """Remarks, worst first; among equals, the cause before its symptoms."""
+    """Remarks, worst first; among equals, the cause before its symptoms. A gravity that is off comes before all of them."""
     depth, recording = _depth(figures, unit), _recording(figures)
     if figures.depth_coverage < _LEAST_DEPTH:  # all else follows from that
         return (*depth, *recording)
     found = (
         *depth,
+        *_gravity(figures),
         *_conventions(figures, convention, scale, registration),
         *recording,
         *_tracking(figures, explained=convention is not None or scale is not None),
         *_pictures(figures),
         *_room(figures),
     )
-    return tuple(sorted(found, key=lambda r: -VERDICTS.index(r.verdict)))
+    return tuple(sorted(found, key=lambda r: (r.cause not in _FIRST, -VERDICTS.index(r.verdict))))
 
 
 def worst(remarks: tuple[Remark, ...]) -> Verdict:
-    """The verdict of the first remark, "good" without one."""
-    return remarks[0].verdict if remarks else "good"
+    """The worst verdict among the remarks, "good" without one."""
+    return max((r.verdict for r in remarks), key=VERDICTS.index, default="good")
 
 
 def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
@@ -63,6 +70,18 @@ def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
             _remark("usable with care", "confidence" if low else "depth_coverage", text, "stay 0.5 to 3 m away, in good light")
         ]
     return []
+
+
+def _gravity(figures: CaptureFigures) -> list[Remark]:
+    off = figures.up_file_off_deg
+    if off is None or off <= _GRAVITY_OFF_DEG:
+        return []
+    if figures.up_corrected:
+        text = f"the recording's gravity is {off:.1f} deg off its level and upright planes; the planes' is taken"
+        verdict: Verdict = "good" if off <= _SMALL_TILT_DEG else "usable with care"
+        return [_remark(verdict, "gravity_off", text, "nothing is to be done if the scan stands upright; else set up by hand")]
+    text = f"the recording's gravity is {off:.1f} deg off its level and upright planes, which are too few to be believed"
+    return [_remark("usable with care", "gravity_off", text, "film more of the floor and the walls, or set up by hand")]
 
 
 def _unit_advice(unit: Unit | None) -> str:
@@ -185,10 +204,15 @@ def _room(figures: CaptureFigures) -> list[Remark]:
     if figures.up_source == "assumed":
         text = "neither the recording nor its planes tell which way is up"
         remarks.append(_remark("usable with care", "up_unknown", text, "set it by hand"))
+    if figures.up_rival is not None:
+        up = ", ".join(f"{value:.3g}" for value in figures.up_rival)
+        text = "the recording does not know gravity, and its images may lie on their side: up is in doubt"
+        remarks.append(_remark("usable with care", "up_in_doubt", text, f"if the scan lies too, set up by hand to [{up}]"))
     if not figures.floor_found:
         remarks.append(
             _remark("usable with care", "no_floor", "no floor was found", "film some of it, or set its height by hand")
         )
+    remarks += _scale_by_furniture(figures)
     height = figures.camera_height_m
     if height is not None and not 0.7 < height < 2.2:
         text = f"the camera was held {height:.2f} m above what was taken for the floor"
@@ -196,6 +220,18 @@ def _room(figures: CaptureFigures) -> list[Remark]:
             _remark("usable with care", "camera_height", text, "check the floor's height and the scale of the poses")
         )
     return remarks
+
+
+def _scale_by_furniture(figures: CaptureFigures) -> list[Remark]:
+    """A hint where the level surfaces stand as no worktop and no table does; it changes nothing."""
+    heights = [z for z in figures.level_heights_m if _FURNITURE_M[0] < z < _FURNITURE_M[1]]
+    if not heights or any(_USUAL_M[0] <= z <= _USUAL_M[1] for z in heights):
+        return []
+    nearest = min(heights, key=lambda z: abs(z - _WORKTOP_M))
+    off = nearest / _WORKTOP_M - 1.0
+    text = f"the level surface nearest to a worktop's height stands at {nearest:.2f} m; tables and worktops at 0.70 to 0.95 m"
+    size = f"if it is one, all lengths are about {abs(off):.0%} too {'large' if off > 0 else 'small'}"
+    return [_remark("good", "furniture_height", text, f"{size}: measure something that you know")]
 
 
 def _remark(verdict: Verdict, cause: str, text: str, advice: str) -> Remark:

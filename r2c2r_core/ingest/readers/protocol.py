@@ -47,6 +47,7 @@ class Recording:
     colour_of: Callable[[RawFrame], Colour]  # cheapest in the order of the frames; raises UnreadableFrame
     depth_of: Callable[[RawFrame], RawDepth]  # raises UnreadableFrame
     up_capture: Vector3 | None  # unit, in the recording's own world, when the file knows gravity
+    other_ups: tuple[Vector3, ...] = ()  # what the file's gravity may mean instead
     notices: tuple[str, ...] = ()
     other_names: tuple[str, ...] = ()  # metadata files that are part of the recording's identity
 

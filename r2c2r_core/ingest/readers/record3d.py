@@ -51,6 +51,7 @@ def open_record3d(files: Files) -> Recording:
         colour_of=partial(colour_file, files),
         depth_of=partial(_depth_of, files),
         up_capture=metadata.up_capture,
+        other_ups=metadata.other_ups,
         notices=tuple(notices),
         other_names=(_METADATA,),
     )

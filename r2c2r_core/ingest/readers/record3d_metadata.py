@@ -33,6 +33,7 @@ class Record3DMetadata:
     timestamps_s: tuple[float, ...] | None
     fps: float | None
     up_capture: Vector3 | None
+    other_ups: tuple[Vector3, ...]  # what initPose may mean instead
 
     def camera(self, number: int) -> Intrinsics:
         """The RGB camera of a frame."""
@@ -77,6 +78,7 @@ def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
         raise CaptureError(f"{source}: no poses", hint="record with the LiDAR camera and tracking switched on")
     has_depth_size = bool(metadata.get("dw")) and bool(metadata.get("dh"))
     times = metadata.get("frameTimestamps")
+    ups = _ups(metadata, raw_poses)
     return Record3DMetadata(
         source=source,
         width=width,
@@ -88,7 +90,8 @@ def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
         if isinstance(times, list) and _all_numbers(times) and np.isfinite(times).all()
         else None,
         fps=float(metadata["fps"]) if isinstance(metadata.get("fps"), int | float) and metadata["fps"] > 0 else None,
-        up_capture=_up(metadata, raw_poses),
+        up_capture=ups[0] if ups else None,
+        other_ups=ups[1:],
     )
 
 
@@ -109,8 +112,12 @@ def _pose(row: np.ndarray) -> Rigid3 | None:
     return pose_of_quaternion(np.concatenate([row[4:], row[:4]]), CAMERA_CV_FROM_GL)
 
 
-def _up(metadata: dict[str, Any], poses: np.ndarray) -> Vector3 | None:
-    """+y of ARKit's world; in the recording's world when initPose leads from one to the other. None for the older app."""
+def _ups(metadata: dict[str, Any], poses: np.ndarray) -> tuple[Vector3, ...]:
+    """+y of ARKit's world in the recording's, by each reading of initPose in the wild; none for the older app.
+
+    Where initPose is no identity, it leads from the recording's world to ARKit's, or the poses have it in them already, or it
+    leads back.
+    """
     from scipy.spatial.transform import Rotation
 
     up = np.array([0.0, 1.0, 0.0])
@@ -118,9 +125,9 @@ def _up(metadata: dict[str, Any], poses: np.ndarray) -> Vector3 | None:
     if isinstance(first, list) and len(first) == 7 and _all_numbers(first) and np.linalg.norm(first[:4]) > 0.5:
         turn = Rotation.from_quat(np.array(first[:4], dtype=np.float64))
         if turn.magnitude() > 1e-4:
-            return np.asarray(turn.inv().apply(up))
+            return np.asarray(turn.inv().apply(up)), up, np.asarray(turn.apply(up))
     starts_at_camera = abs(abs(poses[0, 3]) - 1.0) < 1e-5 and np.linalg.norm(poses[0, 4:]) < 1e-6
-    return None if starts_at_camera else up
+    return () if starts_at_camera else (up,)
 
 
 def _table(metadata: dict[str, Any], key: str, columns: int, source: str) -> np.ndarray | None:

@@ -220,6 +220,33 @@ def test_few_frames_no_floor_and_a_guessed_up_are_told(capture):
     assert examine(replace(capture, frames=capture.frames[:1])).verdict == "unusable"
 
 
+def test_a_gravity_that_is_off_is_said_first_with_its_angle(capture):
+    def report(off, corrected):
+        room = replace(capture.room, up_file_off_deg=off, up_corrected=corrected, floor_found=False)
+        return examine(replace(capture, room=room, frames=capture.frames[:4]))  # too few: unusable for another reason
+
+    assert "gravity_off" not in {r.cause for r in report(1.4, False).remarks}
+    for off, corrected, verdict in ((2.1, True, "good"), (5.0, True, "usable with care"), (5.0, False, "usable with care")):
+        found = report(off, corrected)
+        assert found.reasons[0].startswith(f"the recording's gravity is {off:.1f} deg off its level and upright planes")
+        assert found.remarks[0].verdict == verdict
+        assert found.verdict == "unusable"
+
+
+def test_up_in_doubt_is_told_with_the_direction_that_would_mend_it(capture):
+    room = replace(capture.room, up_rival_capture=np.array([1.0, 0.0, 0.0]))
+    reasons = examine(replace(capture, room=room)).reasons
+    assert any("may lie on their side" in r and "[1, 0, 0]" in r for r in reasons)
+
+
+@pytest.mark.parametrize(("factor", "told"), [(0.72, "28% too small"), (1.0, None), (1.4, "24% too large")])
+def test_furniture_of_no_usual_height_is_a_hint_of_a_wrong_scale(factor, told, capture):
+    figures = replace(examine(capture).figures, level_heights_m=(0.2, 0.9 * factor if factor < 1 else 0.8 * factor))
+    hints = [r for r in judge(figures, None, None, None) if r.cause == "furniture_height"]
+    assert [told in hint.line for hint in hints] == ([True] if told else [])
+    assert all(hint.verdict == "good" for hint in hints)
+
+
 def test_blur_and_flicker_are_told(capture):
     blurred = examine(with_frames(capture, lambda k, f: replace(f, sharpness=1.0 if k % 3 == 0 else 100.0)))
     assert any(r.cause == "blur" for r in blurred.remarks)

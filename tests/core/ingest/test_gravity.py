@@ -72,13 +72,59 @@ def test_up_and_floor_come_from_the_planes_when_the_file_knows_nothing(euler_deg
     assert np.abs(floor_points[:, 2]).max() < 0.008
 
 
-def test_a_files_gravity_is_corrected_a_little_and_never_a_lot():
-    for off in (1.8, 2.4):
-        result, _, error_deg = levelled((90, 0, 0), file_up=off)
-        assert result.room.up_source == "file"
-        assert error_deg < 0.1
-    _, _, error_deg = levelled((90, 0, 0), file_up=8.0)  # planes that far off are not the file's level planes
-    assert error_deg > 5.0
+@pytest.mark.parametrize("off", [1.8, 2.4, 5.0, 8.0, 20.0])
+def test_a_files_gravity_gives_way_to_many_planes_that_agree(off):
+    result, _, error_deg = levelled((90, 0, 0), file_up=off)
+    assert error_deg < 0.1
+    assert result.room.up_corrected
+    assert result.room.up_file_off_deg == pytest.approx(off, rel=0.06)  # `levelled` turns about no unit axis
+    assert any("corrected by" in notice for notice in result.notices)
+
+
+def test_a_files_gravity_is_kept_against_one_plane_and_that_is_known():
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0, 0.003, 4000)])  # a ramp, for all one knows
+    ramp = SurfaceSample(points=points, normals=np.tile([0.0, 0.0, 1.0], (4000, 1)), area_each_m2=1e-3)
+    up = Rotation.from_euler("x", 5, degrees=True).apply([0.0, 0.0, 1.0])
+    result = level_room(ramp, cameras(), up, None, np.random.default_rng(0))
+    assert np.allclose(result.world_from_capture.rotation @ up, [0, 0, 1])
+    assert not result.room.up_corrected
+    assert result.room.up_file_off_deg == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_of_two_readings_of_a_files_gravity_the_planes_choose(first):
+    readings = [np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.87]), np.array([0.0, -0.64, 0.77])]
+    ordered = [readings[first], *(r for r in readings if r is not readings[first])]
+    result = level_room(kitchen(), cameras(), ordered[0], None, np.random.default_rng(0), other_ups=ordered[1:])
+    assert (result.world_from_capture.rotation @ [0.0, 0.0, 1.0])[2] > 0.99999
+    assert result.room.up_file_off_deg < 1.0
+
+
+def turned(poses: list[Rigid3], quarters: int) -> list[Rigid3]:
+    """The cameras of the same pictures, stored turned."""
+    turn = np.rint(rotation_about_z(quarters * np.pi / 2))
+    return [Rigid3(pose.rotation @ turn, pose.translation) for pose in poses]
+
+
+def walk() -> list[Rigid3]:
+    """The cameras, carried sideways and back by a meter."""
+    return [Rigid3(c.rotation, c.translation + np.array([0.1 * k, 0.0, 0.01 * k])) for k, c in enumerate(cameras())]
+
+
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_images_stored_sideways_without_gravity_do_not_turn_the_room(quarters):
+    result = level_room(kitchen(), turned(walk(), quarters), None, None, np.random.default_rng(0))
+    assert (result.world_from_capture.rotation @ [0.0, 0.0, 1.0])[2] > 0.9999
+    assert any(("lie on their side" in n) == (quarters in (1, 3)) for n in result.notices)
+    assert (result.room.up_rival_capture is not None) == (quarters in (1, 3))  # it is said to be in doubt
+
+
+def test_up_is_in_doubt_where_the_camera_hardly_moved():
+    still = cameras()[2:3]  # straight at a wall
+    room = level_room(kitchen(), still, None, None, np.random.default_rng(0)).room
+    assert abs(room.up_rival_capture[2]) < 0.01  # it could as well lie
+    assert level_room(kitchen(), still, np.array([0.0, 0.0, 1.0]), None, np.random.default_rng(0)).room.up_rival_capture is None
 
 
 def test_a_phones_gravity_is_kept_as_it_is():

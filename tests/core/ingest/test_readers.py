@@ -155,6 +155,13 @@ def test_init_pose_turns_gravity_into_the_recordings_own_world(tmp_path):
     turn = Rotation.from_euler("x", 40, degrees=True)
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
     assert np.allclose(turn.apply(recording.up_capture), [0, 1, 0])
+    assert np.allclose(recording.other_ups, [[0, 1, 0], turn.apply([0, 1, 0])])  # its other readings in the wild
+
+
+def test_images_are_not_turned_while_initpose_can_be_read_in_two_ways(tmp_path):
+    turn = Rotation.from_euler("z", 90, degrees=True)
+    recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
+    assert (recording.frames[0].rgb_camera.width, recording.frames[0].rgb_camera.height) == ROOM.rgb_size
 
 
 def test_depth_may_be_stored_raw(tmp_path):

@@ -1,0 +1,244 @@
+"""Which way is up: what the recording says of gravity, checked against level and upright planes and against how people film."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import OverrideError
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.planes import Plane
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When planes are believed about gravity, and when cameras are."""
+
+    least_correction_deg: float = param(
+        1.0, "deg", "below which a file's gravity stays", source="a phone's gravity is better than fitted planes"
+    )
+    few_planes_deg: float = param(
+        3.0, "deg", "most correction where a level surface and few planes agree", source="the real kitchen's file is off by 2.1"
+    )
+    widest_deg: float = param(12.0, "deg", "around a file's gravity, within which planes are looked for at first")
+    agree_deg: float = param(
+        1.5, "deg", "rms by which planes that settle up may disagree", source="a Kinect's bent walls give 0.8"
+    )
+    many: int = param(3, "count", "level and upright planes that outweigh a file's gravity")
+    many_m2: float = param(2.0, "m²", "their area", source="three fronts and a worktop")
+    many_share: float = param(0.6, "share", "of the area of all planes that they make")
+    aligned_deg: float = param(2.5, "deg", "off level or upright, within which a plane speaks for a direction")
+    level_m2: float = param(0.3, "m²", "level surface without which planes correct nothing")
+    clear_share: float = param(0.2, "share", "of the planes' area by which one reading of a file must beat the other")
+    walks_within_m: float = param(
+        0.25,
+        "m",
+        "one sigma of a camera's height that people keep to",
+        source="0.02 to 0.10 m on four real recordings, 0.5 to 1.0 m of the same on their side",
+    )
+    held_within_deg: float = param(
+        8.0,
+        "deg",
+        "mean roll of a camera that is held upright",
+        source="2 to 5 degrees on four real recordings, 11 to 26 of the same on their side",
+    )
+
+
+class Up(NamedTuple):
+    """The way up in the capture's own frame, and its evidence."""
+
+    direction: Vector3
+    source: Literal["file", "floor", "person", "assumed"]
+    notices: tuple[str, ...] = ()
+    file_off_deg: float | None = None  # of the file's gravity from what its planes say; None: they do not settle it
+    corrected: bool = False  # whether the planes were taken in its place
+    rival: Vector3 | None = None  # up if the images are stored sideways, where nothing rules that out
+
+
+def choose_up(
+    planes: Sequence[Plane],
+    cameras: Sequence[Rigid3],
+    readings: Sequence[Vector3],
+    said_up: Vector3 | None,
+) -> Up:
+    """Up by a person, else by the file where its planes do not contradict it, else by planes, else by the cameras.
+
+    `readings`: what the file's gravity may mean, the likeliest first; none where it has none.
+    """
+    params = tuned(Params)
+    if said_up is not None:
+        length = float(np.linalg.norm(said_up))
+        if not np.isfinite(length) or length < 1e-6:
+            raise OverrideError("overrides: 'up' has no direction", hint="give three numbers, such as [0, 1, 0]")
+        return Up(np.asarray(said_up) / length, "person")
+    if readings:
+        return _from_file(planes, _supported(planes, readings, params), params)
+    return _without_gravity(planes, cameras, params)
+
+
+def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple[Vector3, float] | None:
+    """The direction that makes planes horizontal or vertical, near `guess`, and the rms angle (deg) by which they disagree.
+
+    None when the planes do not settle it: no level plane, and no two upright ones that face differently.
+    """
+    up = guess / np.linalg.norm(guess)
+    for reach_deg in (within_deg + 5.0, within_deg + 2.0, 4.0, 4.0, 4.0):
+        matrix, weight_sum, miss, area_m2 = np.zeros((3, 3)), 0.0, 0.0, 0.0
+        for plane in planes:
+            off_deg, sign = _off_deg(plane, up)
+            if off_deg > reach_deg:
+                continue
+            weight = plane.area_m2 / (1.0 + (off_deg / 1.5) ** 2)
+            matrix += sign * weight * np.outer(plane.normal, plane.normal)
+            weight_sum += weight
+            area_m2 += plane.area_m2
+            miss += weight * off_deg**2
+        values, vectors = np.linalg.eigh(matrix)
+        # The winner must stand clear of the runner-up: one wall alone leaves a circle of directions
+        if area_m2 < 0.5 or values[2] - values[1] < 0.15:
+            return None
+        found = vectors[:, 2]
+        up = found if found @ up > 0 else -found
+    return up, float(np.sqrt(miss / weight_sum))
+
+
+def _from_file(planes: Sequence[Plane], file_up: Vector3, params: Params) -> Up:
+    """The file's gravity; corrected where planes agree on it, a lot only where they are many."""
+    found = find_up(planes, file_up, params.widest_deg)
+    if found is None or found[1] > params.agree_deg:
+        far = _up_from_planes(planes, file_up)
+        found = None if far is None or not _many(planes, far, params) else find_up(planes, far, params.few_planes_deg)
+    if found is None:
+        return Up(file_up, "file")
+    off_deg = _angle_deg(found[0], file_up)
+    level_m2 = sum(p.area_m2 for p in planes for off, sign in (_off_deg(p, found[0]),) if sign > 0 and off < params.aligned_deg)
+    believed = off_deg <= params.few_planes_deg and level_m2 >= params.level_m2
+    if off_deg <= params.least_correction_deg or not (believed or _many(planes, found[0], params)):
+        return Up(file_up, "file", file_off_deg=off_deg)
+    notice = f"the recording's gravity was corrected by {off_deg:.1f} deg, as its level and upright planes agree"
+    source: Literal["file", "floor"] = "file" if off_deg <= params.few_planes_deg else "floor"
+    return Up(found[0], source, (notice,), off_deg, corrected=True)
+
+
+def _many(planes: Sequence[Plane], up: Vector3, params: Params) -> bool:
+    """Whether enough level and upright planes stand by a direction to outweigh what a file says."""
+    aligned = [(p, sign) for p in planes for off, sign in (_off_deg(p, up),) if off < params.aligned_deg]
+    area = sum(p.area_m2 for p, _ in aligned)
+    level = sum(p.area_m2 for p, sign in aligned if sign > 0)
+    enough = len(aligned) >= params.many and area >= params.many_m2 and level >= params.level_m2
+    return enough and level < area and area >= params.many_share * sum(p.area_m2 for p in planes)
+
+
+def _supported(planes: Sequence[Plane], readings: Sequence[Vector3], params: Params) -> Vector3:
+    """The first reading, unless the planes clearly stand by another."""
+    shares = [_share(planes, reading, params.few_planes_deg + params.aligned_deg) for reading in readings]
+    best = int(np.argmax(shares))
+    return readings[best] if shares[best] > shares[0] + params.clear_share else readings[0]
+
+
+def _share(planes: Sequence[Plane], up: Vector3, within_deg: float) -> float:
+    """Share of the planes' area that is level or upright; what is level counts double, as every wall is upright twice."""
+    offs = [_off_deg(p, up) for p in planes]
+    areas = np.array([p.area_m2 * (2.0 if sign > 0 else 1.0) for p, (_, sign) in zip(planes, offs, strict=True)])
+    near = np.array([off < within_deg for off, _ in offs])
+    return float(areas[near].sum() / max(sum(p.area_m2 for p in planes), 1e-9)) if len(offs) else 0.0
+
+
+def _without_gravity(planes: Sequence[Plane], cameras: Sequence[Rigid3], params: Params) -> Up:
+    """Up by planes, near the images' own; or near another of their sides where people would not have filmed otherwise."""
+    ends = [way for side in (0, 2) if (way := _way(planes, cameras, side)) is not None]  # as stored, or on its head
+    stored = max(ends, key=lambda way: way.seen_from_above_m2, default=None) if _on_its_head(ends) else _way(planes, cameras, 0)
+    found = [way for side in (1, 3) if (way := _way(planes, cameras, side)) is not None]  # a quarter turn to either side
+    if stored is None and not found:
+        up = _mean_side(cameras, 0)
+        return Up(up, "assumed", ("neither the recording nor its planes tell which way is up; check it",))
+    chosen = stored if stored is not None else found[0]
+    better = [way for way in found if way.clear_of(chosen, params, both=True)]
+    if better:
+        best = max(better, key=lambda way: way.seen_from_above_m2)
+        notice = "the recording does not know gravity, and its images lie on their side: up was taken from its planes and path"
+        return Up(best.up, "floor", (notice,), rival=chosen.up)
+    rivals = [way for way in found if way is not chosen and not chosen.clear_of(way, params, both=False)]
+    head = ", and its images stand on their head" if _on_its_head(ends) else ""
+    notice = f"the recording does not know gravity{head}; up was taken from its level and upright planes"
+    rival = max(rivals, key=lambda way: way.seen_from_above_m2).up if rivals else None
+    return Up(chosen.up, "floor", (notice,), rival=rival)
+
+
+class _Way(NamedTuple):
+    """One way up, and how the camera was held and carried if it is the right one."""
+
+    up: Vector3
+    height_spread_m: float  # one sigma
+    roll_deg: float  # mean
+    seen_from_above_m2: float  # level surface that faces up, less what faces down: floors are filmed, ceilings rarely
+
+    def clear_of(self, other: "_Way", params: Params, *, both: bool) -> bool:
+        """Whether people film so rather than the other way: by its height, by its roll, or by both."""
+        level = other.height_spread_m > params.walks_within_m and self.height_spread_m < 0.5 * other.height_spread_m
+        held = other.roll_deg > params.held_within_deg and self.roll_deg < 0.5 * other.roll_deg
+        return (level and held) if both else (level or held)
+
+
+def _on_its_head(ends: "Sequence[_Way]") -> bool:
+    """Whether a scan is filmed from below as it is stored: its level surfaces nearly all face down."""
+    return len(ends) == 2 and ends[0].up @ ends[1].up < 0 and ends[0].seen_from_above_m2 < 0 < ends[1].seen_from_above_m2
+
+
+def _way(planes: Sequence[Plane], cameras: Sequence[Rigid3], side: int) -> _Way | None:
+    """Up by planes near a side of the images: 0 their top, 1 their right, 2 their bottom, 3 their left."""
+    up = _up_from_planes(planes, _mean_side(cameras, side))
+    if up is None:
+        return None
+    across = np.array([np.cross(_side(c, side), c.rotation[:, 2]) for c in cameras])
+    roll = np.degrees(np.abs(np.arcsin(np.clip(across @ up, -1.0, 1.0))))
+    heights = np.array([c.translation for c in cameras]) @ up
+    facing = sum(p.area_m2 * np.sign(p.normal @ up) for p in planes if _off_deg(p, up)[1] > 0)
+    return _Way(up, float(np.std(heights)), float(roll.mean()), float(facing))
+
+
+def _up_from_planes(planes: Sequence[Plane], camera_up: Vector3) -> Vector3 | None:
+    """The direction near the cameras' own up that makes most area level or upright."""
+    candidates = [s * p.normal for p in planes for s in (1.0, -1.0)]
+    large = planes[:6]
+    candidates += [s * np.cross(a.normal, b.normal) for i, a in enumerate(large) for b in large[:i] for s in (1.0, -1.0)]
+    best, best_score = None, 0.0
+    for candidate in candidates:
+        length = float(np.linalg.norm(candidate))
+        if length < 0.5 or candidate @ camera_up < length * np.cos(np.radians(60.0)):
+            continue
+        found = find_up(planes, candidate / length, 4.0)
+        if found is None:
+            continue
+        up = found[0]
+        cosines = np.array([float(p.normal @ up) for p in planes])
+        areas = np.array([p.area_m2 for p in planes])
+        # What faces up counts double: floors and worktops are seen from above, ceilings and undersides rarely
+        share = areas @ ((np.abs(cosines) < 0.1) + 2.0 * (cosines > 0.995) + 0.5 * (cosines < -0.995))
+        score = float(share) * (0.5 + float(up @ camera_up))
+        if score > best_score:
+            best, best_score = up, score
+    return best
+
+
+def _mean_side(cameras: Sequence[Rigid3], side: int) -> Vector3:
+    total = np.array([_side(c, side) for c in cameras]).mean(axis=0)
+    return np.asarray(total / max(float(np.linalg.norm(total)), 1e-9))
+
+
+def _side(camera: Rigid3, side: int) -> Vector3:
+    """The direction of an image's top, right, bottom or left in the capture's frame."""
+    return np.asarray((-camera.rotation[:, 1], camera.rotation[:, 0], camera.rotation[:, 1], -camera.rotation[:, 0])[side])
+
+
+def _off_deg(plane: Plane, up: Vector3) -> tuple[float, float]:
+    """By how much (deg) a plane misses being level (then 1) or upright (then -1), whichever is nearer."""
+    off_level = float(np.degrees(np.arccos(min(abs(float(plane.normal @ up)), 1.0))))
+    return (off_level, 1.0) if off_level < 45.0 else (90.0 - off_level, -1.0)
+
+
+def _angle_deg(a: Vector3, b: Vector3) -> float:
+    return float(np.degrees(np.arccos(np.clip(a @ b / np.linalg.norm(a) / np.linalg.norm(b), -1.0, 1.0))))
