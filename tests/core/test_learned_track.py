@@ -23,9 +23,9 @@ from tests.core.segment.learned.test_session import TrueMasks
 def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:
     capture, truth = kitchen()
     config = SegmentConfig()
-    bench = GeometricSegmenter().open(capture, tmp_path, config)
+    prepared = GeometricSegmenter().open(capture, tmp_path, config)
     model = TrueMasks([truth["drawer_mid"][frame.index] for frame in capture.frames])
-    session = LearnedSession(name="sam2", model=model, bench=bench, config=config)  # type: ignore[arg-type]
+    session = LearnedSession(name="sam2", model=model, prepared=prepared, config=config)  # type: ignore[arg-type]
     left, width, bottom, height = DRAWERS["drawer_mid"]
     middle = (left + 0.3 * width, FRONT_Y, bottom + 0.3 * height)
     track = session.track(prompt("drawer_mid", "drawer", click_on(capture, middle, 60)))

@@ -1,1 +1,1 @@
-"""Appliances: `find` takes clicks to the front, `box` measures it; the others refine that box by depth and photographs."""
+"""Appliances: `find` takes clicks to the front, `fit` is the method (least squares) on `edges` and `faces` as evidence."""

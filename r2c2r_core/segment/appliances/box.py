@@ -1,16 +1,15 @@
-"""An appliance's box: the front rectangle with the clearest edges, extruded by the depth its sides show; its masks."""
+"""An appliance's front on the orthomosaic: the rectangle with the clearest edges of a possible size; its box and its masks."""
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Mask, Points
+from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import ThingBox
-from r2c2r_core.segment.appliances.back_edges import depth_at_back_edge
 from r2c2r_core.segment.fronts.front import Front, front_corners, side_corners, side_faces
 from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
 from r2c2r_core.segment.runs.lines import Evidence
@@ -93,30 +92,6 @@ def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, floa
     return mask, share
 
 
-def measure_depth(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[float, bool]:
-    """How deep the box reaches behind its front, and whether its sides or top showed it."""
-    limit = min(wall_m - 0.035 if wall_m is not None else 1.0, 1.0)
-    points = _surface_points(front, scene)
-    grid, cell = front.run.grid, front.cell
-    local = grid.world_from_plane.inverse.apply(points)
-    at = grid.cells_of(points)
-    slack = 0.03 / grid.cell_m
-    inside = (at[:, 0] > cell.left - slack) & (at[:, 0] < cell.right + slack)
-    inside &= (at[:, 1] > cell.top - slack) & (at[:, 1] < cell.bottom - slack)
-    near_side = np.minimum(np.abs(at[:, 0] - cell.left), np.abs(at[:, 0] - cell.right)) < slack
-    on_face = inside & (near_side | (np.abs(at[:, 1] - cell.top) < slack)) & (local[:, 1] > 0.04) & (local[:, 1] < limit)
-    depths = local[on_face, 1]
-    spread = np.bincount((depths / 0.02).astype(int), minlength=1) if len(depths) else np.zeros(1)
-    filled = spread[2:] > 0.25 * max(np.median(spread[spread > 0]) if (spread > 0).any() else 1, 2)
-    reach = 0
-    while reach < len(filled) and filled[reach : reach + 2].any():  # a hole of 2 cm is no end
-        reach += 1
-    if reach >= 6:
-        about = min((reach + 2) * 0.02, limit)
-        return depth_at_back_edge(front, scene, about, wall_m or 1.0) or about, True
-    return min(usual_m, limit), False
-
-
 def appliance_box(front: Front) -> ThingBox:
     """The box in the world: the front rectangle extruded."""
     grid, cell = front.run.grid, front.cell
@@ -127,12 +102,6 @@ def appliance_box(front: Front) -> ThingBox:
         dimensions_m=np.array([width, front.depth_m, height]),
         support_z_m=float(centre[2] - height / 2),
     )
-
-
-def _surface_points(front: Front, scene: Scene) -> Points:
-    vertices = scene.capture.surface.vertices_world
-    centre = appliance_box(front).world_from_object.translation
-    return vertices[np.linalg.norm(vertices - centre, axis=1) < 1.8]
 
 
 def _component(run: Run, clicks: np.ndarray) -> np.ndarray:

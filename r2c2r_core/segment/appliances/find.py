@@ -8,11 +8,8 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.kitchen.categories import every_category
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.segment.appliances.box import find_rectangle, measure_depth
-from r2c2r_core.segment.appliances.outline import outlined, photos_of
-from r2c2r_core.segment.appliances.squaring import squared
-from r2c2r_core.segment.appliances.stance import stood
-from r2c2r_core.segment.appliances.trimming import trimmed
+from r2c2r_core.segment.appliances.box import find_rectangle
+from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
@@ -47,7 +44,7 @@ def appliance_front(
     """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
 
     Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
-    the photographs, which take most of the time and move the box by millimetres.
+    the photographs, which take most of the time.
     """
     clicks = [click for click in prompt.points if click.label == 1]
     found = _plane_of(prepared, clicks[0], kind)
@@ -65,26 +62,10 @@ def appliance_front(
     lab, seen_colour = as_lab(run.mosaic)
     cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
     handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
-    front = trimmed(Front(run, cell, handle, kind.depth.usual), prepared.scene)
+    front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_to_wall(front, prepared.scene.capture.room, kind)
-    depth, seen = measure_depth(front, prepared.scene, kind.depth.usual, wall)
-    front = squared(replace(front, depth_m=depth), prepared.scene)
-    if not glimpse:
-        front, outlined_depth = _photographed(front, prepared.scene, kind.depth.usual, wall)
-        seen = seen or outlined_depth
-    front = replace(front, cell=_nudged(front.cell, on[1:], off, run.grid.cell_m))
-    return front, seen
-
-
-def _photographed(front: Front, scene: Scene, usual_m: float, wall_m: float | None) -> tuple[Front, bool]:
-    """The front by the edges of its box in the photographs; and whether they show its depth."""
-    photos = photos_of(front, scene)
-    front, clear = outlined(front, photos, usual_m, wall_m)
-    standing = stood(front, photos)
-    if standing is front:
-        return front, clear
-    front, again = outlined(standing, photos, usual_m, wall_m)
-    return front, clear or again
+    fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)
+    return replace(fitted.front, cell=_nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)), fitted.depth_seen
 
 
 def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, support_row: float | None) -> Cell | None:

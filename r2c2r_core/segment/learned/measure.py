@@ -13,7 +13,8 @@ from r2c2r_core.kitchen.category import Category, Kind
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.track import FrontPanel, ThingBox
-from r2c2r_core.segment.appliances.box import appliance_box, measure_depth
+from r2c2r_core.segment.appliances.box import appliance_box
+from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -74,9 +75,10 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
     wall = depth_to_wall(front, prepared.scene.capture.room, category)
     if category.kind == "front":
         return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or usual_m)))
-    depth, seen = measure_depth(front, prepared.scene, usual_m, wall)
-    warnings = () if seen else (f"its depth was not seen: {depth:.2f} m is usual for a {prompt.category}",)
-    front = replace(front, depth_m=depth)
+    fitted = fit_box(front, prepared.scene, category, wall)
+    front = fitted.front
+    assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
+    warnings = () if fitted.depth_seen else (assumed,)
     return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
 
 

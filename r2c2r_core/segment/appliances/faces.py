@@ -1,0 +1,128 @@
+"""Depth on the faces of a box: patches of the fused surface, each with its face, and free space that depth saw through."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.segment.appliances.edges import BACK, BOTTOM, FRONT, LEFT, RIGHT, TOP
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.viewpoints import best_views
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which parts of the fused surface belong to which face."""
+
+    shell_m: float = param(0.05, "m", "how far a side or the top may lie from where it is thought")
+    front_shell_m: float = param(0.02, "m", "the same of the front, whose plane is known better")
+    behind_m: float = param(
+        0.03, "m", "sides and the top are read from here on behind the front: the fused surface is round at its edges"
+    )
+    facing: float = param(0.85, "cosine", "between a face and a normal on it: normals of fused depth scatter by 30 degrees")
+    patch_m: float = param(
+        0.05, "m", "side of a patch whose depth counts once", source="errors of fused depth go together over about 3 cm"
+    )
+    least_share: float = param(0.07, "share", "of a face that depth must have seen to measure anything by it")
+    gap_m: float = param(0.06, "m", "a hole this long in a side is where it ends")
+    least_reach_m: float = param(0.15, "m", "sides that end before this are dark, and depth has holes in them")
+    open_views: int = param(16, "count", "frames asked whether they look through the front's rectangle", ge=1)
+    open_step_m: float = param(0.03, "m", "between the points asked about")
+    open_behind_m: float = param(0.08, "m", "depth this far behind the front went past it")
+    open_share: float = param(
+        0.85,
+        "share",
+        "of the frames that measured there: glass lies in a frame that returns light, a gap beside an appliance has none",
+    )
+    open_known: int = param(3, "count", "frames that must have measured there", ge=1)
+
+
+class Patches(NamedTuple):
+    """Depth on faces, in the frame of the front as first thought (n patches)."""
+
+    points: Points
+    axis: np.ndarray  # (n,) coordinate across the face: 0, 1 or 2
+    face: np.ndarray  # (n,) parameter of the box that this coordinate measures
+    reach_m: float | None  # how far behind the front the sides and the top were seen without a gap
+
+
+def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patches:
+    """The patches of the fused surface that lie on a box's front, sides and top."""
+    params = tuned(Params)
+    low, high = box[[LEFT, FRONT, BOTTOM]], box[[RIGHT, BACK, TOP]]
+    before, beyond = (
+        np.array([params.shell_m, params.front_shell_m, params.shell_m]),
+        np.array([params.shell_m, 0.0, params.shell_m]),
+    )
+    points, normals, areas = _surface_in(scene, world_from_front, low - before, high + beyond)
+    x, y, z = points.T
+    level = (z > low[2] + 0.02) & (z < high[2] - 0.02)
+    inner = (x > low[0] + 0.01) & (x < high[0] - 0.01)
+    behind = (y > box[FRONT] + params.behind_m) & (y < box[BACK])
+    near = np.abs(points[:, [0, 0, 2]] - box[[LEFT, RIGHT, TOP]]) < params.shell_m
+    width, depth, height = high - low
+    chosen = {
+        FRONT: ((normals[:, 1] < -params.facing) & (np.abs(y - box[FRONT]) < params.front_shell_m) & inner & level, 0.0),
+        LEFT: ((normals[:, 0] < -params.facing) & near[:, 0] & behind & level, depth * height),
+        RIGHT: ((normals[:, 0] > params.facing) & near[:, 1] & behind & level, depth * height),
+        TOP: ((normals[:, 2] > params.facing) & near[:, 2] & behind & inner, width * depth),
+    }
+    axes = {FRONT: 1, LEFT: 0, RIGHT: 0, TOP: 2}
+    found = {
+        face: _patches(points[on], areas[on], params.patch_m)
+        for face, (on, size) in chosen.items()
+        if areas[on].sum() > params.least_share * size and on.any()
+    }
+    count = [len(patches) for patches in found.values()]
+    ends = [end for face, on in found.items() if face != FRONT and (end := _end(on[:, 1])) > params.least_reach_m]
+    return Patches(
+        np.concatenate([np.zeros((0, 3)), *found.values()]),
+        np.repeat([axes[face] for face in found], count).astype(int),
+        np.repeat(list(found), count).astype(int),
+        max(ends, default=None),
+    )
+
+
+def open_points(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Points:
+    """Points (n, 3) of the front's rectangle, in its frame, that the frames measure past: nothing is there."""
+    params = tuned(Params)
+    x, z = (np.arange(box[a] + params.open_step_m / 2, box[b], params.open_step_m) for a, b in ((LEFT, RIGHT), (BOTTOM, TOP)))
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(x, [box[FRONT]], z, indexing="ij")], axis=1)
+    world = world_from_front.apply(grid)
+    known, past = np.zeros(len(world)), np.zeros(len(world))
+    for frame in best_views(scene, world.mean(axis=0), params.open_views):
+        at, seen, _ = look_up(world, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        known += (seen > 0) & ~scene.noise.occluded(seen, at, params.open_behind_m)
+        past += scene.noise.seen_through(seen, at, params.open_behind_m)
+    return grid[(known >= params.open_known) & (past > params.open_share * known)]
+
+
+def _surface_in(
+    scene: Scene, world_from_front: Rigid3, low: np.ndarray, high: np.ndarray
+) -> tuple[Points, np.ndarray, np.ndarray]:
+    """Middles, normals and areas of the surface's triangles in a box of the front's frame."""
+    parts = scene.parts
+    near = parts.faces_near(world_from_front.apply((low + high)[None] / 2)[0], float(np.linalg.norm(high - low)) / 2)
+    points = world_from_front.inverse.apply(parts.middles[near])
+    inside = ((points > low) & (points < high)).all(axis=1)
+    near = near[inside]
+    return points[inside], parts.normals[near] @ world_from_front.rotation, parts.areas_m2[near]
+
+
+def _patches(points: Points, areas: np.ndarray, patch_m: float) -> Points:
+    """The mean point of each cube of that side."""
+    _, patch = np.unique(np.floor(points / patch_m).astype(int), axis=0, return_inverse=True)
+    weight = np.bincount(patch, areas)
+    return np.stack([np.bincount(patch, areas * points[:, k]) for k in range(3)], axis=1) / weight[:, None]
+
+
+def _end(depths: np.ndarray) -> float:
+    """Where depths along a face first end."""
+    params = tuned(Params)
+    ordered = np.sort(depths)
+    gaps = np.flatnonzero(np.diff(ordered) > params.gap_m)
+    return float(ordered[gaps[0] if len(gaps) else -1]) + params.patch_m / 2

@@ -1,0 +1,290 @@
+"""An appliance's upright box by one robust least-squares fit: depth on its faces, image edges, support, wall and usual sizes.
+
+Everything measured is a residual over its standard deviation, under one robust kernel (Cauchy), for scipy's least_squares.
+Which change of colour is which edge is not known: a Gaussian mixture weighs the candidates (expectation-maximisation), and its
+spread shrinks from centimetres to the noise (graduated non-convexity), from several depths to start from.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.segment.appliances.edges import (
+    BACK,
+    BOTTOM,
+    FRONT,
+    LEFT,
+    RIGHT,
+    TOP,
+    YAW,
+    EdgeView,
+    Photo,
+    associate,
+    displacements,
+    edge_parts,
+    look_across,
+    photo_of,
+    shares,
+)
+from r2c2r_core.segment.appliances.faces import Patches, open_points, patches_on
+from r2c2r_core.segment.fronts.front import Front, front_middle
+from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.thing import ThingConfig, support_height
+from r2c2r_core.segment.viewpoints import best_views
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Standard deviations of what the fit hears, and how it proceeds."""
+
+    yaw_rad: float = param(
+        float(np.radians(1.5)), "rad", "standard deviation of the plane found, where glass leaves little of it"
+    )
+    front_m: float = param(0.008, "m", "the same of its place")
+    side_m: float = param(
+        0.008,
+        "m",
+        "the same of the rectangle's left and right edge: of the clearest lines on the orthomosaic",
+        source="4 to 5 mm on the sample kitchens, 20 mm once of eight",
+    )
+    top_m: float = param(
+        0.025,
+        "m",
+        "the same of its upper edge: a line of the door may be clearer",
+        source="39 mm once of eight on the sample kitchens",
+    )
+    bottom_m: float = param(0.010, "m", "the same of its lower edge, which no photograph is asked for: it lies in shadow")
+    support_m: float = param(0.004, "m", "the same of the height of what it stands on")
+    wall_m: float = param(0.010, "m", "the same of the wall behind")
+    reach_m: float = param(0.04, "m", "the same of where its sides end in depth, which smears across the gap to the wall")
+    open_m: float = param(0.010, "m", "the same of the border of what the frames look through")
+    distance_m: float = param(1.5, "m", "of the cameras, at which the depth noise of the fused surface is taken")
+    kernel: float = param(2.0, "σ", "scale of the Cauchy kernel")
+    spreads_m: tuple[float, ...] = param(
+        (0.020, 0.010, 0.005, 0.003),
+        "m",
+        "of an edge's candidates about it: from how far off the box may be thought to what poses err",
+    )
+    reach_spreads: float = param(2.5, "σ", "how far from an edge its candidates are looked for, in spreads")
+    rounds: int = param(3, "count", "of expectation and maximisation at each spread", ge=1)
+    independent: float = param(
+        4.0, "count", "photographs that err on their own about an edge: a line beside it misleads the others alike"
+    )
+    photos: int = param(16, "count", "photographs asked", ge=1)
+    sure: float = param(0.5, "share", "of the spread of usual depths: a depth known that well was seen")
+
+
+_THOUGHT = 10  # residuals of what was thought before: the seven parameters, and three usual sizes
+_STILL = 2e-4  # a step (rad, m) below which the box stands
+_SCALE = np.array([0.02, 0.01, 0.01, 0.01, 0.02, 0.01, 0.01])  # of the parameters, for the solver's trust region
+
+
+class FittedBox(NamedTuple):
+    """An appliance's front with its depth, and how well its box is known."""
+
+    front: Front
+    covariance: np.ndarray  # (7, 7) of x, y, z of the centre (world, m), yaw (rad), width, depth and height (m)
+    depth_seen: bool  # rather than usual for its kind
+
+
+class Evidence(NamedTuple):
+    """What does not change during the fit; the front's frame."""
+
+    start: np.ndarray
+    kind: Category
+    patches: Patches
+    open_points: np.ndarray
+    wall_m: float | None
+    support_m: float | None
+    sigma_m: float  # of a depth patch
+
+
+class _Edges(NamedTuple):
+    """Where the parts of edges should be in one photograph, and their weights (1/px)."""
+
+    view: EdgeView
+    target_px: np.ndarray
+    weight: np.ndarray
+
+
+class Solution(NamedTuple):
+    box: np.ndarray
+    information: np.ndarray  # (7, 7)
+    cost: float  # negative log-likelihood ratio
+
+
+def fit_box(front: Front, scene: Scene, kind: Category, wall_m: float | None, *, photographs: bool = True) -> FittedBox:
+    """The box behind a front's rectangle, whose depth is a first guess; `wall_m` is how far behind it a wall stands.
+
+    Without photographs, by depth alone: a first look.
+    """
+    cell, cell_m, middle = front.cell, front.run.grid.cell_m, front_middle(front)
+    world_from_front = Rigid3(front.run.grid.world_from_plane.rotation, middle)
+    half_w, half_h = cell.width * cell_m / 2, cell.height * cell_m / 2
+    farthest = min(kind.depth.high, np.inf if wall_m is None else wall_m)
+    start = np.array([0.0, -half_w, half_w, 0.0, min(kind.depth.usual, farthest), -half_h, half_h])
+    deep = start.copy()
+    deep[BACK] = farthest
+    support = support_height(scene, middle[None], ThingConfig(radius_m=half_w))
+    evidence = Evidence(
+        start,
+        kind,
+        patches_on(deep, scene, world_from_front),
+        open_points(start, scene, world_from_front),
+        wall_m,
+        None if support is None else support - float(middle[2]),
+        float(scene.noise.sigma(tuned(Params).distance_m)),
+    )
+    photos = [photo_of(scene, frame) for frame in best_views(scene, middle, tuned(Params).photos)] if photographs else []
+    found = solve(evidence, photos, world_from_front)
+    if not _possible(found.box, start):
+        return FittedBox(replace(front, depth_m=float(start[BACK])), np.full((7, 7), np.nan), False)
+    covariance = covariance_of(found, world_from_front)
+    seen = np.sqrt(covariance[5, 5]) < tuned(Params).sure * kind.depth.usual * kind.depth.spread
+    return FittedBox(_fitted_front(front, found.box), covariance, bool(seen))
+
+
+def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3) -> Solution:
+    """The best box from several depths; of its sides where the wide spread led and where the rectangle had them."""
+    params = tuned(Params)
+
+    def annealed(box: np.ndarray, spreads_m: Sequence[float]) -> Solution:
+        return _annealed(evidence, photos, world_from_front, box, spreads_m)
+
+    coarse = min((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
+    fine = annealed(coarse.box, params.spreads_m[1:])
+    as_found = fine.box.copy()
+    as_found[[LEFT, RIGHT]] = evidence.start[[LEFT, RIGHT]]
+    return min(fine, annealed(as_found, params.spreads_m[2:]), key=_cost)
+
+
+def _cost(solution: Solution) -> float:
+    return solution.cost
+
+
+def _starts(evidence: Evidence) -> list[np.ndarray]:
+    """The box with each of several depths that its kind may have before the wall."""
+    size, first = evidence.kind.depth, float(evidence.start[BACK])
+    farthest = size.high if evidence.wall_m is None else evidence.wall_m
+    others = [(size.low + size.usual) / 2, (size.usual + size.high) / 2, evidence.patches.reach_m]
+    depths = [first, *(depth for depth in others if depth is not None and size.low <= depth <= farthest)]
+    return [np.concatenate([evidence.start[:BACK], [depth], evidence.start[BACK + 1 :]]) for depth in depths]
+
+
+def _annealed(
+    evidence: Evidence,
+    photos: Sequence[Photo],
+    world_from_front: Rigid3,
+    box: np.ndarray,
+    spreads_m: Sequence[float],
+) -> Solution:
+    """The box after expectation-maximisation at each spread in turn."""
+    params = tuned(Params)
+    from scipy.optimize import least_squares
+
+    for spread in spreads_m:
+        views = look_across(box, photos, world_from_front, params.reach_spreads * spread)
+        counted = shares(views, params.independent)
+        for _ in range(params.rounds):
+            parts = edge_parts(box)
+            found = [associate(displacements(parts, view), view, spread) for view in views]
+            edges = [
+                _Edges(view, at.target_px, at.weight * np.sqrt(n)) for view, at, n in zip(views, found, counted, strict=True)
+            ]
+            solved = least_squares(
+                _residuals, box, args=(evidence, edges), loss=_kernel, f_scale=params.kernel, x_scale=_SCALE, max_nfev=8
+            )
+            moved, box = np.abs(solved.x - box).max(), solved.x
+            if moved < _STILL or not views:
+                break
+    parts = edge_parts(box)
+    gain = sum(
+        float(n @ associate(displacements(parts, view), view, spread).gain) for view, n in zip(views, counted, strict=True)
+    )
+    known = (_residuals(box, evidence, []) / params.kernel) ** 2
+    return Solution(box, solved.jac.T @ solved.jac, float(0.5 * params.kernel**2 * _kernel(known)[0].sum() - gain))
+
+
+def _kernel(squares: np.ndarray) -> np.ndarray:
+    """Cauchy's kernel and its two derivatives (3, n) at squared residuals; what was thought before is taken as it is."""
+    with_kernel = 1.0 + squares
+    rho = np.stack([np.log(with_kernel), 1.0 / with_kernel, -1.0 / with_kernel**2])
+    rho[0, :_THOUGHT], rho[1, :_THOUGHT], rho[2, :_THOUGHT] = squares[:_THOUGHT], 1.0, 0.0
+    return rho
+
+
+def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> np.ndarray:
+    """All evidence over its standard deviations."""
+    params = tuned(Params)
+    _, left, right, front, back, bottom, top = box
+    thought = [params.yaw_rad, params.side_m, params.side_m, params.front_m, np.inf, params.bottom_m, params.top_m]
+    sizes = zip(
+        (right - left, back - front, top - bottom),
+        (evidence.kind.width, evidence.kind.depth, evidence.kind.height),
+        strict=True,
+    )
+    limits = []
+    if evidence.wall_m is not None:
+        limits.append(max(back - evidence.wall_m, 0.0) / params.wall_m)
+    if evidence.support_m is not None:
+        limits.append(min(bottom - evidence.support_m, 0.0) / params.support_m)
+    if evidence.patches.reach_m is not None:
+        limits.append((back - evidence.patches.reach_m) / params.reach_m)
+    turned = rotation_about_z(float(box[YAW]))
+    patches = evidence.patches
+    off = (patches.points @ turned)[np.arange(len(patches.axis)), patches.axis] - box[patches.face]
+    x, _, z = (evidence.open_points @ turned).T
+    inside = np.maximum(np.minimum(np.minimum(x - left, right - x), top - z), 0.0)
+    parts = edge_parts(box)
+    matched = [(displacements(parts, edge.view) - edge.target_px) * edge.weight for edge in edges]
+    return np.concatenate(
+        [
+            (box - evidence.start) / thought,
+            [float(size.deviation(max(value, 0.02))) for value, size in sizes],
+            limits,
+            off / evidence.sigma_m,
+            inside / params.open_m,
+            *matched,
+        ]
+    )
+
+
+def _possible(box: np.ndarray, start: np.ndarray) -> bool:
+    """Whether the fit kept at least half the rectangle and a depth."""
+    width, height = box[RIGHT] - box[LEFT], box[TOP] - box[BOTTOM]
+    return bool(width > start[RIGHT] and height > start[TOP] and box[BACK] - box[FRONT] > 0.05 and np.isfinite(box).all())
+
+
+def _fitted_front(front: Front, box: np.ndarray) -> Front:
+    """The front turned about the upright axis through its middle, moved and with its edges where the box has them."""
+    middle, run, cell, cell_m = front_middle(front), front.run, front.cell, front.run.grid.cell_m
+    column, row = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
+    moved = Cell(column + box[LEFT] / cell_m, row - box[TOP] / cell_m, column + box[RIGHT] / cell_m, row - box[BOTTOM] / cell_m)
+
+    def placed(world_from_plane: Rigid3) -> Rigid3:
+        turned = Rigid3(rotation_about_z(float(box[YAW])), middle) @ Rigid3(np.eye(3), -middle) @ world_from_plane
+        return Rigid3(turned.rotation, turned.translation + box[FRONT] * turned.rotation[:, 1])
+
+    grid = replace(run.grid, world_from_plane=placed(run.grid.world_from_plane))
+    region = replace(run.region, world_from_plane=placed(run.region.world_from_plane))
+    return replace(front, cell=moved, depth_m=float(box[BACK] - box[FRONT]), run=replace(run, grid=grid, region=region))
+
+
+def covariance_of(solution: Solution, world_from_front: Rigid3) -> np.ndarray:
+    """(7, 7) of the box's centre in the world, its yaw, width, depth and height."""
+    box = solution.box
+    middle = np.array([box[LEFT] + box[RIGHT], box[FRONT] + box[BACK], box[BOTTOM] + box[TOP]]) / 2
+    turned = world_from_front.rotation @ rotation_about_z(float(box[YAW]))
+    change = np.zeros((7, 7))
+    change[:3, YAW] = turned @ np.array([-middle[1], middle[0], 0.0])
+    for axis, pair in enumerate(((LEFT, RIGHT), (FRONT, BACK), (BOTTOM, TOP))):
+        change[:3, pair] = turned[:, [axis]] / 2
+        change[4 + axis, pair] = -1.0, 1.0
+    change[3, YAW] = 1.0
+    return np.asarray(change @ np.linalg.pinv(solution.information) @ change.T)

@@ -1,0 +1,100 @@
+"""What depth says of a box: the patches on its faces, where a side ends, and what the frames look through."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.model.capture import SceneSurface
+from r2c2r_core.segment.appliances import faces
+from r2c2r_core.segment.appliances.edges import FRONT, RIGHT, TOP
+from r2c2r_core.segment.appliances.faces import open_points, patches_on
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.surface import parts_of
+from tests.core.segment.appliances.drawn import TRUE
+
+HERE = Rigid3(np.eye(3), np.zeros(3))
+DEEP = TRUE + np.array([0, 0, 0, 0, 0.09, 0, 0])  # to the wall
+CELL_M = 0.01
+CAMERA = Intrinsics(fx=200.0, fy=200.0, cx=128.0, cy=96.0, width=256, height=192)
+Span = tuple[float, float]
+
+
+def sheet(axis: int, at: float, first: Span, second: Span, outward: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a flat piece across an axis, which faces along it (1) or against it (-1)."""
+    rows, columns = (np.arange(low, high + CELL_M / 2, CELL_M) for low, high in (first, second))
+    grid = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+    vertices = np.insert(grid, axis, at, axis=1)
+    n = len(columns)
+    corner = (np.arange(len(rows) - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    triangles = np.concatenate(
+        [np.stack([corner, corner + n, corner + 1], 1), np.stack([corner + n, corner + n + 1, corner + 1], 1)]
+    )
+    a, b, c = (vertices[triangles[0, k]] for k in range(3))
+    return vertices, triangles if np.cross(b - a, c - a)[axis] * outward > 0 else triangles[:, ::-1]
+
+
+def scene_of(*sheets: tuple[np.ndarray, np.ndarray]) -> Scene:
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in sheets)])
+    vertices = np.concatenate([vertices for vertices, _ in sheets])
+    triangles = np.concatenate([triangles + start for (_, triangles), start in zip(sheets, starts, strict=False)])
+    surface = SceneSurface(
+        vertices_world=vertices, faces=triangles, colours=np.zeros((len(vertices), 3), np.uint8), voxel_m=0.01
+    )
+    return cast(Scene, SimpleNamespace(parts=parts_of(surface)))
+
+
+def test_patches_know_their_faces() -> None:
+    found = patches_on(
+        DEEP,
+        scene_of(
+            sheet(1, 0.004, (-0.2, 0.2), (-0.14, 0.14), -1),
+            sheet(0, 0.26, (0.0, 0.34), (-0.14, 0.14), 1),
+            sheet(2, 0.12, (-0.2, 0.2), (0.0, 0.3), 1),
+        ),
+        HERE,
+    )
+    for face, axis, at in ((FRONT, 1, 0.004), (RIGHT, 0, 0.26), (TOP, 2, 0.12)):
+        on = found.face == face
+        assert on.sum() > 10
+        assert (found.axis[on] == axis).all()
+        np.testing.assert_allclose(found.points[on][:, axis], at, atol=1e-6)
+
+
+def test_a_side_ends_at_its_first_gap_not_at_the_wall_behind() -> None:
+    side = sheet(0, 0.25, (0.0, 0.30), (-0.14, 0.14), 1)
+    beyond = sheet(0, 0.25, (0.42, 0.45), (-0.14, 0.14), 1)
+    assert patches_on(DEEP, scene_of(side, beyond), HERE).reach_m == pytest.approx(0.31, abs=0.03)
+
+
+def test_a_dark_side_with_holes_says_nothing_of_where_it_ends() -> None:
+    pieces = [sheet(0, 0.25, span, (-0.14, 0.14), 1) for span in ((0.03, 0.08), (0.37, 0.42))]
+    found = patches_on(DEEP, scene_of(*pieces), HERE)
+    assert found.reach_m is None
+    assert len(found.points)
+
+
+def test_a_face_of_which_depth_saw_next_to_nothing_is_left_out() -> None:
+    assert not len(patches_on(DEEP, scene_of(sheet(0, 0.25, (0.1, 0.13), (0.0, 0.03), 1)), HERE).points)
+
+
+def test_open_is_what_the_frames_measure_past(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The right third of the rectangle is a gap; the sensor meets the front in the rest."""
+    down = np.column_stack([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    frames = [
+        SimpleNamespace(index=k, world_from_camera=Rigid3(down, np.array([0.02 * k, -1.0, 0.0])), depth_camera=CAMERA)
+        for k in range(4)
+    ]
+
+    def depth(index: int) -> np.ndarray:
+        x = (np.arange(CAMERA.width) + 0.5 - CAMERA.cx) / CAMERA.fx + 0.02 * index
+        return np.tile(np.where(x > 0.1, 1.5, 1.0), (CAMERA.height, 1)).astype(np.float32)
+
+    monkeypatch.setattr(faces, "best_views", lambda scene, point, count: frames)
+    found = open_points(TRUE, cast(Any, SimpleNamespace(depth=depth, noise=DepthNoise())), HERE)
+    assert found[:, 0].min() == pytest.approx(0.1, abs=0.03)
+    assert found[:, 0].max() > 0.22

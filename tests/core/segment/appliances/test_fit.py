@@ -1,0 +1,136 @@
+"""An appliance's box from drawn photographs and from depth on its faces, from guesses centimetres off."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.segment.appliances.edges import BACK, FRONT, LEFT, RIGHT, TOP, YAW, Photo
+from r2c2r_core.segment.appliances.faces import Patches
+from r2c2r_core.segment.appliances.fit import Evidence, Params, Solution, covariance_of, solve
+from r2c2r_core.tuning import tuned
+from tests.core.segment.appliances.drawn import BACK_M, EYES, LEFT_M, LINE_Z, RIGHT_M, TOP_M, TRUE, WALL_Y, photo
+
+KIND = category_of("microwave")
+NOTHING = Patches(np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, int), None)
+PIXEL_M = 0.0035  # at 1.5 m a pixel is 2 mm, and edges are drawn to half a pixel
+
+
+def solved(
+    start: np.ndarray,
+    photos: list[Photo],
+    world_from_front: Rigid3 | None = None,
+    patches: Patches = NOTHING,
+    open_points: Points = np.zeros((0, 3)),
+) -> Solution:
+    evidence = Evidence(start, KIND, patches, open_points, WALL_Y, None, 0.0085)
+    return solve(evidence, photos, world_from_front or Rigid3(np.eye(3), np.zeros(3)))
+
+
+def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wall() -> None:
+    start = TRUE.copy()
+    start[[TOP, BACK]] = LINE_Z, 0.42
+    found = solved(start, [photo(eye) for eye in EYES])
+    assert found.box[TOP] == pytest.approx(TOP_M, abs=PIXEL_M)
+    assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)  # seen at a slant
+
+
+@pytest.mark.parametrize("turn_deg", [1.4, -1.1])
+def test_edges_tell_a_turn_that_depth_missed(turn_deg: float) -> None:
+    """And where its front and sides are, from a guess a centimetre off."""
+    turn, start = np.radians(turn_deg), TRUE.copy()
+    start[[LEFT, RIGHT]] = LEFT_M + 0.004, RIGHT_M - 0.004
+    found = solved(start, [photo(eye) for eye in EYES], Rigid3(rotation_about_z(turn), np.array([0.006, 0.004, 0.0])))
+    assert found.box[YAW] == pytest.approx(-turn, abs=np.radians(0.2))
+    assert found.box[FRONT] == pytest.approx(-0.004, abs=PIXEL_M)
+    assert found.box[LEFT] == pytest.approx(LEFT_M - 0.006, abs=PIXEL_M)
+    assert found.box[RIGHT] == pytest.approx(RIGHT_M - 0.006, abs=PIXEL_M)
+
+
+def test_a_box_that_stands_where_it_was_thought_stays() -> None:
+    found = solved(TRUE, [photo(eye) for eye in EYES])
+    assert abs(found.box[YAW]) < np.radians(0.15)
+    np.testing.assert_allclose(found.box[1:5], TRUE[1:5], atol=PIXEL_M)
+
+
+def test_a_white_box_before_a_white_wall_keeps_a_depth_it_does_not_claim_to_know() -> None:
+    found = solved(TRUE, [photo(eye, 200, side_grey=200, tiles=False) for eye in EYES])
+    assert depth_sigma(found) > tuned(Params).sure * KIND.depth.usual * KIND.depth.spread
+    assert depth_sigma(solved(TRUE, [photo(eye) for eye in EYES])) < 0.01
+
+
+def test_edges_behind_something_nearer_say_nothing() -> None:
+    start = TRUE.copy()
+    start[BACK] = KIND.depth.usual
+    found = solved(start, [photo(eye, hidden=True) for eye in EYES])
+    np.testing.assert_allclose(found.box[[YAW, LEFT, RIGHT, FRONT, BACK]], start[[YAW, LEFT, RIGHT, FRONT, BACK]], atol=1e-3)
+
+
+@pytest.mark.parametrize("turn_deg", [-4.0, 0.0, 3.0])
+def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(turn_deg: float) -> None:
+    """A strip of keys and the right side, 3 mm rough; no photographs."""
+    rng, turn = np.random.default_rng(1), np.radians(turn_deg)
+    keys = np.column_stack([rng.uniform(0.15, 0.25, 40), np.zeros(40), rng.uniform(-0.15, 0.15, 40)])
+    side = np.column_stack([np.full(100, 0.25), rng.uniform(0.03, 0.35, 100), rng.uniform(-0.15, 0.15, 100)])
+    points = np.concatenate([keys, side])
+    points[:40, 1] += rng.normal(0, 0.003, 40)
+    points[40:, 0] += rng.normal(0, 0.003, 100)
+    patches = Patches(
+        points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), None
+    )
+    found = solved(TRUE, [], patches=patches)
+    assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # drawn a little to the plane that was found
+    assert found.box[RIGHT] == pytest.approx(0.25, abs=0.004)
+
+
+def test_a_gap_that_the_frames_look_through_is_cut_off() -> None:
+    """A wall beside the box has a line that the rectangle took for its edge, 4 cm too far; glass in its middle is no gap."""
+    start = TRUE.copy()
+    start[RIGHT] = RIGHT_M + 0.04
+    gap = grid((RIGHT_M, RIGHT_M + 0.04), (-0.15, 0.15))
+    window = grid((-0.05, 0.05), (-0.05, 0.05))
+    assert solved(start, [], open_points=gap).box[RIGHT] == pytest.approx(RIGHT_M, abs=0.01)
+    np.testing.assert_allclose(solved(TRUE, [], open_points=window).box[[LEFT, RIGHT]], [LEFT_M, RIGHT_M], atol=0.005)
+
+
+def test_the_covariance_is_of_centre_yaw_and_sizes() -> None:
+    """By perturbing the parameters: the box of a turned front, 1 mm and 1 mrad."""
+    box = np.array([0.3, -0.2, 0.4, 0.05, 0.5, -0.1, 0.4])
+    world_from_front = Rigid3(rotation_about_z(0.7), np.array([1.0, 2.0, 0.5]))
+
+    def measures(of: np.ndarray) -> np.ndarray:
+        middle = np.array([of[1] + of[2], of[3] + of[4], of[5] + of[6]]) / 2
+        centre = world_from_front.apply((rotation_about_z(of[0]) @ middle)[None])[0]
+        return np.array([*centre, 0.7 + of[0], of[2] - of[1], of[4] - of[3], of[6] - of[5]])
+
+    sigma = np.array([2.0, 1.0, 3.0, 1.0, 5.0, 2.0, 1.0]) * 1e-3
+    slope = np.column_stack([(measures(box + 1e-5 * e) - measures(box - 1e-5 * e)) / 2e-5 for e in np.eye(7)])
+    covariance = covariance_of(Solution(box, np.diag(sigma**-2), 0.0), world_from_front)
+    np.testing.assert_allclose(covariance, slope @ np.diag(sigma**2) @ slope.T, atol=1e-12)
+
+
+def test_more_depth_of_a_side_means_less_spread() -> None:
+    def side(count: int) -> Patches:
+        points = np.column_stack([np.full(count, RIGHT_M), np.linspace(0.04, 0.3, count), np.zeros(count)])
+        return on_the_right(points)
+
+    few, many = (sigma_of(RIGHT, solved(TRUE, [], patches=side(count))) for count in (4, 36))
+    assert many < 0.6 * few
+
+
+def on_the_right(points: Points) -> Patches:
+    return Patches(points, np.zeros(len(points), int), np.full(len(points), RIGHT), None)
+
+
+def grid(x_m: tuple[float, float], z_m: tuple[float, float]) -> Points:
+    x, z = np.meshgrid(np.arange(*x_m, 0.01) + 0.005, np.arange(*z_m, 0.03))
+    return np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])
+
+
+def depth_sigma(found: Solution) -> float:
+    return float(np.sqrt(covariance_of(found, Rigid3(np.eye(3), np.zeros(3)))[5, 5]))
+
+
+def sigma_of(parameter: int, found: Solution) -> float:
+    return float(np.sqrt(np.linalg.inv(found.information)[parameter, parameter]))
