@@ -112,6 +112,8 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
     expect(panel.get_by_role("listitem")).to_have_text(re.compile("bea"))
     expect(name).to_be_focused()
     expect(name).to_have_value("")
+    below = "card => card.parentElement.nextElementSibling.getBoundingClientRect().top - card.getBoundingClientRect().bottom"
+    assert panel.evaluate(below) >= 12  # px between the card and what follows
     picture(ann, "23-members")
 
     card.click()  # it is there again
@@ -149,7 +151,7 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: 
     picture(ann, "24-set-aside")
     aside.get_by_role("button", name="Leave it there").click()
     expect(ann.locator(".toast", has_text="stays where it is")).to_be_visible()
-    aside.get_by_text("1 folder left where they are").click()
+    aside.get_by_text("1 folder left in place").click()
     card = ann.locator(f".cards a[href='/p/{project}']")
     expect(card).to_have_count(0)
     aside.get_by_role("button", name="Adopt Sample kitchen").click()

@@ -33,7 +33,7 @@ export class UnknownList extends HTMLElement {
           ? h(
               "details",
               {},
-              h("summary", {}, `${counted(left.length, "folder")} left where they are`),
+              h("summary", {}, `${counted(left.length, "folder")} left in place`),
               h("ul", { class: "stack plain" }, ...left.map((entry) => this.#row(entry))),
             )
           : "",
