@@ -1,5 +1,6 @@
 """A command's wall time, CPU time and peak memory, its children included."""
 
+import os
 import subprocess
 import threading
 import time
@@ -20,6 +21,7 @@ class Cost:
     wall_s: float
     cpu_s: float  # user and system, of the process and all its children
     peak_bytes: int  # resident memory of the whole tree, sampled five times a second
+    largest_bytes: int  # that of its largest process, at its peak
 
 
 def run_measured(command: Sequence[str], *, cwd: Path, log: Path) -> Cost:
@@ -29,25 +31,26 @@ def run_measured(command: Sequence[str], *, cwd: Path, log: Path) -> Cost:
         process = subprocess.Popen(command, cwd=cwd, stdout=output, stderr=subprocess.STDOUT)
         watch = _Watch(psutil.Process(process.pid))
         watch.start()
-        exit_code = process.wait()
+        _, status, usage = os.wait4(process.pid, 0)  # what its children took is in it
+        process.returncode = os.waitstatus_to_exitcode(status)
         watch.stop()
-    return Cost(exit_code=exit_code, wall_s=time.monotonic() - started, cpu_s=watch.cpu_s, peak_bytes=watch.peak_bytes)
+    return Cost(
+        exit_code=process.returncode,
+        wall_s=time.monotonic() - started,
+        cpu_s=usage.ru_utime + usage.ru_stime,
+        peak_bytes=watch.peak_bytes,
+        largest_bytes=usage.ru_maxrss * 1024,
+    )
 
 
 class _Watch(threading.Thread):
-    """Samples a process tree until told to stop."""
+    """Samples a process tree's memory until told to stop."""
 
     def __init__(self, root: psutil.Process) -> None:
         super().__init__(daemon=True)
         self._root = root
         self._ended = threading.Event()
-        self._cpu: dict[int, float] = {}
         self.peak_bytes = 0
-
-    @property
-    def cpu_s(self) -> float:
-        """CPU seconds of every process seen, each at its last sample."""
-        return sum(self._cpu.values())
 
     def run(self) -> None:
         """Sample until stopped."""
@@ -67,9 +70,7 @@ class _Watch(threading.Thread):
             return
         for process in tree:
             try:
-                times = process.cpu_times()
                 total += process.memory_info().rss
             except psutil.NoSuchProcess:
                 continue
-            self._cpu[process.pid] = times.user + times.system
         self.peak_bytes = max(self.peak_bytes, total)

@@ -1,11 +1,12 @@
 """Seconds by stage: how they grow with objects and with frames, from nothing to the bundle, and after one changed click.
 
-    python benchmarks/speed.py [--objects 5,14,40] [--frames 60,180,600] [--workers N] [--workdir DIR]
+    python benchmarks/speed.py [--quick] [--objects 5,14,40] [--frames 60,180,600] [--workers N] [--workdir DIR]
 
 Each case is a fresh workspace; each stage is a process of its own, as in the app, so its seconds include starting it and its
 workers. More objects than the sample has are its objects again under other names: they are segmented, generated and placed, and
 not arranged, for they would stand in each other. "whole" is `r2c2r run`, "again" the same with one click moved by two pixels.
-Writes benchmarks/speed.json and a table. Times move with the machine's load: use an idle one.
+Writes benchmarks/speed.json and a table; --quick measures "whole" and "again" alone and keeps what the file says of stages.
+Times move with the machine's load: use an idle one. The load average beside each says whether it was.
 """
 
 import argparse
@@ -18,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from measure import run_measured
+from measure import Cost, run_measured
 from run import CLI, REPOSITORY, made_sample
 
 RESULTS = Path(__file__).resolve().parent / "speed.json"
@@ -34,23 +35,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--frames", type=_numbers, default=(60, 180, 600))
     parser.add_argument("--workers", type=int, default=0, help="0: as cores and memory allow")
     parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are used again")
+    parser.add_argument("--quick", action="store_true", help="only the whole run and the one after a changed click")
     options = parser.parse_args(arguments)
+    cases = [(count, USUAL_FRAMES) for count in options.objects]
+    cases += [(USUAL_OBJECTS, frames) for frames in options.frames if frames != USUAL_FRAMES]
     with tempfile.TemporaryDirectory(prefix="r2c2r-speed-") as scratch:
         workdir = (options.workdir or Path(scratch)).resolve()
         workdir.mkdir(parents=True, exist_ok=True)
-        cases = [(count, USUAL_FRAMES) for count in options.objects]
-        cases += [(USUAL_OBJECTS, frames) for frames in options.frames if frames != USUAL_FRAMES]
-        rows = []
-        for count, frames in cases:
-            rows.append(stage_seconds(count, frames, options.workers, workdir))
-            print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
-        document = {
+        document: dict[str, Any] = {
             "version": 1,
             "cores": len(os.sched_getaffinity(0)),
             "workers": options.workers,
-            "stages": rows,
             "run": run_seconds(options.workers, workdir),
+            "stages": _stages_before() if options.quick else [],
         }
+        for count, frames in () if options.quick else sorted(cases, key=lambda case: case[0] * case[1]):
+            document["stages"].append(stage_seconds(count, frames, options.workers, workdir))
+            print(json.dumps(document["stages"][-1]), file=sys.stderr, flush=True)
     RESULTS.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     print(markdown(document))
     return 0
@@ -77,7 +78,7 @@ def stage_seconds(count: int, frames: int, workers: int, workdir: Path) -> dict[
         cost = run_measured(command, cwd=REPOSITORY, log=work / f"{stage}.log")
         if cost.exit_code != 0:
             raise SystemExit(f"{stage} ended with {cost.exit_code}: see {work / f'{stage}.log'}")
-        taken[stage] = {"wall_s": round(cost.wall_s, 1), "cpu_s": round(cost.cpu_s, 1)}
+        taken[stage] = _told(cost)
     return taken
 
 
@@ -95,14 +96,24 @@ def run_seconds(workers: int, workdir: Path) -> dict[str, Any]:
         (work / "prompts.json").write_text(json.dumps(prompts))
         command = [*CLI, "run", str(sample / "scan.r3d"), "--prompts", str(work / "prompts.json"), "-o", str(work / "b.zip")]
         cost = run_measured([*command, "--workers", str(workers)], cwd=REPOSITORY, log=work / f"{name}.log")
-        taken[name] = {
-            "wall_s": round(cost.wall_s, 1),
-            "cpu_s": round(cost.cpu_s, 1),
-            "peak_gb": round(cost.peak_bytes / 1e9, 2),
-            "exit_code": cost.exit_code,
-        }
+        taken[name] = _told(cost) | {"exit_code": cost.exit_code}
         print(json.dumps({name: taken[name]}), file=sys.stderr, flush=True)
     return taken
+
+
+def _told(cost: Cost) -> dict[str, Any]:
+    return {
+        "wall_s": round(cost.wall_s, 1),
+        "cpu_s": round(cost.cpu_s, 1),
+        "peak_gb": round(cost.peak_bytes / 1e9, 2),
+        "largest_process_gb": round(cost.largest_bytes / 1e9, 2),
+        "load": round(os.getloadavg()[0], 1),
+    }
+
+
+def _stages_before() -> list[dict[str, Any]]:
+    before: list[dict[str, Any]] = json.loads(RESULTS.read_text(encoding="utf-8"))["stages"] if RESULTS.exists() else []
+    return before
 
 
 def markdown(document: dict[str, Any]) -> str:
