@@ -75,7 +75,7 @@ def _scans(folder: Path) -> Iterator[Article]:
     loaded = trimesh.load(folder / "aws-Refrigerator_01" / "meshes" / "aws_Refrigerator_01_visual.DAE", force="scene")
     yield _standing("refrigerator model", "scan", _patterned(loaded.to_geometry()), 1.75, by_height=True)
     figure = read_upload(folder / "sam3d-bench" / "0.glb", "figure", "c0").mesh
-    turn = least_volume_axes(figure.vertices)[0].T
+    turn = least_volume_axes(figure.vertices, hull_directions(figure.vertices, 40))[0].T
     turn = np.roll(turn, 2 - int(np.argmax(np.ptp(figure.vertices @ turn.T, axis=0))), axis=0)  # its longest side upright
     yield _standing("figure", "scan", _moved(figure, Similarity3(1.0, turn, np.zeros(3))), 0.9, by_height=True)
 

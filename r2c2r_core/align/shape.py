@@ -1,5 +1,6 @@
 """A candidate mesh prepared for alignment: sampled surface, colours, box axes, a light copy to render."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from r2c2r_core.arrays import Faces, Matrix3, Points, Vector3
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3, nearest_rotation, rotation_between
 from r2c2r_core.model.mesh import TexturedMesh
+
+_HULL_SIDES = 40  # that a box may stand on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,11 +46,12 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
     normals = _smooth_normals(tree, points, normals)
     vertices, faces = _lighten(mesh, face_limit)
     manhattan, boxiness = manhattan_axes(normals, rng)
-    boxes = [manhattan, *least_volume_axes(points)]
+    sides = hull_directions(points, _HULL_SIDES)
+    boxes = [manhattan, *least_volume_axes(points, sides)]
     frames = _distinct_frames(boxes)
     volume = float((triangles[:, 0] * np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6)
     diameter = float(np.linalg.norm(np.ptp(points @ frames[0], axis=0)))  # of its own box: the frame's is arbitrary
-    ups, bases = standing_directions(points, frames, boxiness)
+    ups, bases = standing_directions(points, frames, boxiness, sides)
     return Shape(
         points=points,
         normals=normals,
@@ -108,11 +112,10 @@ def manhattan_axes(normals: Points, rng: np.random.Generator) -> tuple[Matrix3, 
     return best.T, float(aligned.mean())
 
 
-def least_volume_axes(points: Points) -> list[Matrix3]:
-    """Axes (columns) of the smallest box that stands on a side of the convex hull; empty for a flat point set."""
-    normals = hull_directions(points, 40)
+def least_volume_axes(points: Points, sides: Sequence[Vector3]) -> list[Matrix3]:
+    """Axes (columns) of the smallest box on one of the `sides` of the convex hull; empty for a flat point set."""
     best_volume, best = np.inf, None
-    for up in normals:
+    for up in sides:
         to_plan = rotation_between(up, np.array([0.0, 0.0, 1.0]))
         plan = points @ to_plan.T
         try:

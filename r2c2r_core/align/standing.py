@@ -1,5 +1,6 @@
 """Which ways up a mesh can stand: gravity is known, so of two poses that fit alike the one that would topple is wrong."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,20 +23,22 @@ class Params:
     flat: float = param(1 / 9, "ratio", "of a foot's thickness to its width, at most: on a round side a thing rocks")
     settled_deg: float = param(12.0, "deg", "from square to its base: a direction farther off belongs to another base")
     most: int = param(14, "count", "directions tried", ge=1)
+    sides: int = param(8, "count", "of them flat sides of the hull, at most: a mug's base is among its smaller ones", ge=1)
 
 
 def standing_directions(
-    points: Points, frames: tuple[Matrix3, ...], boxiness: float
+    points: Points, frames: tuple[Matrix3, ...], boxiness: float, sides: Sequence[Vector3]
 ) -> tuple[tuple[Vector3, ...], tuple[Vector3, ...]]:
     """Directions that may point up (stable ones first, 10 degrees apart at least), and those of them that are stable.
 
-    They come from the box axes and the flat sides of the hull. A box's own axes are known by all of its sides; anything
-    else stands square to its base, which its box axes miss by some degrees where a handle sticks out.
+    They come from the box axes and the flat `sides` of the hull, outward normals, largest first. A box's own axes are known
+    by all of its sides; anything else stands square to its base, which its box axes miss by some degrees where a handle
+    sticks out.
     """
     params = tuned(Params)
     axes = [sign * frame[:, k] for frame in frames for k in range(3) for sign in (1.0, -1.0)]
-    sides = [-n for n in hull_directions(points, 8)]  # a mug's base is among its smaller sides
-    own, others = (axes[:6], [*sides, *axes[6:]]) if boxiness > 0.5 else ([], [*sides, *axes])
+    downs = [-n for n in sides[: params.sides]]
+    own, others = (axes[:6], [*downs, *axes[6:]]) if boxiness > 0.5 else ([], [*downs, *axes])
     stable: list[Vector3] = []
     rest: list[Vector3] = []
     for direction in own:
@@ -76,14 +79,16 @@ def hull_directions(points: Points, count: int) -> list[Vector3]:
     left = area.copy()
     found: list[np.ndarray] = []
     together = normals @ normals.T > np.cos(np.radians(5))
+    gathered = together @ left
     while len(found) < count:
-        gathered = together @ left
         k = int(np.argmax(gathered))
         if gathered[k] < 0.01 * area.sum():
             break
-        direction = (normals * (left * together[k])[:, None]).sum(axis=0)
+        side = np.flatnonzero(together[k] & (left > 0))
+        direction = left[side] @ normals[side]
         found.append(direction / np.linalg.norm(direction))
-        left = np.where(together[k], 0.0, left)
+        gathered -= left[side] @ together[side]
+        left[side] = 0.0
     return found
 
 

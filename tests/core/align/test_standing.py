@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from r2c2r_core.align.standing import settled_on_base, standing_directions
+from r2c2r_core.align.standing import hull_directions, settled_on_base, standing_directions
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -30,7 +30,8 @@ def off_deg(direction: np.ndarray, wanted: np.ndarray) -> float:
 def test_a_cup_stands_square_to_its_base_whatever_its_box_axes_say(seed: int) -> None:
     turn = Rotation.random(random_state=seed).as_matrix()
     box_axes = turn @ Rotation.from_euler("y", 7, degrees=True).as_matrix()
-    ups, bases = standing_directions(cup() @ turn.T, (box_axes,), 0.3)
+    points = cup() @ turn.T
+    ups, bases = standing_directions(points, (box_axes,), 0.3, hull_directions(points, 8))
     assert min(off_deg(base, turn @ UP) for base in bases) < 1.0  # 1 mm of noise over a base of 8 cm
     assert min(off_deg(up, turn @ UP) for up in ups) < 1.0
     assert all(off_deg(a, b) > 10 for k, a in enumerate(ups) for b in ups[:k])
@@ -39,7 +40,7 @@ def test_a_cup_stands_square_to_its_base_whatever_its_box_axes_say(seed: int) ->
 def test_a_boxs_own_axes_count_for_more_than_its_base() -> None:
     points = cup(handle=False)
     axes = Rotation.from_euler("y", 2, degrees=True).as_matrix()
-    _, bases = standing_directions(points, (axes,), 0.9)
+    _, bases = standing_directions(points, (axes,), 0.9, hull_directions(points, 8))
     assert min(off_deg(base, axes[:, 2]) for base in bases) < 1e-6
 
 
