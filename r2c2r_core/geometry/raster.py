@@ -45,7 +45,7 @@ def rasterize(
     vertices = np.ascontiguousarray(vertices_world, dtype=np.float32)
     world_to_camera = camera_from_world.matrix
     z = vertices @ world_to_camera[2, :3].astype(np.float32) + np.float32(world_to_camera[2, 3])
-    visible = faces[(z[faces] > _NEAR_M).all(axis=1)].astype(np.int32) if len(faces) else faces
+    visible = _before(faces, z > _NEAR_M).astype(np.int32, copy=False)
     depth = np.full((canvas_h, canvas_w), _FAR_M, np.float32)
     drawn = np.zeros((canvas_h, canvas_w, 3), np.float32)
     if len(visible):
@@ -100,6 +100,13 @@ def subdivide_long_edges(
     packed[:, 3:] *= 1e-6
     split, split_faces = subdivide_to_size(packed, faces, max_edge=longest_m, max_iter=12)
     return split[:, :3], split_faces, split[:, 3:] * 1e6
+
+
+def _before(faces: Faces, is_before: np.ndarray) -> AnyFaces:
+    """The faces of which every vertex is."""
+    if is_before.all():
+        return faces
+    return faces[is_before[faces[:, 0]] & is_before[faces[:, 1]] & is_before[faces[:, 2]]]
 
 
 def _settings() -> "cv2.TriangleRasterizeSettings":
