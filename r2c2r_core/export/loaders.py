@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ SAPIEN_VARIABLE = "R2C2R_SAPIEN_PYTHON"
 
 _PROBES = Path(__file__).parent / "probes"
 _SECONDS = 180
+_AT_ONCE = 2  # most of them import and parse, two wait for a process of theirs
 
 
 class _NotThereError(Exception):
@@ -46,7 +48,12 @@ def try_loaders(
         ("SAPIEN", lambda: _sapien(scene, python)),
         ("USD", lambda: _usd(folder / "scene.usda")),
     )
-    return tuple(_verdict(name, attempt, expected) for name, attempt in progress.each(attempts, "loaders"))
+
+    def verdict(loader: tuple[str, Callable[[], dict[str, Any]]]) -> LoaderResult:
+        return _verdict(*loader, expected)
+
+    with ThreadPoolExecutor(_AT_ONCE) as threads:
+        return tuple(progress.each(threads.map(verdict, attempts), "loaders", count=len(attempts)))
 
 
 def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readback) -> LoaderResult:

@@ -1,5 +1,6 @@
 """preview.png: the scene closed and open, drawn on the CPU with a sun, its shadow and a floor."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -19,8 +20,9 @@ OPEN_FRACTION = 0.75
 _SUPERSAMPLE = 2
 _LONG = 1.9  # width over height, as seen, from which the two pictures go one above the other
 _SUN_FROM = np.array([-0.45, -0.35, 1.0])  # in the view's own right, back, up
-_BACKGROUND = np.array([244.0, 245.0, 247.0])
-_FLOOR = np.array([222.0, 221.0, 218.0])
+_BACKGROUND = np.array([244.0, 245.0, 247.0], np.float32)
+_FLOOR = np.array([222.0, 221.0, 218.0], np.float32)
+_UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,10 +48,12 @@ def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> 
     stacked = across > _LONG * high
     size = (width_px * 3 // 4, round(width_px * 0.32)) if stacked else (width_px // 2, round(width_px * 0.4))
     camera, camera_from_world = framing(points, direction, size)
-    pictures = [
-        _captioned(draw(soup, plan.floor_z_m, camera, camera_from_world), caption)
-        for soup, caption in ((closed, "closed"), (opened, "open"))
-    ]
+
+    def picture(soup: Soup, caption: str) -> Image:
+        return _captioned(draw(soup, plan.floor_z_m, camera, camera_from_world), caption)
+
+    with ThreadPoolExecutor(2) as threads:
+        pictures = list(threads.map(picture, (closed, opened), ("closed", "open")))
     return png_bytes(np.concatenate(pictures, axis=0 if stacked else 1))
 
 
@@ -74,7 +78,7 @@ def scene_soup(plan: Plan, fraction: float) -> Soup:
         normals=np.repeat(normal, 3, axis=0),
         ids=np.concatenate(ids),
         textures=tuple(textures),
-        colours=np.array([[255.0 * c for c in body.link.colour] for body in plan.bodies]),
+        colours=np.array([[255.0 * c for c in body.link.colour] for body in plan.bodies], np.float32),
     )
 
 
@@ -123,7 +127,7 @@ def draw(soup: Soup, floor_z_m: float, camera: Intrinsics, camera_from_world: Ri
     on_floor = (marks.depth_m == 0) & (depth > 0)
     colour = albedo(soup, marks.attributes)
     colour[on_floor] = _FLOOR
-    normals = np.where(on_floor[..., None], np.array([0.0, 0.0, 1.0]), _facing(normals, points, camera_from_world))
+    normals = np.where(on_floor[..., None], _UP, _facing(normals, points, camera_from_world))
     sun = _sun_direction(camera_from_world)
     light = _light(normals, sun, _sunlit(soup, points, depth > 0, sun)) * _contact_shade(depth, large)
     lit = np.where((depth > 0)[..., None], colour * light[..., None], _BACKGROUND)
@@ -166,12 +170,15 @@ def _view_from(plan: Plan, seen_from: Vector3 | None) -> Vector3:
 
 def albedo(soup: Soup, marks: np.ndarray) -> np.ndarray:
     """Unlit colours (h, w, 3) of the pixels marked with uv and body id."""
-    ids = np.rint(marks[..., 2]).astype(np.int64)
+    ids = np.rint(marks[..., 2]).astype(np.int32)
     colour = np.concatenate([_BACKGROUND[None], soup.colours])[ids.clip(0, len(soup.colours))]
-    for number, texture in enumerate(soup.textures, start=1):
-        rows, columns = np.nonzero(ids == number)
-        if texture is not None and len(rows):
-            colour[rows, columns] = texture_colours(texture, marks[rows, columns, :2])
+    shown = np.flatnonzero(ids)
+    shown = shown[np.argsort(ids.ravel()[shown], kind="stable")]
+    ends = np.searchsorted(ids.ravel()[shown], np.arange(len(soup.textures) + 1), side="right")
+    for texture, start, end in zip(soup.textures, ends[:-1], ends[1:], strict=True):
+        if texture is not None and end > start:
+            pixels = shown[start:end]
+            colour.reshape(-1, 3)[pixels] = texture_colours(texture, marks.reshape(-1, 3)[pixels, :2])
     return colour
 
 
@@ -200,10 +207,10 @@ def _floor_behind(
 
 def _facing(normals: np.ndarray, points: np.ndarray, camera_from_world: Rigid3) -> np.ndarray:
     """Normals turned towards the eye (fitted meshes may be open) and of unit length."""
-    eye = camera_from_world.inverse.translation
-    away = np.einsum("hwi,hwi->hw", normals, eye - points) < 0
-    length = np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
-    return np.where(away[..., None], -normals, normals) / length
+    towards = camera_from_world.inverse.translation.astype(np.float32) - points
+    away = np.einsum("hwi,hwi->hw", normals, towards) < 0
+    length = np.maximum(np.sqrt(np.einsum("hwi,hwi->hw", normals, normals)), np.float32(1e-6))
+    return np.asarray(normals * (np.where(away, np.float32(-1), np.float32(1)) / length)[..., None])
 
 
 def _sun_direction(camera_from_world: Rigid3) -> Vector3:
@@ -240,7 +247,7 @@ def _sunlit(soup: Soup, points: np.ndarray, valid: np.ndarray, sun: Vector3) -> 
 
 
 def _light(normals: np.ndarray, sun: Vector3, sunlit: np.ndarray) -> np.ndarray:
-    diffuse = np.maximum(normals @ sun, 0.0) * sunlit
+    diffuse = np.maximum(normals @ sun.astype(np.float32), np.float32(0)) * sunlit
     sky = 0.5 + 0.5 * normals[..., 2]
     return np.asarray(0.52 + 0.14 * sky + 0.46 * diffuse)
 
@@ -260,9 +267,12 @@ def _contact_shade(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
 def _floor_fade(points: np.ndarray, soup: Soup, on_floor: np.ndarray) -> np.ndarray:
     """How far the floor has faded into the background, 0..1, with the distance from the scene."""
     low, high = soup.corners.min(axis=0)[:2], soup.corners.max(axis=0)[:2]
-    outside = np.maximum(np.maximum(low - points[..., :2], points[..., :2] - high), 0.0)
+    floor = points[on_floor][:, :2]
+    outside = np.linalg.norm(np.maximum(np.maximum(low - floor, floor - high), 0.0), axis=1)
     reach = max(float(np.linalg.norm(high - low)) * 0.5, 0.5)
-    return np.where(on_floor, (np.linalg.norm(outside, axis=-1) / reach).clip(0, 1), 0.0)
+    fade = np.zeros(on_floor.shape, np.float32)
+    fade[on_floor] = (outside / reach).clip(0, 1)
+    return fade
 
 
 def _captioned(image: Image, caption: str) -> Image:
