@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +19,13 @@ from r2c2r_core.export.readback import Readback, differences, expected_readback,
 from r2c2r_core.export.reading import Urdf
 from r2c2r_core.model.report import LoaderResult
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.threads import in_threads
 
 EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "SAPIEN", "USD")
 SAPIEN_VARIABLE = "R2C2R_SAPIEN_PYTHON"
 
 _PROBES = Path(__file__).parent / "probes"
 _SECONDS = 180
-_AT_ONCE = 2  # most of them import and parse, two wait for a process of theirs
 
 
 class _NotThereError(Exception):
@@ -52,8 +51,7 @@ def try_loaders(
     def verdict(loader: tuple[str, Callable[[], dict[str, Any]]]) -> LoaderResult:
         return _verdict(*loader, expected)
 
-    with ThreadPoolExecutor(_AT_ONCE) as threads:
-        return tuple(progress.each(threads.map(verdict, attempts), "loaders", count=len(attempts)))
+    return tuple(progress.each(in_threads(verdict, attempts), "loaders", count=len(attempts)))
 
 
 def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readback) -> LoaderResult:

@@ -1,6 +1,5 @@
 """preview.png: the scene closed and open, drawn on the CPU with a sun, its shadow and a floor."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -13,6 +12,7 @@ from r2c2r_core.geometry.camera import Intrinsics, pixel_centres
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.texels import texture_colours
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+from r2c2r_core.threads import in_threads
 
 OPEN_FRACTION = 0.75
 """How far joints stand open in the picture: doors at full travel hide behind their own edge."""
@@ -49,11 +49,10 @@ def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> 
     size = (width_px * 3 // 4, round(width_px * 0.32)) if stacked else (width_px // 2, round(width_px * 0.4))
     camera, camera_from_world = framing(points, direction, size)
 
-    def picture(soup: Soup, caption: str) -> Image:
-        return _captioned(draw(soup, plan.floor_z_m, camera, camera_from_world), caption)
+    def picture(of: tuple[Soup, str]) -> Image:
+        return _captioned(draw(of[0], plan.floor_z_m, camera, camera_from_world), of[1])
 
-    with ThreadPoolExecutor(2) as threads:
-        pictures = list(threads.map(picture, (closed, opened), ("closed", "open")))
+    pictures = list(in_threads(picture, ((closed, "closed"), (opened, "open"))))
     return png_bytes(np.concatenate(pictures, axis=0 if stacked else 1))
 
 

@@ -146,12 +146,14 @@ def _gather(
 def _photo(view: View, vertices_world: Points, faces: Faces, world_from_local: Rigid3) -> _Photo:
     surface = render_depth(vertices_world, faces, view)
     camera_from_local = view.world_from_camera.inverse @ world_from_local
-    return _Photo(view, camera_from_local, _well_inside(view), surface, sensor_depth(view, surface.shape))
+    return _Photo(
+        view, camera_from_local, _well_inside(view, tuned(Params).edge_share), surface, sensor_depth(view, surface.shape)
+    )
 
 
 @lru_cache(maxsize=VIEWS_KEPT)
-def _well_inside(view: View) -> Mask:
-    return moved_edge(view.mask, -max(1.0, tuned(Params).edge_share * np.sqrt(view.mask.sum())))
+def _well_inside(view: View, edge_share: float) -> Mask:
+    return moved_edge(view.mask, -max(1.0, edge_share * np.sqrt(view.mask.sum())))
 
 
 def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray) -> None:

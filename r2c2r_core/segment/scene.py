@@ -16,7 +16,8 @@ from r2c2r_core.geometry.camera import pixel_rays
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, in_threads, parts_of
+from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, parts_of
+from r2c2r_core.threads import in_threads
 
 T = TypeVar("T", Image, DepthMetres)
 

@@ -1,11 +1,6 @@
 """Spatial index of the fused surface: triangles near a point, and the depth image that each frame would have of it."""
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
 from dataclasses import dataclass
-from os import cpu_count
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,9 +9,6 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame, SceneSurface
 from r2c2r_core.tuning import param, tuned
-
-A = TypeVar("A")
-B = TypeVar("B")
 
 _PART_M = 0.5
 _NONE = np.zeros(0, np.int64)
@@ -126,19 +118,6 @@ def drawn_size(camera: Intrinsics) -> tuple[int, int]:
     """Width and height of the drawn surface."""
     params = tuned(Params)
     return params.width_px, max(1, round(params.width_px * camera.height / camera.width))
-
-
-def in_threads(work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
-    """The results in order, computed on all cores; what is not begun is dropped when the caller stops asking.
-
-    Tuned numbers hold in the threads as they do here.
-    """
-    context = copy_context()
-    pool = ThreadPoolExecutor(min(4, cpu_count() or 1))
-    try:
-        yield from pool.map(lambda item: context.copy().run(work, item), items)
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _may_be_seen(parts: SurfaceParts, frame: Frame) -> np.ndarray:

@@ -15,7 +15,7 @@ from r2c2r_core.kitchen.walls import Params
 from r2c2r_core.ledger import Kept, Ledger, Shared
 from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.segment.surface import in_threads
+from r2c2r_core.threads import in_threads
 from r2c2r_core.tuning import UNITS, Changes, changed, modules_with_numbers, params_of, tuned, tuning
 from r2c2r_core.workspace import Workspace
 

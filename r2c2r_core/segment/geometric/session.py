@@ -30,8 +30,8 @@ from r2c2r_core.segment.protocol import Glimpse, SegmentConfig, Segmenter
 from r2c2r_core.segment.runs.prepared import Hits
 from r2c2r_core.segment.runs.run import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
-from r2c2r_core.segment.surface import in_threads
 from r2c2r_core.sources import source_key
+from r2c2r_core.threads import in_threads
 from r2c2r_core.tuning import in_force
 
 
