@@ -51,7 +51,7 @@ def read_mesh(path: Path) -> ObjMesh | None:
     """An OBJ or STL file; None when it holds no triangle or cannot be read."""
     try:
         return _read_obj(path) if path.suffix.lower() == ".obj" else _read_stl(path)
-    except (ValueError, IndexError, OSError, KeyError, TypeError):
+    except (ValueError, OverflowError, IndexError, OSError, KeyError, TypeError):  # a face may name vertex 10^30
         return None
 
 

@@ -231,6 +231,7 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
     ),
     ("mesh-unreadable", "empty", write(DOOR_MESH, ""), set()),
     ("mesh-unreadable", "index out of range", write(DOOR_MESH, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"), set()),
+    ("mesh-unreadable", "index beyond 64 bits", write(DOOR_MESH, f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {10**30}\n"), set()),
     ("mesh-size", "too long", write(BOTTLE_HULL, obj_of_boxes(0.0).replace("0.1", "100")), set()),
     ("texture-missing", "no picture", lambda f: (f / DOOR_MESH).with_suffix(".png").unlink(), set()),
     ("texture-missing", "no material", lambda f: (f / DOOR_MESH).with_suffix(".mtl").unlink(), set()),
