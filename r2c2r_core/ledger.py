@@ -11,9 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args
 
-import cv2
-
-from r2c2r_core.errors import EnvironmentProblem, PromptError, R2C2RError, StageError
+from r2c2r_core.errors import EnvironmentProblem, R2C2RError
+from r2c2r_core.failing import OBJECT_FAILS, failure_line
 from r2c2r_core.pool import Failed, Pool, Task
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.sources import source_key
@@ -26,10 +25,6 @@ Stage = Literal["ingest", "segment", "generate", "align", "synthesize", "warp", 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
 _STANDS_ON = {"generate": ("align",)}  # the placing of candidates is given to it
-_OBJECT_FAILS = (StageError, PromptError, ValueError, ArithmeticError, LookupError, RuntimeError, cv2.error)
-"""What one object's measurements may end in (LinAlgError is a ValueError, Qhull's a RuntimeError); anything else is wrong for
-all: a programming error, a full disk, a missing backend, a person who cancelled."""
-
 _log = logging.getLogger(__name__)
 
 
@@ -145,7 +140,7 @@ class Ledger:
         for name, item in items.items():
             try:
                 results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
-            except _OBJECT_FAILS as error:
+            except OBJECT_FAILS as error:
                 self._failed(stage, name, error)
         return results
 
@@ -156,7 +151,7 @@ class Ledger:
             part.at(0.0, name)
             try:
                 results[name] = self._once(job, part)
-            except _OBJECT_FAILS as error:
+            except OBJECT_FAILS as error:
                 self._failed(job.stage, name, error)
         _opened.cache_clear()
         return results
@@ -176,7 +171,7 @@ class Ledger:
                 kept = self._found(jobs[name])
                 assert kept is not None, "it was stored a moment ago"
                 results[name] = kept
-            elif isinstance(answer.error, _OBJECT_FAILS):
+            elif isinstance(answer.error, OBJECT_FAILS):
                 self._failed(jobs[name].stage, name, answer.error, answer.where)
             else:
                 _log.error("%s: %s", name, answer.where)
@@ -199,13 +194,11 @@ class Ledger:
 
     def _failed(self, stage: str, name: str, error: Exception, where: str = "") -> None:
         """One line for a person; the traceback of what nobody foresaw goes to the log."""
+        self.failures[name] = failure_line(stage, name, error)
         if isinstance(error, R2C2RError):
             _log.warning("%s: %s: %s", stage, name, error)
-            self.failures[name] = f"{stage}: {error}"
-            return
-        _log.warning("%s: %s: %s%s", stage, name, error, where and f"\n{where}", exc_info=None if where else error)
-        said = (str(error).strip() or "no message").splitlines()[0]
-        self.failures[name] = f"{stage}: {name}: {type(error).__name__}: {said}; see the log, or leave it out"
+        else:
+            _log.warning("%s: %s: %s%s", stage, name, error, where and f"\n{where}", exc_info=None if where else error)
 
     def _begin(self, stage: Stage) -> Progress:
         if STAGES.index(stage) > STAGES.index(self.until):

@@ -107,3 +107,4 @@ class ArticulatedScene:
     objects: tuple[SceneObject, ...]
     layout_moves_m: dict[str, float]  # how far the layout moved each object
     warnings: tuple[str, ...]
+    failures: dict[str, str] = field(default_factory=dict)  # objects left out, with one line each

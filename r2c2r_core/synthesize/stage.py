@@ -1,11 +1,14 @@
 """Placements to an articulated scene of primitives (paper sections 4.4-4.5)."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import R2C2RError, StageError
+from r2c2r_core.failing import OBJECT_FAILS, failure_line
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.capture import Capture
@@ -30,6 +33,8 @@ from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 from r2c2r_core.tuning import Changes, param, tuned
+
+_log = logging.getLogger(__name__)
 
 _WOOD = (0.80, 0.76, 0.70)
 
@@ -62,23 +67,31 @@ def build_scene(
     *,
     progress: Progress = SILENT,
 ) -> ArticulatedScene:
-    """Measure every object, arrange them, and build each as a fixture that opens."""
+    """Measure every object, arrange them, and build each as a fixture that opens.
+
+    One that cannot be measured is left out, and why is said; raises StageError where none can.
+    """
     carcass = CARCASSES.load(config.fixtures)
-    measured = []
+    measured: list[MeasuredObject] = []
+    meshes: list[tuple[Placement, MeshAsset]] = []
+    failures: dict[str, str] = {}
     for track, placement, asset in progress.part(0.0, 0.5).each(
         list(zip(tracks, placements, assets, strict=True)), "measuring"
     ):
-        spec, notice = named(track.category)
-        item = measure_object(
-            capture, track, placement, asset, spec, overrides.of(track.name), seed=config.seed, box_search=config.box
-        )
-        measured.append(replace(item, warnings=(*([notice] if notice else []), *asset.warnings, *item.warnings)))
+        try:
+            measured.append(_measured(capture, track, placement, asset, overrides.of(track.name), config))
+            meshes.append((placement, asset))
+        except OBJECT_FAILS as error:
+            _log.warning("synthesize: %s: %s", track.name, error, exc_info=not isinstance(error, R2C2RError))
+            failures[track.name] = failure_line("synthesize", track.name, error)
+    if not measured:
+        raise StageError("no object could be measured", hint="; ".join(failures.values()))
     progress.at(0.5, "arranging")
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     hinges = choose_hinges(layout.objects, overrides)
     built = []
-    shapes = list(zip(layout.objects, placements, assets, strict=True))
-    for item, placement, asset in progress.part(0.5, 0.9).each(shapes, "building"):
+    shapes = list(zip(layout.objects, meshes, strict=True))
+    for item, (placement, asset) in progress.part(0.5, 0.9).each(shapes, "building"):
         if item.spec.fixture is None:
             built.append(_thing(item, placement, asset, config.seed))
         else:
@@ -98,7 +111,22 @@ def build_scene(
         objects=tuple(opened),
         layout_moves_m=layout.moves_m,
         warnings=layout.warnings,
+        failures=failures,
     )
+
+
+def _measured(
+    capture: Capture,
+    track: MaskTrack,
+    placement: Placement,
+    asset: MeshAsset,
+    override: ObjectOverride,
+    config: SynthesizeConfig,
+) -> MeasuredObject:
+    """Its size and pose, and what a person should know of it so far."""
+    spec, notice = named(track.category)
+    item = measure_object(capture, track, placement, asset, spec, override, seed=config.seed, box_search=config.box)
+    return replace(item, warnings=(*([notice] if notice else []), *asset.warnings, *item.warnings))
 
 
 def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride, carcass: CarcassBuilder) -> SceneObject:

@@ -1,13 +1,16 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from r2c2r_core.errors import StageError
 from r2c2r_core.kitchen.categories import CATEGORIES
-from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
-from r2c2r_core.model.track import Swing
+from r2c2r_core.model.track import MaskTrack, Swing
+from r2c2r_core.synthesize import stage
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
@@ -41,6 +44,24 @@ def kitchen() -> ArticulatedScene:
 
 def the(scene: ArticulatedScene, name: str) -> SceneObject:
     return next(o for o in scene.objects if o.name == name)
+
+
+def test_an_object_whose_measuring_fails_is_left_out_and_the_others_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    measure = stage.measure_object
+
+    def measured(capture: Capture, track: MaskTrack, *further: Any, **settings: Any) -> Any:
+        if track.name in ("cab_r", "bottle"):
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return measure(capture, track, *further, **settings)
+
+    monkeypatch.setattr(stage, "measure_object", measured)
+    units = [unit for unit in KITCHEN if unit.name in ("cab_l", "cab_r", "bottle", "micro")]
+    scene = built(*units)
+    assert {item.name for item in scene.objects} - {"plinth_1"} == {"cab_l", "micro"}  # nobody clicked the plinth
+    assert set(scene.failures) == {"cab_r", "bottle"}
+    assert scene.failures["cab_r"].startswith("synthesize: cab_r: LinAlgError: SVD did not converge")
+    with pytest.raises(StageError, match="no object could be measured"):
+        built(*[unit for unit in units if unit.name == "bottle"])
 
 
 def test_nothing_touches_at_rest(kitchen: ArticulatedScene) -> None:
