@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import DepthMetres, Image, Mask, Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, sample_through
+from r2c2r_core.geometry.light import balanced
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.views import MaskView, choose_views, is_cropped, stands_open, view_scores
@@ -31,7 +32,7 @@ class View:
     """One frame, cropped to the object with a margin; colour, mask and depth keep their own resolutions."""
 
     frame_index: int
-    rgb: Image
+    rgb: Image  # at the recording's common exposure
     mask: Mask
     rgb_camera: Intrinsics
     depth_m: DepthMetres
@@ -144,7 +145,7 @@ def _load_view(capture: Capture, packed: PackedMask, frame: Frame, sharpness: fl
     depth_window, depth_camera = _window(frame.depth_camera, scale * box + offset, scale * end + offset)
     return View(
         frame_index=frame.index,
-        rgb=np.ascontiguousarray(rgb[rgb_window]),
+        rgb=np.ascontiguousarray(balanced(rgb[rgb_window], frame.gain)),
         mask=np.ascontiguousarray(unpack_mask(packed)[rgb_window]),
         rgb_camera=rgb_camera,
         depth_m=np.where(depth.valid, depth.metres, 0.0).astype(np.float32)[depth_window],

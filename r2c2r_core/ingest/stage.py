@@ -13,6 +13,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.depth import usable_depth
+from r2c2r_core.ingest.exposure import balance_exposure
 from r2c2r_core.ingest.flying import drop_flying
 from r2c2r_core.ingest.gravity import level_room
 from r2c2r_core.ingest.noise import estimate_depth_noise
@@ -104,7 +105,10 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         progress=progress.part(0.8, 0.97),
     )
     noise = estimate_depth_noise(settled.frames, images, surface.vertices, surface.faces)
-    progress.at(0.97, "hashing")
+    rng = np.random.default_rng(config.seed)
+    of_light = progress.part(0.97, 0.99)
+    balance = balance_exposure(settled.frames, images, surface.vertices, surface.faces, noise, rng, of_light)
+    progress.at(0.99, "hashing")
     sha256 = recording.files.sha256(recording.names)
     own_world = settled.evidence.source != "odometry"  # an estimated one is the first camera's
     progress.at(1.0, f"{len(frames)} frames")
@@ -112,7 +116,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         name=source.stem if source.is_file() else source.name,
         sha256=sha256,
         format=recording.format,
-        frames=settled.frames,
+        frames=balance.frames,
         surface=SceneSurface(vertices_world=surface.vertices, faces=surface.faces, colours=surface.colours, voxel_m=voxel_m),
         images=images,
         up_capture=recording.up_capture if own_world else None,

@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.light import NO_GAIN, Gain
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import DepthNoise
 
@@ -38,6 +39,7 @@ class Frame:
     depth_camera: Intrinsics
     world_from_camera: Rigid3  # colour and depth share it (readers register them)
     sharpness: float  # variance of the Laplacian at 320 px width; only its order means something
+    gain: Gain = NO_GAIN  # brings the picture, which is stored as filmed, to the recording's common exposure and white
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

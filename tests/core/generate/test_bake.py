@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,13 @@ def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
     assert depth[200 + 1, 200] > 0
     assert back.argmax() == 2  # the back is blue, the seat red
     assert seat_edge.argmax() == 0
+
+
+def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):
+    capture, track = front_scene
+    plain = {view.frame_index: view.rgb for view in gather_evidence(capture, track, 4).pool}
+    darker = replace(capture, frames=tuple(replace(f, gain=(0.5, 0.6, 0.7)) for f in capture.frames))
+    for view in gather_evidence(darker, track, 4).pool:
+        expected = plain[view.frame_index] * np.array((0.5, 0.6, 0.7))
+        filmed = plain[view.frame_index].max(axis=-1) < 200  # towards white the gain fades out
+        assert np.abs(view.rgb - expected)[filmed].max() <= 0.51

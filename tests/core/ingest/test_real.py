@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.ingest.cloud import fuse_frames
 from r2c2r_core.ingest.doctor import examine
+from r2c2r_core.ingest.exposure import see, spread
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
@@ -63,6 +64,15 @@ def test_the_kitchen_is_good_and_its_back_wall_is_found(kitchen):
     assert report.verdict == "good", report.reasons
     assert report.figures.pair_error_mm < 20
     assert any(w.normal[1] < -0.95 for w in kitchen.room.walls)
+
+
+def test_the_kitchens_pictures_agree_better_on_its_colours_than_as_filmed(kitchen):
+    """Automatic exposure: the same red door is filmed as red, dark red and purple."""
+    points = kitchen.surface.vertices_world[::40]
+    looks = see(kitchen.frames, kitchen.images, points, kitchen.depth_noise)
+    filmed = spread(looks, np.zeros((len(kitchen.frames), 3)))
+    assert filmed > 0.1
+    assert spread(looks, np.log([f.gain for f in kitchen.frames])) < 0.7 * filmed
 
 
 def test_the_cabinet_has_its_measured_size_and_yaw(real, tmp_path):

@@ -1,0 +1,150 @@
+"""How each picture's exposure and white balance differ from the others', by the surface that several of them show.
+
+A phone adapts both while it films, so that doors of one colour come out in several. The logarithm of a stored value is taken
+for the surface's less the frame's gain; both are solved for at once, by least squares that let outliers go (highlights, what
+moved, poses a pixel off). Stored values are gamma-encoded, under which a gain of light stays a gain of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.geometry.camera import project, sample_nearest
+from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.ingest.planes import sample_surface
+from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How gains are estimated."""
+
+    frames: int = param(120, "count", "spread over the recording; those between them are interpolated", ge=2)
+    points: int = param(4000, "count", "of the surface, spread by area", ge=10)
+    width_px: int = param(160, "px", "of the pictures that are compared: poses are off by a pixel or two at full size", ge=16)
+    darkest: int = param(20, "grey", "below, noise and black offset hide the gain")
+    brightest: int = param(235, "grey", "above, a channel is clipped")
+    hidden_m: float = param(0.03, "m", "beyond the depth's noise, before or behind the surface: something else is seen")
+    outlier: float = param(0.12, "log", "residual at which a look counts half", source="a highlight is 0.3 and more")
+    held: float = param(
+        0.5, "log", "one sigma of gains that nothing else tells", source="a stop of light is 0.32 of stored value"
+    )
+    most: float = param(0.7, "log", "largest gain that is believed: two stops")
+    least_looks: int = param(200, "count", "of a frame, fewer tell nothing about it")
+    least_gain: float = param(0.1, "share", "of the spread that must go before pictures are touched")
+    rounds: int = param(8, "count", "of reweighting", ge=1)
+
+
+class Balance(NamedTuple):
+    """The frames with their gains, and what they do to the surface's colour."""
+
+    frames: tuple[Frame, ...]
+    spread_before: float  # median over the surface of one sigma of log colour across frames
+    spread_after: float
+
+
+class Looks(NamedTuple):
+    """What frames show of points: one row a look."""
+
+    point: np.ndarray  # (n,)
+    frame: np.ndarray  # (n,) position
+    log_rgb: np.ndarray  # (n, 3)
+
+
+def balance_exposure(
+    frames: Sequence[Frame],
+    images: FrameImages,
+    vertices: Points,
+    faces: Faces,
+    noise: DepthNoise,
+    rng: np.random.Generator,
+    progress: Progress = SILENT,
+) -> Balance:
+    """Gains that bring the frames to one exposure and white; none where they would hardly change the surface's colours."""
+    params = tuned(Params)
+    chosen = frames[:: max(1, len(frames) // params.frames)]
+    points = sample_surface(vertices, faces, params.points, rng).points
+    looks = see(chosen, images, points, noise, progress)
+    log_gains = solve_gains(looks, len(chosen))
+    before, after = spread(looks, np.zeros_like(log_gains)), spread(looks, log_gains)
+    if not after < (1.0 - params.least_gain) * before:
+        return Balance(tuple(frames), before, before)
+    numbers = np.array([f.index for f in chosen], dtype=np.float64)
+    gains = [np.exp([np.interp(f.index, numbers, channel) for channel in log_gains.T]) for f in frames]
+    balanced = (replace(f, gain=(float(g[0]), float(g[1]), float(g[2]))) for f, g in zip(frames, gains, strict=True))
+    return Balance(tuple(balanced), before, after)
+
+
+def see(frames: Sequence[Frame], images: FrameImages, points: Points, noise: DepthNoise, progress: Progress = SILENT) -> Looks:
+    """The colours that frames show of points their depth confirms, neither clipped nor black."""
+    params = tuned(Params)
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for position, frame in enumerate(frames):
+        progress.at(position / len(frames), f"comparing exposures {position + 1}/{len(frames)}")
+        local = frame.world_from_camera.inverse.apply(points)
+        front = np.flatnonzero(local[:, 2] > 0.1)
+        measured, inside = sample_nearest(images.depth(frame.index).metres, project(local[front], frame.depth_camera))
+        z = local[front, 2]
+        other = noise.occluded(measured, z, params.hidden_m) | noise.seen_through(measured, z, params.hidden_m)
+        seen = front[inside & (measured > 0) & ~other]
+        camera = frame.rgb_camera
+        small = camera.resized(params.width_px, max(1, round(camera.height * params.width_px / camera.width)))
+        picture = cv2.resize(images.rgb(frame.index), (small.width, small.height), interpolation=cv2.INTER_AREA)
+        colour, inside = sample_nearest(picture, project(local[seen], small))
+        usable = inside & (colour.min(axis=1) > params.darkest) & (colour.max(axis=1) < params.brightest)
+        parts.append((seen[usable], np.full(int(usable.sum()), position), np.log(colour[usable].astype(np.float64))))
+    point, at, log_rgb = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Looks(point, at, log_rgb.reshape(-1, 3))
+
+
+def solve_gains(looks: Looks, frames: int) -> np.ndarray:
+    """Log gains (frames, 3) under which the looks at each point agree best; 0 for frames that show too little."""
+    params = tuned(Params)
+    shows = np.bincount(looks.frame, minlength=frames) >= params.least_looks
+    gains = np.zeros((frames, 3))
+    if not shows.any():
+        return gains
+    weight = np.where(shows[looks.frame], 1.0, 0.0)
+    for _ in range(params.rounds):
+        for channel in range(3):
+            gains[:, channel] = _solved(looks, looks.log_rgb[:, channel], weight, frames, params.held)
+        residual = np.linalg.norm(looks.log_rgb + gains[looks.frame] - _surface(looks, gains, weight)[looks.point], axis=1)
+        weight = np.where(shows[looks.frame], 1.0 / (1.0 + (residual / params.outlier) ** 2), 0.0)
+    gains -= np.median(gains[shows], axis=0)
+    return np.clip(np.where(shows[:, None], gains, 0.0), -params.most, params.most)
+
+
+def spread(looks: Looks, gains: np.ndarray) -> float:
+    """Median over points seen five times of one robust sigma of log colour across the frames that show it."""
+    value = looks.log_rgb + gains[looks.frame]
+    order = np.argsort(looks.point, kind="stable")
+    ends = np.flatnonzero(np.diff(looks.point[order])) + 1
+    groups = [value[rows] for rows in np.split(order, ends) if len(rows) >= 5]
+    sigmas = [1.4826 * np.median(np.abs(g - np.median(g, axis=0)), axis=0).mean() for g in groups]
+    return float(np.median(sigmas)) if sigmas else 0.0
+
+
+def _solved(looks: Looks, value: np.ndarray, weight: np.ndarray, frames: int, held: float) -> np.ndarray:
+    """Gains of one channel: the normal equations with the points' own values eliminated."""
+    points = int(looks.point.max()) + 1
+    table = np.zeros((points, frames))
+    np.add.at(table, (looks.point, looks.frame), weight)
+    total = np.maximum(table.sum(axis=1), 1e-12)
+    matrix = np.diag(table.sum(axis=0) + 1.0 / held**2) - table.T @ (table / total[:, None])
+    mean = np.bincount(looks.point, weight * value, points) / total
+    pull = np.bincount(looks.frame, weight * (mean[looks.point] - value), frames)
+    return np.asarray(np.linalg.solve(matrix, pull))
+
+
+def _surface(looks: Looks, gains: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Each point's log colour (points, 3): the weighted mean of its looks."""
+    points = int(looks.point.max()) + 1
+    total = np.maximum(np.bincount(looks.point, weight, points), 1e-12)
+    value = looks.log_rgb + gains[looks.frame]
+    return np.stack([np.bincount(looks.point, weight * value[:, c], points) / total for c in range(3)], axis=1)
