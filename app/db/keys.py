@@ -73,6 +73,7 @@ def note_segmenter(session: Session, project: Project) -> None:
 
 
 def _chosen(project: Project) -> dict[str, str]:
-    """Backends that are not the default, by seam: a new seam leaves the keys of older results as they are."""
+    """What is not the default, backends by seam and how depth is read: something new leaves the keys of older results."""
     usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default}
-    return {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}
+    chosen = {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}
+    return {**chosen, "depth": "registered"} if project.register_depth else chosen

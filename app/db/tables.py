@@ -33,6 +33,7 @@ class Project(SQLModel, table=True):
     segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
     generator: str = Field(default=GENERATORS.default, sa_column_kwargs={"server_default": GENERATORS.default})
     matcher: str = Field(default=MATCHERS.default, sa_column_kwargs={"server_default": MATCHERS.default})
+    register_depth: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # moved onto colour when read
     owner_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # who made it
     members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # only they and admins see it
     review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py

@@ -64,6 +64,8 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
         return found
     tools = {key: payload[key] for key in ("segmenter", "generator", "matcher") if payload.get(key)}
     request: dict[str, Any] = {"source": project.source_path, "prompts": "prompts.json", "overrides": "overrides.json"}
+    if project.register_depth:
+        request["config"] = {"ingest": {"register_depth": True}}
     request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": project.inputs}
     write_json(path.with_name("prompts.json"), prompts_document(session, project.id))
     write_json(path.with_name("overrides.json"), overrides_document(session, project.id))

@@ -6,7 +6,7 @@ from app import schemas
 from app.deps import AdminCtx, Ctx
 from app.routes.numbers import STREAMED, Count, OptionalId
 from app.schemas.text import FileName, Title
-from app.services import imports, projects, uploads
+from app.services import imports, projects, rereading, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
@@ -47,6 +47,12 @@ def get_project(context: Ctx, project: str) -> schemas.Project:
 def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> schemas.Project:
     """A new name, or another segmenter (refused while its libraries or weights are missing)."""
     return projects.change(context, project, body)
+
+
+@router.put("/{project}/reading", operation_id="readAgain", status_code=202)
+def read_again(context: Ctx, project: str, body: schemas.ReadingIn) -> schemas.Project:
+    """Read the recording again with its depth moved onto the colour images, or as it was recorded."""
+    return rereading.read_again(context, project, body)
 
 
 @router.delete("/{project}", operation_id="deleteProject")

@@ -40,6 +40,7 @@ from app.schemas.projects import (
     ProjectMembers,
     ProjectPatch,
     ProjectSummary,
+    ReadingIn,
     SampleRequest,
 )
 from app.schemas.proposals import Proposal, ProposalIds, Proposals
@@ -118,6 +119,7 @@ __all__ = [
     "Proposal",
     "ProposalIds",
     "Proposals",
+    "ReadingIn",
     "ReviewMove",
     "ReviewStatus",
     "ReviewStep",

@@ -51,6 +51,7 @@ class Project(ProjectSummary):
 
     capture: CaptureFacts | None
     notices: list[str]
+    register_depth: bool  # whether depth is moved onto the colour images when the recording is read
 
 
 class ProjectPatch(Shape):
@@ -60,6 +61,12 @@ class ProjectPatch(Shape):
     segmenter: Word | None = None
     generator: Word | None = None
     matcher: Word | None = None
+
+
+class ReadingIn(Shape):
+    """How the recording is to be read."""
+
+    register_depth: bool
 
 
 class ProjectMembers(Shape):

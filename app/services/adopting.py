@@ -29,7 +29,15 @@ from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.segment.prompts import parse_prompts
 
 _log = logging.getLogger(__name__)
-CHOSEN = {"name", "segmenter", "generator", "matcher", "members_only", "review_state"}  # what people chose about a project
+CHOSEN = {
+    "name",
+    "segmenter",
+    "generator",
+    "matcher",
+    "register_depth",
+    "members_only",
+    "review_state",
+}  # what people chose about a project
 _ID = re.compile(r"[0-9a-f]{12}")
 
 

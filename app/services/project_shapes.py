@@ -35,7 +35,9 @@ def whole(session: Session, row: Project) -> schemas.Project:
     """One project with what the doctor said of its recording, as far as this version still says it."""
     known = schemas.CaptureFacts.model_fields
     facts = schemas.CaptureFacts(**{name: row.capture[name] for name in known if name in row.capture}) if row.capture else None
-    return schemas.Project(**_summary(row, _about(session, row.id)), capture=facts, notices=row.notices)
+    return schemas.Project(
+        **_summary(row, _about(session, row.id)), capture=facts, notices=row.notices, register_depth=row.register_depth
+    )
 
 
 def _about(session: Session, project_id: str | None) -> _About:

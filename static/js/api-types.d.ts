@@ -559,6 +559,7 @@ export interface Project {
   review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
   capture: CaptureFacts | null;
   notices: string[];
+  register_depth: boolean;
 }
 
 /** What is in a project. */
@@ -656,6 +657,11 @@ export interface Proposals {
   fraction: number;
   items: Proposal[];
   dismissed: number;
+}
+
+/** How the recording is to be read. */
+export interface ReadingIn {
+  register_depth: boolean;
 }
 
 /** One legal step from here; with something unmet it needs a written reason, which the history keeps. */
@@ -1040,6 +1046,8 @@ export interface Operations {
   dismissProposals: { parameters: { project: string }; body: ProposalIds; answer: Proposals };
   /** POST /api/projects/{project}/proposals/restore */
   restoreProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
+  /** PUT /api/projects/{project}/reading */
+  readAgain: { parameters: { project: string }; body: ReadingIn; answer: Project };
   /** POST /api/projects/{project}/redo */
   redo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
   /** GET /api/projects/{project}/review */

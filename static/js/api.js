@@ -5,7 +5,7 @@
  *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
  *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
- *   UnknownFolder, ProjectMembers, MembersIn
+ *   UnknownFolder, ProjectMembers, MembersIn, ReadingIn
  * } from "./api-types" */
 
 import { patiently } from "./lib/patience.js";
@@ -152,6 +152,8 @@ export const importPath = (path) => send("POST", "/api/projects/import", { path 
 export const makeSample = (request) => send("POST", "/api/projects/sample", request);
 /** @param {string} id @param {{ name?: string, segmenter?: string }} patch @returns {Promise<Project>} */
 export const changeProject = (id, patch) => send("PATCH", of(id), patch);
+/** @param {string} id @param {ReadingIn} how @returns {Promise<Project>} */
+export const readAgain = (id, how) => send("PUT", `${of(id)}/reading`, how);
 /** @param {string} id @returns {Promise<Deleted>} */
 export const deleteProject = (id) => send("DELETE", of(id));
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<ProjectMembers>} */

@@ -1,6 +1,6 @@
 /** What the recording is, before any work starts; and where the project stands. */
 
-import { changeProject, getHistory, getProject, getSystem } from "../api.js";
+import { changeProject, getHistory, getProject, getSystem, readAgain } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
 import { BackendChoice } from "../elements/backend-choice.js";
@@ -14,6 +14,7 @@ import { live } from "../live.js";
 /** @typedef {import("../api-types").Project} Project */
 
 const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher"]);
+const BESIDE = new Set(["unregistered", "colour_focal_length"]); // causes that the doctor's fit mends
 
 export class OverviewPage extends LiveElement {
   project = "";
@@ -92,7 +93,13 @@ export class OverviewPage extends LiveElement {
    * @param {NonNullable<Project["capture"]>} capture
    */
   #drawScan(project, capture) {
-    const read = JSON.stringify([capture, project.notices, project.size_bytes, project.media_version]);
+    const read = JSON.stringify([
+      capture,
+      project.notices,
+      project.register_depth,
+      project.size_bytes,
+      project.media_version,
+    ]);
     if (read === this.#read) return;
     this.#read = read;
     this.#scan.replaceChildren(this.#facts(project, capture), scanCard(project));
@@ -119,11 +126,46 @@ export class OverviewPage extends LiveElement {
       { class: "card stack" },
       h("h2", {}, "The recording"),
       verdictCard(capture),
+      this.#registering(project, capture),
       h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
       list(project.notices),
       momentStrips(capture),
       allFigures(capture),
     );
+  }
+
+  /**
+   * Depth that does not lie on its colour is moved there only if a person says so; and back.
+   * @param {Project} project
+   * @param {NonNullable<Project["capture"]>} capture
+   */
+  #registering(project, capture) {
+    const beside = capture.remarks.some((remark) => BESIDE.has(remark.cause));
+    if (!beside && !project.register_depth) return null;
+    const said = project.register_depth
+      ? "Depth was moved onto the colour images when the recording was read."
+      : "Depth can be moved onto the colour images by the fit above: the recording is read again, clicks stay.";
+    const button = h(
+      "button",
+      { type: "button" },
+      project.register_depth ? "Read depth as recorded" : "Register depth",
+    );
+    button.addEventListener("click", () => this.#readAgain(button, !project.register_depth), { signal: this.signal });
+    return h("div", { class: "row", role: "note" }, h("span", {}, said), button);
+  }
+
+  /**
+   * @param {HTMLButtonElement} button
+   * @param {boolean} registered
+   */
+  async #readAgain(button, registered) {
+    button.disabled = true;
+    try {
+      this.#draw(await readAgain(this.project, { register_depth: registered }));
+    } catch (error) {
+      sayError(error);
+      button.disabled = false;
+    }
   }
 
   async #drawHistory() {

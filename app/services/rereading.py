@@ -1,0 +1,41 @@
+"""A recording read again, in another way: with its depth moved onto the colour images, or as it was recorded."""
+
+import time
+
+from sqlmodel import col, select
+
+from app import schemas
+from app.db import history as events
+from app.db import keys, queries
+from app.db.engine import writing
+from app.db.tables import Event, Job
+from app.errors import Conflict, NotFound
+from app.services import imports, projects
+from app.services.context import Context
+
+
+def read_again(context: Context, project_id: str, body: schemas.ReadingIn) -> schemas.Project:
+    """Read the recording so; clicks stay, masks and results made from the other reading are stale."""
+    with writing(context.engine) as session:
+        row = queries.project_row(session, project_id)
+        if row.register_depth == body.register_depth:
+            return projects.get_project(context, project_id)
+        events.require_open(row)
+        if row.source_path is None:
+            raise NotFound("the recording is not kept here", hint="import it again")
+        busy = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(queries.ACTIVE))
+        if session.exec(busy).first() is not None:
+            raise Conflict("a job of this project is under way", hint="wait for it, or cancel it")
+        before, now = {"register_depth": row.register_depth}, time.time()
+        row.register_depth, row.status, row.updated = body.register_depth, "importing", now
+        said = "depth registered to the colour images" if body.register_depth else "depth read as it was recorded"
+        event = Event(project_id=row.id, scope="project", action="reading", text=said, who=context.who, at=now)
+        event.before, event.after = before, {"register_depth": body.register_depth}
+        session.add_all([row, event])
+        keys.note_project(session, row)
+        job = imports.queue_job(context, session, row, "import", {}).id or 0
+    context.live.close(project_id)
+    context.viewer.close(project_id)
+    context.runner.queued(job)
+    projects.tell(context, project_id)
+    return projects.get_project(context, project_id)
