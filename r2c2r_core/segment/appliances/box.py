@@ -18,8 +18,6 @@ from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
-_TOLERANCE = Tolerance(front_m=0.08, behind_m=0.06)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -30,6 +28,20 @@ class Params:
     covered: float = param(
         1.2, "score", "worth of what depth saw of the plane, beside 1 for all four edges: it belongs to the appliance"
     )
+    reach: float = param(0.4, "ratio", "to a kind's least side, beyond the clicks, where lines are looked for")
+    usual: float = param(0.3, "score", "worth of a usual size, beside 1 for all four edges")
+    refused: float = param(10.0, "score", "cost of a click that says no")
+    sure_z: float = param(4.0, "σ", "of a line that is clear", gt=0)
+    clearest_z: float = param(6.0, "σ", "at which lines are cut where candidates are looked for", gt=0)
+    least_line: float = param(0.2, "σ", "mean of a candidate line")
+    blur_m: float = param(0.003, "m", "over which candidate lines are one", gt=0)
+    apart_m: float = param(0.0075, "m", "between candidate lines, at least")
+    end_z: float = param(3.0, "σ", "that an end of what depth saw is worth")
+    end_share: float = param(0.3, "share", "of the widest column that still belongs to what depth saw")
+    front_m: float = param(0.08, "m", "before the box, from where something hides it")
+    behind_m: float = param(0.06, "m", "behind the box, from where the sensor looked past it")
+    least_visible: float = param(0.05, "share", "of the box's projection that must be visible")
+    nearest_part_m2: float = param(0.004, "m²", "of a part of the plane that a click without depth may mean")
 
 
 def find_rectangle(
@@ -42,8 +54,8 @@ def find_rectangle(
     part = _component(run, clicks)
     upright, level = _with_ends(run.vertical, part, 0), _with_ends(run.horizontal, part, 1)
     vertical, horizontal = _sums(upright), _sums(level)
-    columns = _candidates(upright, low[1], high[1], 0.4 * kind.height.low / cell_m)
-    rows = _candidates(level, low[0], high[0], 0.4 * kind.width.low / cell_m)
+    columns = _candidates(upright, low[1], high[1], params.reach * kind.height.low / cell_m, cell_m)
+    rows = _candidates(level, low[0], high[0], params.reach * kind.width.low / cell_m, cell_m)
     if support_row is not None:
         rows = np.append(rows[rows < support_row - params.shadow_m / cell_m], support_row)
     support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
@@ -67,9 +79,9 @@ def find_rectangle(
                 + _along_rows(horizontal, bottom, left, right, run.horizontal.block)
             ) / 4
             usual = np.exp(-0.5 * (kind.height.deviation(tall) ** 2 + kind.width.deviation(width) ** 2))
-            score = edges + 0.3 * usual + params.covered * _covered(support, left, right, top, bottom)
+            score = edges + params.usual * usual + params.covered * _covered(support, left, right, top, bottom)
             for column, row in refused:
-                score = score - 10.0 * ((left < column < right) & (top < row) & (row < bottom))
+                score = score - params.refused * ((left < column < right) & (top < row) & (row < bottom))
             i = int(np.argmax(score))
             if best is None or score[i] > best[0] + 1e-9:
                 best = (float(score[i]), Cell(float(left), float(top[i]), float(right), float(bottom[i])))
@@ -78,7 +90,7 @@ def find_rectangle(
 
 def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, float]:
     """The box's visible pixels in a frame, and the share of its projection that is visible."""
-    grid = front.run.grid
+    params, grid = tuned(Params), front.run.grid
     slide = front.run.slide_of(frame.index, scene)
     facets = []
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward > 0.03:
@@ -86,8 +98,8 @@ def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, floa
     for side in ("left", "right", "top", "bottom"):
         if side_faces(front.cell, grid, side, frame.world_from_camera.translation):
             facets.append(Facet(side_corners(front.cell, grid, slide, side, front.depth_m)))
-    mask, share = visible_mask(facets, scene, frame, _TOLERANCE)
-    if share < 0.05:
+    mask, share = visible_mask(facets, scene, frame, Tolerance(front_m=params.front_m, behind_m=params.behind_m))
+    if share < params.least_visible:
         return np.zeros_like(mask), 0.0
     return mask, share
 
@@ -116,7 +128,9 @@ def _component(run: Run, clicks: np.ndarray) -> np.ndarray:
         return np.asarray(np.isin(labels, under))
     areas = np.bincount(labels.ravel())
     distance = [
-        np.inf if label == 0 or areas[label] * run.grid.cell_m**2 < 0.004 else _distance(labels == label, clicks[0])
+        np.inf
+        if label == 0 or areas[label] * run.grid.cell_m**2 < tuned(Params).nearest_part_m2
+        else _distance(labels == label, clicks[0])
         for label in range(count)
     ]
     nearest = int(np.argmin(distance))
@@ -140,7 +154,8 @@ def _covered(support: np.ndarray, left: float, right: float, top: np.ndarray, bo
 
 def _sums(evidence: Evidence) -> np.ndarray:
     """Running sums over blocks of how clearly each position shows a line (0..1), the best of three neighbours."""
-    clear = cv2.dilate(np.clip(evidence.score, 0, 4).astype(np.float32), np.ones((1, 3), np.uint8)) / 4
+    sure = tuned(Params).sure_z
+    clear = cv2.dilate(np.clip(evidence.score, 0, sure).astype(np.float32), np.ones((1, 3), np.uint8)) / sure
     return np.pad(np.where(evidence.known, clear, 0).cumsum(axis=0), ((1, 0), (0, 0)))
 
 
@@ -157,29 +172,35 @@ def _along_rows(sums: np.ndarray, rows: np.ndarray, left: float, right: float, b
     return np.asarray((sums[last, at] - sums[first, at]) / max(last - first, 1))
 
 
-def _candidates(evidence: Evidence, low: float, high: float, reach: float) -> np.ndarray:
+def _candidates(evidence: Evidence, low: float, high: float, reach: float, cell_m: float) -> np.ndarray:
     """Positions (cell centres) of the clearest lines across the clicks' surroundings."""
+    params = tuned(Params)
+    around = 2 * round(params.apart_m / cell_m) + 1
     first = int(max((low - reach) // evidence.block, 0))
     if first >= len(evidence.score):
         return np.zeros(0)  # the clicks lie beside what was seen
     last = int(max(min(np.ceil((high + reach) / evidence.block), len(evidence.score)), first + 1))
-    shown = np.where(evidence.known[first:last], np.clip(evidence.score[first:last], 0, 6), 0).mean(axis=0)
-    profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), 1.2)[0]
-    peak = (profile >= cv2.dilate(profile[None], np.ones((1, 7), np.uint8))[0] - 1e-6) & (profile > 0.2)
+    shown = np.where(evidence.known[first:last], np.clip(evidence.score[first:last], 0, params.clearest_z), 0).mean(axis=0)
+    profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), params.blur_m / cell_m)[0]
+    peak = (profile >= cv2.dilate(profile[None], np.ones((1, around), np.uint8))[0] - 1e-6) & (profile > params.least_line)
     positions = np.flatnonzero(peak)
-    order = np.argsort(-profile[positions], kind="stable")[: tuned(Params).candidates]
+    order = np.argsort(-profile[positions], kind="stable")[: params.candidates]
     return np.sort(positions[order]) + 0.5
 
 
 def _with_ends(evidence: Evidence, part: np.ndarray, axis: int) -> Evidence:
     """The evidence, and the ends of what depth saw (its outline may be clearer than any colour edge)."""
+    params = tuned(Params)
     part = part if axis == 0 else part.T
-    across, along = np.flatnonzero(part.mean(axis=0) > 0.3 * part.mean(axis=0).max()), np.flatnonzero(part.any(axis=1))
+    across, along = (
+        np.flatnonzero(part.mean(axis=0) > params.end_share * part.mean(axis=0).max()),
+        np.flatnonzero(part.any(axis=1)),
+    )
     if len(across) == 0 or not part.any():
         return evidence
     score, known = evidence.score.copy(), evidence.known.copy()
     first, last = int(along[0] // evidence.block), int(along[-1] // evidence.block) + 1
     for end in (int(across[0]), int(across[-1])):
-        score[first:last, end] = np.maximum(score[first:last, end], 3.0)
+        score[first:last, end] = np.maximum(score[first:last, end], params.end_z)
         known[first:last, end] = True
     return Evidence(score, known, evidence.block)

@@ -26,7 +26,15 @@ class Params:
     most: float = param(0.6, "share", "of the depth points before the front that must lie on the flat")
     span: float = param(0.7, "share", "of the front's width and height that they must span")
     beside_m: float = param(0.05, "m", "beyond its edges the flat must end: the same outline, not a board before it")
-    beside_share: float = param(0.35, "ratio", "of the points in that strip to those on the flat, at most")
+    beside_share: float = param(0.35, "ratio", "of the density of points in that strip to that on the flat, at most")
+    beside_gap_m: float = param(0.01, "m", "beyond its edges, where that strip begins for a drawer")
+    inside: float = param(0.95, "share", "of the front's half width and height, within which depth is the front's")
+    closed_share: float = param(0.4, "share", "of the depth in its place, from which it is closed")
+    least_points: int = param(60, "count", "depth points of a flat")
+    lift_bin_m: float = param(0.005, "m", "of heights over the plane that are counted together", gt=0)
+    trim: float = param(0.03, "share", "of a flat's points left out at either end of its span", ge=0, lt=0.5)
+    place: float = param(0.9, "share", "of a door's half width and height: its place")
+    nearest_radius: float = param(0.2, "share", "of a door's half width, from its hinge, where its leaf is looked for")
     least_swing_rad: float = param(float(np.deg2rad(12.0)), "rad", "of a door that counts as open")
     bin_rad: float = param(float(np.deg2rad(3.0)), "rad", "of angles that are counted together", gt=0)
     behind_m: float = param(0.05, "m", "behind a door's place: depth there shows that it is not there")
@@ -47,19 +55,24 @@ def drawn_out(front: Front, scene: Scene, frame: Frame) -> float:
     closed = front_corners(front.cell, grid, (0.0, 0.0))
     lift, x, z = _points_about(front, scene, frame, np.concatenate([closed, closed + grid.outward * params.farthest_m]))
     half_w, half_h = _halves(front)
-    inside = (np.abs(x) < 0.95 * half_w) & (np.abs(z) < 0.95 * half_h)
+    inside = (np.abs(x) < params.inside * half_w) & (np.abs(z) < params.inside * half_h)
     shown = lift[inside & (lift > -params.closed_m)]
-    if len(shown) < 60 or (np.abs(shown) < params.closed_m).mean() > 0.4:
+    if len(shown) < params.least_points or (np.abs(shown) < params.closed_m).mean() > params.closed_share:
         return 0.0
-    counts, edges = np.histogram(shown, bins=np.arange(params.closed_m, params.farthest_m, 0.005))
+    counts, edges = np.histogram(shown, bins=np.arange(params.closed_m, params.farthest_m, params.lift_bin_m))
     peak = int(np.argmax(np.convolve(counts, np.ones(5), mode="same")))
-    out = float(edges[peak] + 0.0025)
+    out = float(edges[peak] + params.lift_bin_m / 2)
     flat = np.abs(lift - out) < params.flat_m
-    own, beside = flat & inside, flat & ~inside & (np.abs(x) > half_w + 0.01) & (np.abs(x) < half_w + params.beside_m)
-    spans = np.ptp(np.quantile(np.stack([x[own], z[own]]), [0.03, 0.97], axis=1), axis=0) if own.sum() > 60 else np.zeros(2)
-    density = own.sum() / (4 * 0.95**2 * half_w * half_h)
-    around = beside.sum() / (4 * half_h * (params.beside_m - 0.01))
-    is_front = own.sum() > params.most * len(shown) and (spans > params.span * 1.9 * np.array([half_w, half_h])).all()
+    own, beside = (
+        flat & inside,
+        flat & ~inside & (np.abs(x) > half_w + params.beside_gap_m) & (np.abs(x) < half_w + params.beside_m),
+    )
+    spans = _spans(x[own], z[own]) if own.sum() > params.least_points else np.zeros(2)
+    density = own.sum() / (4 * params.inside**2 * half_w * half_h)
+    around = beside.sum() / (4 * half_h * (params.beside_m - params.beside_gap_m))
+    is_front = (
+        own.sum() > params.most * len(shown) and (spans > params.span * 2 * params.inside * np.array([half_w, half_h])).all()
+    )
     return out if is_front and around < params.beside_share * density else 0.0
 
 
@@ -68,12 +81,12 @@ def swung(front: Front, scene: Scene, frame: Frame) -> Swing | None:
     params = tuned(Params)
     half_w, half_h = _halves(front)
     lift, x, z = _points_about(front, scene, frame, front_corners(front.cell, front.run.grid, (0.0, 0.0)))
-    place = (np.abs(x) < 0.9 * half_w) & (np.abs(z) < 0.9 * half_h)
+    place = (np.abs(x) < params.place * half_w) & (np.abs(z) < params.place * half_h)
     closed, behind = int((place & (np.abs(lift) < params.closed_m)).sum()), int((place & (lift < -params.behind_m)).sum())
-    if behind < params.least_behind or closed > 0.4 * (closed + behind):
+    if behind < params.least_behind or closed > params.closed_share * (closed + behind):
         return None
     lift, x, z = _points_about(front, scene, frame, _swept(front))
-    before = (lift > params.closed_m) & (np.abs(z) < 0.95 * half_h)
+    before = (lift > params.closed_m) & (np.abs(z) < params.inside * half_h)
     leaves = [
         (leaf, Swing(hinge=hinge, angle_rad=leaf[1]))
         for hinge, sign in _EDGES
@@ -97,15 +110,15 @@ def _leaf(across: np.ndarray, lift: np.ndarray, z: np.ndarray, half_w: float, ha
     """Points on, and opening angle of, the flat that hangs on the origin of (across, lift); None where none is a door's."""
     params = tuned(Params)
     angle, radius = np.arctan2(lift, across), np.hypot(across, lift)
-    reach = (radius > 0.2 * half_w) & (radius < 2 * half_w) & (angle > params.least_swing_rad)
-    if reach.sum() < 60:
+    reach = (radius > params.nearest_radius * half_w) & (radius < 2 * half_w) & (angle > params.least_swing_rad)
+    if reach.sum() < params.least_points:
         return None
     counts, edges = np.histogram(angle[reach], bins=np.arange(0.0, np.pi, params.bin_rad))
     guess = float(edges[int(np.argmax(np.convolve(counts, np.ones(3), mode="same")))] + params.bin_rad / 2)
     off, along = _turned(across, lift, guess)
     near = reach & (np.abs(off) < 1.5 * params.off_hinge_m)
     for _ in range(3):  # a line of its own: the camera may see the leaf's back, beside the hinge by its thickness
-        if near.sum() < 60:
+        if near.sum() < params.least_points:
             return None
         slope, offset = np.polyfit(along[near], off[near], 1)
         guess, shift = guess + float(np.arctan(slope)), float(offset * np.cos(np.arctan(slope)))
@@ -117,14 +130,22 @@ def _leaf(across: np.ndarray, lift: np.ndarray, z: np.ndarray, half_w: float, ha
         & (along > 2 * half_w + params.edge_m)
         & (along < 2 * half_w + params.edge_m + params.beside_m)
     )
-    if own.sum() < 60 or abs(shift) > params.off_hinge_m or guess < params.least_swing_rad:
+    if own.sum() < params.least_points or abs(shift) > params.off_hinge_m or guess < params.least_swing_rad:
         return None
-    spans = np.ptp(np.quantile(np.stack([along[own], z[own]]), [0.03, 0.97], axis=1), axis=0)
-    if (spans < [params.leaf_span * 2 * half_w, params.span * 1.9 * half_h]).any() or own.sum() < params.most * near.sum():
+    spans = _spans(along[own], z[own])
+    if (
+        spans < [params.leaf_span * 2 * half_w, params.span * 2 * params.inside * half_h]
+    ).any() or own.sum() < params.most * near.sum():
         return None
     density = own.sum() / spans.prod()
     around = beyond.sum() / (params.beside_m * spans[1])
     return (int(own.sum()), guess) if around < params.beside_share * density else None
+
+
+def _spans(across: np.ndarray, upright: np.ndarray) -> np.ndarray:
+    """How far points reach across and upright, without the outermost."""
+    trim = tuned(Params).trim
+    return np.asarray(np.ptp(np.quantile(np.stack([across, upright]), [trim, 1 - trim], axis=1), axis=0))
 
 
 def _turned(across: np.ndarray, lift: np.ndarray, angle_rad: float) -> tuple[np.ndarray, np.ndarray]:
