@@ -39,6 +39,18 @@ class Params:
         "by which the doors of one cabinet may differ",
         source="they are cut alike; two cabinets beside each other seldom are",
     )
+    faint_lines: float = param(0.45, "σ", "mean strength of the four sides that says nothing")
+    clear_lines: float = param(0.9, "σ", "mean strength of the four sides that says all")
+    faintest_line: float = param(0.1, "σ", "strength of the faintest side that says nothing")
+    faintest_clear: float = param(0.6, "σ", "strength of the faintest side that says all")
+    unoutlined: float = param(0.3, "share", "of its confidence that a panel with one side missing keeps")
+    without_handle: float = param(0.6, "share", "of its confidence that a panel without a handle keeps")
+    unseen: float = param(0.3, "share", "of a panel that depth saw, that says nothing for it")
+    seen: float = param(0.8, "share", "of a panel that depth saw, that says all for it")
+    on_wall: float = param(0.3, "share", "of its confidence that a panel on a wall keeps")
+    mates_m: float = param(0.02, "m", "by which the doors of a pair may differ in height and stand apart")
+    at_seam: float = param(0.3, "share", "of a door's width from the seam, within which its handle is beside it", ge=0, le=0.5)
+    upright: float = param(1.8, "ratio", "of height to width of an upright handle")
     widest_cabinet_m: float = param(0.95, "m", "of two doors that are one cabinet")
 
 
@@ -154,20 +166,25 @@ def _aligned(a: Cell, b: Cell, slack: float) -> bool:
 def _odd_one_out(mates: list[Panel]) -> bool:
     """Whether the doors beside a lying handle carry upright ones: a machine among cupboards."""
     handles = [mate.front.handle for mate in mates if mate.category in ("cabinet", "dishwasher")]
-    return bool(handles) and all(handle is not None and handle.height > 1.8 * handle.width for handle in handles)
+    upright = tuned(Params).upright
+    return bool(handles) and all(handle is not None and handle.height > upright * handle.width for handle in handles)
 
 
 def outlined(front: Front) -> float:
     """0..1: lines on its four sides, and a handle."""
-    edges = edge_strengths(front)
-    lines = np.clip((np.mean(edges) - 0.45) / 0.45, 0, 1) * np.clip((min(edges) - 0.1) / 0.5, 0.3, 1)
-    return float(lines * (0.6 + 0.4 * (front.handle.confidence if front.handle is not None else 0.0)))
+    params, edges = tuned(Params), edge_strengths(front)
+    mean = (np.mean(edges) - params.faint_lines) / (params.clear_lines - params.faint_lines)
+    least = (min(edges) - params.faintest_line) / (params.faintest_clear - params.faintest_line)
+    lines = np.clip(mean, 0, 1) * np.clip(least, params.unoutlined, 1)
+    handle = front.handle.confidence if front.handle is not None else 0.0
+    return float(lines * (params.without_handle + (1 - params.without_handle) * handle))
 
 
 def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
     """0..1: outlined, flat where depth saw it, and no wall."""
-    flat = np.clip((front.run.seen[area].mean() - 0.3) / 0.5, 0, 1)
-    return float(outlined(front) * flat * (0.3 if is_on_wall(front.run, room, tuned(Params).shallowest_m) else 1.0))
+    params = tuned(Params)
+    flat = np.clip((front.run.seen[area].mean() - params.unseen) / (params.seen - params.unseen), 0, 1)
+    return float(outlined(front) * flat * (params.on_wall if is_on_wall(front.run, room, params.shallowest_m) else 1.0))
 
 
 def is_on_wall(run: Run, room: Room, shallowest_m: float) -> bool:
@@ -183,7 +200,7 @@ def _middle(run: Run, cell: Cell) -> Points:
 def _mate(run: Run, cell: Cell) -> Cell | None:
     """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
     params = tuned(Params)
-    slack = 0.02 / run.grid.cell_m
+    slack = params.mates_m / run.grid.cell_m
     for other in run.cells:
         beside = abs(other.left - cell.right) < slack
         if not beside or abs(other.top - cell.top) > slack or abs(other.bottom - cell.bottom) > slack:
@@ -193,7 +210,7 @@ def _mate(run: Run, cell: Cell) -> Cell | None:
             continue
         equal = abs(left.cell.width - right.cell.width) * run.grid.cell_m < params.equal_doors_m
         one_cabinet = (left.cell.width + right.cell.width) * run.grid.cell_m < params.widest_cabinet_m
-        if equal and one_cabinet and _handle_at(left) > 0.7 and _handle_at(right) < 0.3:
+        if equal and one_cabinet and _handle_at(left) > 1 - params.at_seam and _handle_at(right) < params.at_seam:
             return other
     return None
 

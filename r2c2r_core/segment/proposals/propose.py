@@ -43,6 +43,10 @@ class Params:
     )
     same_plane_m: float = param(0.12, "m", "between two fronts of one place")
     box_slack_m: float = param(0.03, "m", "about a box, within which a point is its own")
+    same_front: float = param(0.7, "score", "IoU from which a click gives the panel that was meant")
+    larger: float = param(1.8, "ratio", "to a thing's side as it stands there, of what a click gives, at most")
+    larger_m: float = param(0.05, "m", "by which what a click gives may be larger besides")
+    odd_size: float = param(8.0, "ratio", "of squared deviations from the usual size by which confidence falls to 1/e", gt=0)
     taken_share: float = param(0.4, "share", "of an outline that other proposals may cover")
     tall_m: float = param(1.25, "m", "height of a refrigerator's front, at least")
     foot_m: float = param(0.4, "m", "from the floor to a refrigerator's front, at most")
@@ -161,7 +165,7 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     cell, cell_m = found.front.cell, found.front.run.grid.cell_m
     off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
     front = replace(found.front, depth_m=min(found.front.depth_m, kind.depth.high))
-    return [Panel(front, kind.name, outlined(front) * float(np.exp(-(off @ off) / 8)))]
+    return [Panel(front, kind.name, outlined(front) * float(np.exp(-(off @ off) / params.odd_size)))]
 
 
 # Presenting: the frame that shows it best, and a click there that means it
@@ -175,7 +179,7 @@ def _present_panel(prepared: PreparedCapture, panel: Panel) -> Proposal | None:
         for click in panel_clicks(scene, panel, frame, mask):
             found = _confirmed(prepared, panel.category, click)
             if isinstance(found, FoundFront | FoundAppliance) and isinstance(found, FoundAppliance) == is_box:
-                if _overlap(panel, found) > 0.7:
+                if _overlap(panel, found) > tuned(Params).same_front:
                     return _proposal(prepared, panel, found, frame, click)
                 break
     return None
@@ -210,7 +214,7 @@ def _present_clump(prepared: PreparedCapture, clump: Clump, others: list[Proposa
         mask, box = found.see(frame).mask, found.box()
         if box is None or np.count_nonzero(mask) < prepared.config.least_area_px:
             continue
-        if box.dimensions_m.max() > 1.8 * clump.extent_m.max() + 0.05 or _hits(mask, frame, others):
+        if box.dimensions_m.max() > params.larger * clump.extent_m.max() + params.larger_m or _hits(mask, frame, others):
             return None
         width, depth, height = box.dimensions_m
         confidence = clump.confidence * _agreement(clump, box.dimensions_m)
