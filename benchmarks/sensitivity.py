@@ -58,7 +58,6 @@ ROOMS = ("synthesize", "warp", "align", "kitchen", "geometry", "generate", "segm
 MOVES = {"-25": 0.75, "+25": 1.25}
 LEAST_TRUE_PX = 400
 SHOWN = 40
-MOVED = 0.05  # of the loss, from which a number has an effect
 
 Field = tuple[str, str, int | None]  # module, number, entry of a pair
 
@@ -361,36 +360,38 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
     every = {(path, f.name) for room in ROOMS for path in modules_with_numbers(room) for f in fields(params_of(path))}
     read = {entry for case in cases for reads in case.read.values() for entry in reads}
     key = [source_key(*ROOMS, "ingest", "model"), options.frames, {case.name: sorted(case.prompts) for case in cases}]
-    document = json.loads(options.json.read_text()) if options.json.exists() else {}
-    if document.get("key") != key:
-        document = {"key": key, "numbers": {}}
-    usual = [case.figures(case.made) for case in cases]
-    document |= {"usual": _means(usual), "untouched": sorted(f"{path}.{name}" for path, name in every - read)}
-    print(f"{time.monotonic() - started:.0f} s: {document['usual']}; {len(entries)} numbers read", flush=True)
+    document = json.loads(options.json.read_text()) if options.json.exists() else {"runs": []}
+    run = next((run for run in document["runs"] if run["key"] == key), {"key": key, "numbers": {}})
+    document["runs"] = [other for other in document["runs"] if other["key"][1:] != key[1:]] + [run]  # of older code: anew
+    run["usual"] = _means([case.figures(case.made) for case in cases])
+    run["untouched"] = sorted(f"{path}.{name}" for path, name in every - read)
+    run["read"] = len(entries)
+    print(f"{time.monotonic() - started:.0f} s: {run['usual']}; {len(entries)} numbers read", flush=True)
     for entry in entries:
         name = f"{entry[0]}.{entry[1]}" + ("" if entry[2] is None else f"[{entry[2]}]")
         if time.monotonic() > end:
             break
-        if name in document["numbers"]:
+        if name in run["numbers"]:
             continue
         try:
-            document["numbers"][name] = trial(cases, entry)
+            run["numbers"][name] = trial(cases, entry)
         except Exception:  # a number that ends in a programming error is a finding of its own
-            document["numbers"][name] = {"error": traceback.format_exc().splitlines()[-1]}
-        document["covered"] = f"{len(document['numbers'])} moved of the numbers that were read; {len(read)} of {len(every)} are"
-        options.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        print(name, json.dumps(document["numbers"][name]), file=sys.stderr, flush=True)
+            run["numbers"][name] = {"error": traceback.format_exc().splitlines()[-1]}
+        options.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        print(name, json.dumps(run["numbers"][name]), file=sys.stderr, flush=True)
 
 
 def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
-    """Number, change of the loss down and up; the largest first."""
-    usual = document["usual"]["loss"]
-    found = [
-        (name, *(moves[label]["loss"] - usual if label in moves else 0.0 for label in MOVES))
-        for name, moves in document["numbers"].items()
-        if "error" not in moves
-    ]
-    return sorted(found, key=lambda row: (-max(abs(row[1]), abs(row[2])), row[0]))
+    """Number, change of the loss down and up, the mean over the runs that moved it; the largest first."""
+    found: dict[str, list[list[float]]] = {}
+    for run in document["runs"]:
+        usual = run["usual"]["loss"]
+        for name, moves in run["numbers"].items():
+            if "error" not in moves:
+                found.setdefault(name, []).append([moves[at]["loss"] - usual if at in moves else 0.0 for at in MOVES])
+    means = {name: np.mean(changes, axis=0).round(4).tolist() for name, changes in found.items()}
+    rows = [(name, down, up) for name, (down, up) in means.items()]
+    return sorted(rows, key=lambda row: (-max(abs(row[1]), abs(row[2])), row[0]))
 
 
 def tornado(document: Mapping[str, Any]) -> str:
@@ -402,8 +403,7 @@ def tornado(document: Mapping[str, Any]) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="820" height="{height * (len(rows) + 3)}" '
         'font-family="sans-serif" font-size="11">',
         '<rect width="100%" height="100%" fill="white"/>',
-        f'<text x="10" y="14">change of the loss of {document["usual"]["loss"]:.1f} '
-        "when a number moves by -25 % (blue) and +25 % (orange)</text>",
+        '<text x="10" y="14">change of the loss when a number moves by -25 % (blue) and +25 % (orange)</text>',
     ]
     for position, (name, down, up) in enumerate(rows):
         y = height * (position + 1.6)
@@ -425,15 +425,15 @@ def table(document: Mapping[str, Any]) -> str:
     """The page of the documentation."""
     rows = effects(document)
     still = sorted(name for name, down, up in rows if max(abs(down), abs(up)) == 0.0)
-    usual = document["usual"]
+    untouched = sorted(set.intersection(*(set(run["untouched"]) for run in document["runs"])))
     lines = [
         "# Which numbers matter",
         "",
         "`benchmarks/sensitivity.py` moves each tuned number by a quarter either way, alone, and compares what comes out with",
         "the truth of sample kitchens of two generators. The loss adds the mean error of the sizes in percent,",
-        "100 (1 - mask IoU) and 100 (1 - share of right joints). With the usual numbers it is",
-        f"{usual['loss']:.2f}: sizes {usual['extents_percent']:.2f} %, mask IoU {usual['mask_iou']:.3f}, joints",
-        f"{usual['joints']:.3f}. {document.get('covered', '')}.",
+        "100 (1 - mask IoU) and 100 (1 - share of right joints). Below 0 is better than as it is.",
+        "",
+        *(_run_line(run) for run in document["runs"]),
         "",
         "![Change of the loss by number](sensitivity.svg)",
         "",
@@ -445,14 +445,24 @@ def table(document: Mapping[str, Any]) -> str:
         "",
         ", ".join(f"`{name}`" for name in still) or "none",
         "",
-        f"## Read by no step of these kitchens ({len(document['untouched'])})",
+        f"## Read by no step of these kitchens ({len(untouched)})",
         "",
         "Other kitchens, other recordings and other backends read them.",
         "",
-        ", ".join(f"`{name}`" for name in document["untouched"]),
+        ", ".join(f"`{name}`" for name in untouched),
         "",
     ]
     return "\n".join(lines)
+
+
+def _run_line(run: Mapping[str, Any]) -> str:
+    usual, objects = run["usual"], run["key"][2]
+    recordings = ", ".join(f"`{name}` ({', '.join(names)})" for name, names in objects.items())
+    return (
+        f"- {recordings}, {run['key'][1]} frames: {len(run['numbers'])} of the {run['read']} numbers that are read were moved. "
+        f"With the usual ones the loss is {usual['loss']:.2f}: sizes {usual['extents_percent']:.2f} %, "
+        f"mask IoU {usual['mask_iou']:.3f}, joints {usual['joints']:.3f}."
+    )
 
 
 if __name__ == "__main__":
