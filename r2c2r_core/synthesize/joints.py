@@ -19,7 +19,7 @@ class Params:
         0.2,
         "share",
         "of half the width: a handle nearer to the middle does not tell its side",
-        source="measured on handles of real fronts: 0.38-0.56 did tell it",
+        source="backends.md 2.8: handles at 0.38-0.56 did not",
     )
     adjacent_m: float = param(0.06, "m", "between two doors that may open as a pair")
     trusted: float = param(0.25, "score", "least confidence, 0 to 1, of a handle that tells the side")

@@ -30,7 +30,6 @@ class Params:
         0.005,
         "m",
         "of a front's edges, measured over all frames",
-        source="an edge is measured to about 8 mm at worst on the sample kitchens",
     )
     mesh_edge_m: float = param(0.012, "m", "of a front's edges, measured on the mesh alone")
     plane_m: float = param(0.003, "m", "of a front's plane")
@@ -40,7 +39,7 @@ class Params:
     )
     thing_m: float = param(0.15, "m", "of where a thing stands")
     appliance_trim_m: float = param(0.004, "m", "by which an appliance's size may change: it moves rather than shrinks")
-    trim_m: float = param(0.012, "m", "by which a size may change", source="an edge is measured to about 8 mm")
+    trim_m: float = param(0.012, "m", "by which a size may change", source="backends.md 2.9: an edge is measured to about 8 mm")
     trim_share: float = param(0.025, "share", "of a size by which it may change")
     least_depth_share: float = param(0.6, "share", "of an unseen depth that must remain")
 

@@ -17,7 +17,10 @@ class Params:
     """Things whose poses disagree."""
 
     wanders_m: float = param(
-        0.05, "m", "how far a small thing wanders between frames", source="seen on KinectFusion recordings of the real kitchen"
+        0.05,
+        "m",
+        "how far a small thing wanders between frames",
+        source="seen between frames of recordings whose poses disagree",
     )
 
 
