@@ -5,6 +5,7 @@ kept (the result is the same, stack.md §7), and of many images only those that 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,13 +15,28 @@ import numpy as np
 from r2c2r_core.align.protocol import NO_MATCH, Features, Matcher, Matches
 from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.errors import BackendUnavailable
+from r2c2r_core.tuning import param, tuned
 
 CANVAS_PX = 256  # side of the square a crop is scaled to; a multiple of 8. The stage's own views have 200 px
-KEYPOINTS = 512  # an image; 2000 of them cost a pair 5 s on two cores, and match a 200 px view no better
-SHORTLIST = 5  # images of many that go through the network: as many as a photo votes with (voting.py)
-_DETECTED = 4  # times as many are asked of the detector, for those beside the object are dropped
-_MARGIN = 0.08  # of the object's box, kept around it: a descriptor looks at some 8 px on each side
-_LEAST = 4  # keypoints in each image
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What matching networks are given."""
+
+    keypoints: int = param(
+        512, "count", "of an image", source="2000 of them cost a pair 5 s on two cores, and match a 200 px view no better", ge=8
+    )
+    shortlist: int = param(
+        5, "count", "images of many that go through the network", source="as many as a photo votes with (voting.py)", ge=1
+    )
+    detected: int = param(
+        4, "ratio", "of keypoints asked of the detector to those kept, for those beside the object are dropped", ge=1
+    )
+    margin: float = param(
+        0.08, "ratio", "to the object's box, kept around it", source="a descriptor looks at some 8 px on each side"
+    )
+    least: int = param(4, "count", "keypoints in each image", ge=1)
 
 
 class Keypoints(NamedTuple):
@@ -69,13 +85,14 @@ class GlueMatcher(Matcher):
 
 def _load(class_name: str, weights: Path, settings: Mapping[str, float]) -> Any:
     """The model of that transformers class from a folder, on the GPU where there is one; raises BackendUnavailable."""
+    params = tuned(Params)
     import torch
     import transformers
 
     model_class = getattr(transformers, class_name)
     try:
         config = model_class.config_class.from_pretrained(weights, local_files_only=True)
-        config.keypoint_detector_config.max_keypoints = _DETECTED * KEYPOINTS
+        config.keypoint_detector_config.max_keypoints = params.detected * params.keypoints
         for name, value in settings.items():
             setattr(config, name, value)
         model = model_class.from_pretrained(weights, config=config, local_files_only=True)
@@ -87,12 +104,13 @@ def _load(class_name: str, weights: Path, settings: Mapping[str, float]) -> Any:
 
 def _describe(model: Any, image: Image, mask: Mask) -> Features:
     """The strongest keypoints of `image` inside `mask`."""
+    params = tuned(Params)
     import torch
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return _features(model, np.zeros((0, 2)), Keypoints(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 0))))
-    margin = 2 + _MARGIN * max(len(rows), len(columns))
+    margin = 2 + params.margin * max(len(rows), len(columns))
     left, top = max(int(columns[0] - margin), 0), max(int(rows[0] - margin), 0)
     crop = image[top : int(rows[-1] + margin) + 1, left : int(columns[-1] + margin) + 1]
     scale = CANVAS_PX / max(crop.shape[:2])
@@ -108,7 +126,7 @@ def _describe(model: Any, image: Image, mask: Mask) -> Features:
     on_canvas = shares.astype(np.float64) * CANVAS_PX  # pixel indices; their centres lie half a pixel further
     uv = (on_canvas + 0.5) / [size[0] / crop.shape[1], size[1] / crop.shape[0]] + [left, top]
     inside = found.mask[0].cpu().numpy().astype(bool) & _covered(uv, mask)
-    best = np.flatnonzero(inside)[np.argsort(-scores[inside], kind="stable")[:KEYPOINTS]]
+    best = np.flatnonzero(inside)[np.argsort(-scores[inside], kind="stable")[: params.keypoints]]
     return _features(model, uv[best], Keypoints(on_canvas[best], scores[best], descriptors[best]))
 
 
@@ -116,7 +134,7 @@ def _match(model: Any, partners_of: Callable[[Pair], Any], first: Features, seco
     """Pairs of keypoints by the network."""
     import torch
 
-    if min(len(first.uv_px), len(second.uv_px)) < _LEAST:
+    if min(len(first.uv_px), len(second.uv_px)) < tuned(Params).least:
         return NO_MATCH
     with torch.inference_mode():
         partners = partners_of(_padded(model, _unpack(first), _unpack(second)))
@@ -128,7 +146,7 @@ def _match(model: Any, partners_of: Callable[[Pair], Any], first: Features, seco
 def _shortlist(first: Features, others: Sequence[Features]) -> list[int]:
     """The images whose descriptors have most mutual nearest neighbours with the first's: cheap, and it needs no network."""
     votes = [_mutual_neighbours(_unpack(first).descriptors, _unpack(other).descriptors) for other in others]
-    return sorted(range(len(others)), key=lambda k: -votes[k])[:SHORTLIST]
+    return sorted(range(len(others)), key=lambda k: -votes[k])[: tuned(Params).shortlist]
 
 
 def _unpack(features: Features) -> Keypoints:
@@ -169,7 +187,7 @@ def _padded(model: Any, first: Keypoints, second: Keypoints) -> Pair:
 
 
 def _mutual_neighbours(first: np.ndarray, second: np.ndarray) -> int:
-    if min(len(first), len(second)) < _LEAST:
+    if min(len(first), len(second)) < tuned(Params).least:
         return 0
     likeness = first @ second.T
     return int(np.count_nonzero(likeness.argmax(axis=0)[likeness.argmax(axis=1)] == np.arange(len(first))))

@@ -1,5 +1,6 @@
 """Texture atlases: six flat projections for furniture, xatlas charts for everything else; and the place of every texel."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -10,10 +11,17 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.meshes import face_normals, vertex_normals
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
 
 FRONT = 2  # chart of the faces that look along -Y
 _PADDING_PX = 3
-_LARGEST_PX = 1536
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How textures are laid out."""
+
+    largest_px: int = param(1536, "px", "longest side of a flat chart", ge=16)
 
 
 class Atlas(NamedTuple):
@@ -109,7 +117,7 @@ def _draw_chart(vertices: Points, faces: Faces, direction: np.ndarray, k: int, p
     axes = [a for a in range(3) if a != axis]
     flat = vertices[faces[chosen]][:, :, axes]
     low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
-    pitch_m = max(pitch_m, float((high - low).max()) / _LARGEST_PX)
+    pitch_m = max(pitch_m, float((high - low).max()) / tuned(Params).largest_px)
     width, height = (int(np.ceil(v)) + 2 * _PADDING_PX for v in (high - low) / pitch_m)
     chart = _Chart(k, axes, np.array([low[0], high[1]]), pitch_m, np.zeros((0, 0)))
     image = np.full((height, width), -1, np.float32)

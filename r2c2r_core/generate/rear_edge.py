@@ -16,14 +16,13 @@ from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.tuning import param, tuned
 
-_WIDEST_M = 0.08  # how far from where it was thought the edge is looked for
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """Where a face seen at a slant ends."""
 
     flattest: float = param(0.08, "cosine", "with the face's normal of a ray that tells")
+    widest_m: float = param(0.08, "m", "from where it was thought, within which the edge is looked for")
     before_m: float = param(0.05, "m", "nearer than the face: something in front of it")
     bin_m: float = param(0.01, "m", "width of the strips along the face", gt=0)
     least: int = param(6, "count", "pixels of a strip, and of a frame on either part of a face", ge=1)
@@ -33,9 +32,7 @@ class Params:
     clearer: float = param(0.5, "ratio", "of the misfit to that of a face without an end, at most")
 
 
-def rear_edge(
-    low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3, reach_m: float = _WIDEST_M
-) -> float:
+def rear_edge(low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3) -> float:
     """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, moved to where depth lets the edge be."""
     params = tuned(Params)
     thought = float(high[1])
@@ -43,13 +40,13 @@ def rear_edge(
     for axis, side in ((2, 1.0), (0, -1.0), (0, 1.0)):
         crossings, behind = [np.zeros(0)], [np.zeros(0)]
         for view in views:
-            y, gap = _continued(low, high, view, world_from_local, axis, side, reach_m)
+            y, gap = _continued(low, high, view, world_from_local, axis, side, params.widest_m)
             known = y < low[1] + params.sure * (high[1] - low[1])
             if known.sum() < params.least or np.count_nonzero(~known) < params.least:
                 continue
             crossings.append(y)
             behind.append(gap - np.median(gap[known]))  # the frame's own pose error
-        found = _change_point(np.concatenate(crossings), np.concatenate(behind), thought, reach_m)
+        found = _change_point(np.concatenate(crossings), np.concatenate(behind), thought, params.widest_m)
         if found is not None:
             bounds.append(found)
     if not bounds:

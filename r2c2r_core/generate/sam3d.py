@@ -11,6 +11,7 @@ remains the next stage's.
 """
 
 import zlib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,12 +29,19 @@ from r2c2r_core.generate.meshfile import parts_of
 from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.tuning import param, tuned
 
 _P3D_FROM_CAMERA = np.diag([-1.0, -1.0, 1.0])
 _Z_UP_FROM_Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-_JUDGES = 8  # views that judge a candidate, as for the weight-free ones
-_LEAST_IOU = 0.3  # of a pose worth believing
 _OWN_CODE = ("sam3d_objects", "torch", "torchvision", "moge")  # what its pipeline.yaml may name to be built
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which of the model's own poses are believed."""
+
+    judges: int = param(8, "count", "views that judge a candidate, as for the weight-free ones", ge=1)
+    least_iou: float = param(0.3, "score", "IoU of a pose worth believing")
 
 
 class Sam3dObjects(MeshGenerator):
@@ -155,8 +163,9 @@ def _either_side(centre: float, size: int) -> tuple[int, int]:
 
 def _judged(posed: Points, faces: np.ndarray, evidence: Evidence) -> dict[str, float]:
     """Agreement with masks and depth where the model says it stands; nothing when that place is plainly wrong."""
-    measures = self_consistency(posed, faces, np.ones(len(faces), dtype=bool), evidence.pool[:_JUDGES])
-    return measures if measures.get("mask_iou", 0.0) >= _LEAST_IOU else {}
+    params = tuned(Params)
+    measures = self_consistency(posed, faces, np.ones(len(faces), dtype=bool), evidence.pool[: params.judges])
+    return measures if measures.get("mask_iou", 0.0) >= params.least_iou else {}
 
 
 def _numbers(tensor: Any) -> np.ndarray:

@@ -13,6 +13,7 @@ from r2c2r_core.align.stage import AlignConfig, _match  # noqa: E402
 from r2c2r_core.align.superglue import SuperGlueMatcher  # noqa: E402
 from r2c2r_core.errors import BackendUnavailable  # noqa: E402
 from r2c2r_core.geometry.meshes import distances_to_mesh  # noqa: E402
+from r2c2r_core.tuning import tuning  # noqa: E402
 
 torch.set_num_threads(1)
 DETECTOR = transformers.SuperPointConfig(
@@ -76,7 +77,7 @@ def test_keypoints_lie_on_the_object_are_capped_and_keep_their_place(folders, pi
     matcher = MATCHERS[name](weights=folders[name])
     (first, second), masks = pictures
     features = matcher.describe(first, masks[0])
-    assert 100 < len(features.uv_px) <= glue.KEYPOINTS
+    assert 100 < len(features.uv_px) <= glue.Params().keypoints
     column, row = features.uv_px.astype(int).T
     assert masks[0][row, column].all()
     # the same patch elsewhere in the picture gives the same keypoints, moved: crop and scale are undone exactly
@@ -141,11 +142,11 @@ def test_of_many_views_only_the_most_alike_go_through_the_network(folders, pictu
     first, same = (matcher.describe(image, mask) for image, mask in zip(images, masks, strict=True))
     rng = np.random.default_rng(1)
     other = matcher.describe(rng.integers(0, 255, images[0].shape).astype(np.uint8), masks[0])
-    monkeypatch.setattr(glue, "SHORTLIST", 1)
     asked = []
     match = matcher.match
     monkeypatch.setattr(matcher, "match", lambda a, b: asked.append(b) or match(a, b))
-    found = matcher.match_many(first, [other, same, other])
+    with tuning({glue.Params: glue.Params(shortlist=1)}):
+        found = matcher.match_many(first, [other, same, other])
     assert len(asked) == 1
     assert asked[0] is same
     assert [len(pairs.first) > 0 for pairs in found] == [False, True, False]
