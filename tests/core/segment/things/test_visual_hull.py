@@ -7,9 +7,11 @@ import pytest
 
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things import visual_hull
 from r2c2r_core.segment.things.silhouettes import small_mask, support_offset, usual_shift
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, find_thing, support_height, thing_mask
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
@@ -107,3 +109,27 @@ def test_the_surface_found_is_the_cartons_and_so_is_its_mask(scene: Scene, boxes
 
 def test_clicks_far_from_any_surface_find_no_thing(scene: Scene) -> None:
     assert find_thing(scene, np.array([[0.9, -1.6, 1.9]]), NO_POINTS, CARTON) is None
+
+
+def test_noisier_depth_carves_less(scene: Scene, hull: Thing) -> None:
+    """The carton's face was carved to within the recording's noise; depth ten times as noisy leaves more standing before it."""
+    noise = DepthNoise(floor_m=0.02, per_m=0.02)
+    noisy = dataclasses.replace(scene, capture=dataclasses.replace(scene.capture, depth_noise=noise))
+    loose = glimpse_small(noisy, ON_IT, NO_POINTS, CARTON, ())
+    fine = glimpse_small(scene, ON_IT, NO_POINTS, CARTON, ())
+    assert loose is not None
+    assert fine is not None
+    assert len(loose.vertices) > 0
+    assert np.ptp(loose.vertices, axis=0).prod() > 1.1 * np.ptp(fine.vertices, axis=0).prod()
+
+
+def test_the_same_error_of_poses_is_borne_by_a_wide_thing_and_not_by_a_narrow_one(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(visual_hull, "_pose_spread", lambda *given: 0.008)
+    monkeypatch.setattr(visual_hull, "usual_shift", lambda *given: 0.0)
+    wide, narrow = (find_small(scene, ON_IT, NO_POINTS, ThingConfig(radius_m=radius), ()) for radius in (0.12, 0.08))
+    assert wide is not None
+    assert narrow is not None
+    assert wide.pose_error_m < 0.03  # carved
+    assert narrow.pose_error_m > 0.03  # looked for frame by frame
