@@ -233,6 +233,8 @@ def _rooms(stage: str) -> tuple[str, ...]:
 
 def store_noun(job: _Job, *, progress: Progress) -> None:
     """Make a noun in a worker process, and store it."""
+    if not any(isinstance(item, Shared) for item in job.inputs):
+        _opened.cache_clear()  # the stage that shared it is over: a prepared recording takes half a gigabyte
     with tuning({type(params): params for params in job.numbers.values()}):
         _compute(Workspace(job.root), job, progress)
 
