@@ -1,5 +1,6 @@
 """What was made of files, kept while they are as they were: bounded by bytes, for entries may be of any size."""
 
+import os
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
@@ -17,13 +18,13 @@ class FileCache(Generic[T]):
         self._kept: OrderedDict[Any, tuple[int, int, T]] = OrderedDict()  # changed, bytes, made; the longest unused first
         self._lock = threading.Lock()
 
-    def get(self, path: Path, make: Callable[[], T], size_of: Callable[[T, int], int], about: Any = None) -> T | None:
+    def get(self, path: Path | str, make: Callable[[], T], size_of: Callable[[T, int], int], about: Any = None) -> T | None:
         """What is made of the file, `about` telling apart several things made of it; None where there is no file.
 
         `size_of` says how many bytes are kept, of what was made and from the size of the file.
         """
         try:
-            found = path.stat()
+            found = os.stat(path)
         except FileNotFoundError:
             return None
         key = (path, about)

@@ -84,7 +84,7 @@ class Workspace:
 
     def noun_path(self, stage: str, name: str) -> Path:
         """File of one noun."""
-        return self.root / "nouns" / stage / f"{name}.noun"
+        return noun_path(self.root, stage, name)
 
     def once(self, stage: str, name: str, key: str, compute: Callable[[], T]) -> tuple[T, float]:
         """The stored noun when its key matches, else the computed one, stored; with the seconds its computation took."""
@@ -153,10 +153,15 @@ class Workspace:
         return replace(noun, images=open_images(self.store(header.get("frames", "")), noun.frames))
 
 
+def noun_path(root: Path, stage: str, name: str) -> Path:
+    """File of one noun below a workspace, which need not be there."""
+    return root.joinpath("nouns", stage, f"{name}.noun")
+
+
 def frames_folder(root: Path) -> Path:
     """Folder of the frames of the capture stored last below a workspace; `capture` itself where none is stored."""
     try:
-        header = decode_header(root / "nouns" / "ingest" / "scene.noun")
+        header = decode_header(noun_path(root, "ingest", "scene"))
     except _UNREADABLE:
         header = {}
     return root / "capture" / str(header.get("frames", ""))
@@ -192,6 +197,8 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def _plain(value: Any) -> Any:
+    if value is None or type(value) in (str, int, float, bool):  # most of what is asked; a subclass may be NumPy's
+        return value
     if is_dataclass(value) and not isinstance(value, type):
         return _plain(asdict(value))
     if isinstance(value, np.ndarray):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import sqlalchemy
-from sqlalchemy import func, update
+from sqlalchemy import bindparam, func, update
 from sqlalchemy.orm import defer
 from sqlmodel import Session, col, select
 
@@ -25,8 +25,12 @@ def project_row(session: Session, project_id: str) -> Project:
     """The project; NotFound when there is none."""
     found = session.get(Project, project_id)
     if found is None:
-        raise NotFound(f"no project {project_id}", hint="it may have been deleted")
+        raise _no_project(project_id)
     return found
+
+
+def _no_project(project_id: str) -> NotFound:
+    return NotFound(f"no project {project_id}", hint="it may have been deleted")
 
 
 def object_row(session: Session, project_id: str, object_id: int, *, deleted: bool = False) -> SceneObject:
@@ -61,6 +65,45 @@ def who_sees(session: Session, project: Project) -> set[str]:
     """The owner and the members of the project, by name."""
     query = select(Account.name).join(ProjectMember).where(ProjectMember.project_id == project.id)
     return {*session.exec(query), *filter(None, [owner(session, project)])}
+
+
+class Drawn(NamedTuple):
+    """What an object's masks are found by: hundreds are read for each frame that somebody scrubs over."""
+
+    id: int
+    name: str
+    masks_key: str
+
+
+class DrawnIn(NamedTuple):
+    """The same of the project they are in."""
+
+    id: str
+    work_path: str | None
+    segmenter: str
+
+
+_DRAWN_IN = sqlalchemy.select(col(Project.id), col(Project.work_path), col(Project.segmenter)).where(
+    col(Project.id) == bindparam("project")
+)
+_DRAWN = (
+    sqlalchemy.select(col(SceneObject.id), col(SceneObject.name), col(SceneObject.masks_key))
+    .where(col(SceneObject.project_id) == bindparam("project"), col(SceneObject.deleted).is_(False))
+    .order_by(col(SceneObject.id))
+)
+
+
+def drawn_in(session: Session, project_id: str) -> DrawnIn:
+    """What says where a project's masks and frames are; NotFound when there is no such project."""
+    found = session.execute(_DRAWN_IN, {"project": project_id}).first()
+    if found is None:
+        raise _no_project(project_id)
+    return DrawnIn(*found)
+
+
+def drawn(session: Session, project_id: str) -> list[Drawn]:
+    """What the masks of each of the project's objects are found by, oldest first."""
+    return [Drawn(*row) for row in session.execute(_DRAWN, {"project": project_id})]
 
 
 class Click(NamedTuple):

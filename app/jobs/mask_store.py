@@ -62,7 +62,7 @@ class MaskFile:
 class StoredMasks:
     """Masks in a file: only where they are is in memory."""
 
-    path: Path
+    path: Path | str
     index: np.ndarray  # (n, 5): frame, confidence, share of the image, byte where its line begins, bytes of it; by frame
     end: str | None = None
     error: dict[str, Any] | None = None
@@ -77,13 +77,12 @@ class StoredMasks:
 
     def entry(self, frame: int) -> Entry | None:
         """One frame's; None also where the file was begun anew meanwhile."""
-        at = int(np.searchsorted(self.index[:, 0], frame))
+        at = int(self.index[:, 0].searchsorted(frame))
         if at == len(self.index) or self.index[at, 0] != frame:
             return None
-        begin, size = self.index[at, 3:].astype(int)
+        begin, size = self.index[at, 3:].tolist()
         try:
-            with self.path.open("rb", buffering=0) as handle:
-                found: Entry = json.loads(os.pread(handle.fileno(), size, begin))
+            found: Entry = json.loads(_part(self.path, int(begin), int(size)))
         except (OSError, ValueError):
             return None
         return found if found.get("frame") == frame else None
@@ -96,7 +95,12 @@ class StoredMasks:
 
 def mask_path(folder: Path, object_id: int, key: str) -> Path:
     """File of an object's masks."""
-    return folder / str(object_id) / f"{key}.jsonl"
+    return Path(mask_file(str(folder), object_id, key))
+
+
+def mask_file(folder: str, object_id: int, key: str) -> str:
+    """The same as text, for whoever looks at hundreds of objects at once: to make a Path takes longer than to look."""
+    return f"{folder}/{object_id}/{key}.jsonl"
 
 
 def begin(path: Path) -> None:
@@ -130,10 +134,10 @@ def write(path: Path, entries: list[Entry], backend: str) -> None:
     write_atomically(path, b"".join(lines) + json.dumps(end).encode() + b"\n")
 
 
-def read(path: Path) -> StoredMasks | None:
+def read(path: Path | str) -> StoredMasks | None:
     """Where everything in the file is; a line cut off by a crash is dropped; None when there is nothing."""
     try:
-        with path.open("rb") as handle:
+        with open(path, "rb") as handle:
             size = handle.seek(0, os.SEEK_END)
             handle.seek(max(size - _TAIL_BYTES, 0))
             tail = handle.read()
@@ -146,10 +150,19 @@ def read(path: Path) -> StoredMasks | None:
     try:
         return _ended(StoredMasks(path, np.zeros((0, 5))), json.loads(tail[last:]))
     except ValueError:
-        return _scanned(path, path.read_bytes())
+        return _scanned(path, Path(path).read_bytes())
 
 
-def _scanned(path: Path, content: bytes) -> StoredMasks:
+def _part(path: Path | str, begin: int, size: int) -> bytes:
+    """Some bytes of a file."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        return os.pread(handle, size, begin)
+    finally:
+        os.close(handle)
+
+
+def _scanned(path: Path | str, content: bytes) -> StoredMasks:
     """The same from all lines: of a file without an end, or a long one."""
     found, at = StoredMasks(path, np.zeros((0, 5))), 0
     rows: dict[int, list[float]] = {}

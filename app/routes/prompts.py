@@ -1,9 +1,11 @@
 """Objects, clicks, undo, and the masks that follow from them."""
 
 from fastapi import APIRouter
+from fastapi.responses import Response
 
 from app import schemas
 from app.deps import Ctx
+from app.routes.encoded import as_json
 from app.routes.numbers import FrameNumber, RowId
 from app.services import clouds, masks, prompt_files, prompts, undoing
 
@@ -120,7 +122,7 @@ def get_lanes(context: Ctx, project: str) -> list[schemas.Lane]:
     return masks.lanes(context, project)
 
 
-@router.get("/masks/{frame}", operation_id="getMasks")
-def get_masks(context: Ctx, project: str, frame: FrameNumber) -> list[schemas.FrameMask]:
+@router.get("/masks/{frame}", operation_id="getMasks", response_model=list[schemas.FrameMask])
+def get_masks(context: Ctx, project: str, frame: FrameNumber) -> Response:
     """All objects' masks on one frame."""
-    return masks.on_frame(context, project, frame)
+    return as_json(masks.on_frame(context, project, frame))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sqlalchemy import Engine
 
+from app.db.queries import DrawnIn
 from app.db.tables import Project
 from app.errors import Forbidden
 from app.files import ProjectFiles, project_files
@@ -53,6 +54,6 @@ class Context:
                 f"{self.who} is {self.person.role}; this needs a role of {role}", hint="ask an admin of this server"
             )
 
-    def files(self, project: Project) -> ProjectFiles:
+    def files(self, project: Project | DrawnIn) -> ProjectFiles:
         """Where the project's files are."""
         return project_files(self.settings.data_dir, project.id, project.work_path)

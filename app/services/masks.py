@@ -11,21 +11,37 @@ from app import schemas
 from app.db import queries
 from app.db.engine import reading
 from app.db.keys import masks_key
+from app.db.queries import Drawn, DrawnIn
 from app.db.tables import Project, SceneObject
 from app.errors import NotReady
 from app.file_cache import FileCache
 from app.files import ProjectFiles, project_files
 from app.jobs import mask_store
-from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_path
+from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_file, mask_path
 from app.jobs.mask_wire import mask_bits
 from app.services.context import Context
 from r2c2r_core.errors import PromptError
 from r2c2r_core.model.track import MaskTrack
-from r2c2r_core.workspace import Workspace
+from r2c2r_core.workspace import Workspace, noun_path
 
 _INDEX_BYTES = 64 << 20  # of where masks are: 3000 objects of 500 frames
 _STORED: FileCache[StoredMasks | None] = FileCache(_INDEX_BYTES)
 _FINISHED: FileCache[dict[str, str]] = FileCache(1 << 20)
+
+
+FrameMask = dict[str, Any]  # schemas.FrameMask: hundreds are shown at once, and what is stored is what goes over the wire
+
+
+class Places(NamedTuple):
+    """Where a project's masks are."""
+
+    files: ProjectFiles
+    masks: str  # the folder of live ones, as text
+
+    @classmethod
+    def of(cls, files: ProjectFiles) -> "Places":
+        """The places of a project's files."""
+        return cls(files, str(files.masks))
 
 
 class Found(NamedTuple):
@@ -122,42 +138,44 @@ def lanes(context: Context, project_id: str) -> list[schemas.Lane]:
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
-    files = context.files(project)
-    return [_lane(item, found_of(context, project, item, files)) for item in items]
+    places = Places.of(context.files(project))
+    return [_lane(item, found_of(context, project, item, places)) for item in items]
 
 
-def on_frame(context: Context, project_id: str, frame: int) -> list[schemas.FrameMask]:
+def on_frame(context: Context, project_id: str, frame: int) -> list[FrameMask]:
     """All objects' masks on one frame."""
     return on_frames(context, project_id, {frame})[frame]
 
 
-def on_frames(context: Context, project_id: str, frames: set[int]) -> dict[int, list[schemas.FrameMask]]:
+def on_frames(context: Context, project_id: str, frames: set[int]) -> dict[int, list[FrameMask]]:
     """All objects' masks, by frame."""
     with reading(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        items = queries.live_objects(session, project_id)
-    shown: dict[int, list[schemas.FrameMask]] = {frame: [] for frame in frames}
-    files = context.files(project)
+        project = queries.drawn_in(session, project_id)
+        items = queries.drawn(session, project_id)
+    shown: dict[int, list[FrameMask]] = {frame: [] for frame in frames}
+    places = Places.of(context.files(project))
     for item in items:
-        found = found_of(context, project, item, files)
+        found = found_of(context, project, item, places)
         for frame in frames if found else ():
             if found and (entry := found.masks.entry(frame)) is not None:
-                shown[frame].append(_frame_mask(item, found, entry))
+                shown[frame].append(_frame_mask(item.id, found, entry))
     return shown
 
 
-def found_of(context: Context, project: Project, item: SceneObject, files: ProjectFiles | None = None) -> Found | None:
-    """The masks that belong to the object's clicks; None while there are none. Who asks for many gives the project's files."""
-    number, key, files = item.id or 0, item.masks_key, files or context.files(project)
+def found_of(
+    context: Context, project: Project | DrawnIn, item: SceneObject | Drawn, places: Places | None = None
+) -> Found | None:
+    """The masks that belong to the object's clicks; None while there are none. Who asks for many gives the places."""
+    number, key, places = item.id or 0, item.masks_key, places or Places.of(context.files(project))
     if not key:
         return None
     live = context.live.task(project.id, number, key)
     if live is not None:
         return Found(*live, "live")
-    stored = _stored(mask_path(files.masks, number, key))
+    stored = _stored(mask_file(places.masks, number, key))
     if stored is not None and stored.end == "done":
         return Found("done", stored, "live")
-    run = _run_masks(files, item, project.segmenter, context.settings.preview_width)
+    run = _run_masks(places.files, item, project.segmenter, context.settings.preview_width)
     if run is not None:
         return Found("done", run, "run")
     if stored is None:
@@ -165,14 +183,9 @@ def found_of(context: Context, project: Project, item: SceneObject, files: Proje
     return Found("failed" if stored.end == "failed" else "partial", stored, "live")
 
 
-def _frame_mask(item: SceneObject, found: Found, entry: Entry) -> schemas.FrameMask:
-    return schemas.FrameMask(
-        object=item.id or 0,
-        frame=entry["frame"],
-        confidence=entry["confidence"],
-        source=found.source,  # type: ignore[arg-type]  # it is one of the two
-        mask=schemas.MaskBits(**entry["mask"]),
-    )
+def _frame_mask(number: int, found: Found, entry: Entry) -> FrameMask:
+    shown = {"object": number, "frame": entry["frame"], "confidence": entry["confidence"]}
+    return shown | {"source": found.source, "mask": entry["mask"]}
 
 
 def _start(context: Context, project: Project, item: SceneObject, clicks: list[queries.Click]) -> None:
@@ -195,10 +208,12 @@ def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
     )
 
 
-def _run_masks(files: ProjectFiles, item: SceneObject, segmenter: str, width: int) -> StoredMasks | None:
+def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, width: int) -> StoredMasks | None:
     """The last run's masks, when it ran with these clicks and this segmenter; made for the browser once."""
-    noun = Workspace(files.work).noun_path("segment", item.name)
-    if not noun.is_file() or _finished_key(files, segmenter, item.name) != item.masks_key:
+    if _finished_key(files, segmenter, item.name) != item.masks_key:
+        return None
+    noun = noun_path(files.work, "segment", item.name)
+    if not noun.is_file():
         return None
     kept = files.previews / "masks" / f"{item.name}-{noun.stat().st_mtime_ns:x}.jsonl"
     if not kept.is_file():
@@ -242,5 +257,5 @@ def _click(point: dict[str, Any]) -> tuple[int, float, float, int]:
     return int(point["frame"]), float(point["x"]), float(point["y"]), int(point["label"])
 
 
-def _stored(path: Path) -> StoredMasks | None:
+def _stored(path: Path | str) -> StoredMasks | None:
     return _STORED.get(path, lambda: mask_store.read(path), lambda found, _: found.bytes if found else 0)

@@ -82,7 +82,7 @@ def candidate_png(context: Context, project_id: str, object_id: int, candidate: 
 
 def _files(context: Context, project_id: str) -> ProjectFiles:
     with reading(context.engine) as session:
-        return context.files(queries.project_row(session, project_id))
+        return context.files(queries.drawn_in(session, project_id))
 
 
 def _object_files(context: Context, project_id: str, object_id: int) -> tuple[ProjectFiles, str]:

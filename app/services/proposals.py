@@ -122,20 +122,20 @@ def _without_covered(context: Context, project_id: str, lines: list[dict[str, An
     shown = masks.on_frames(context, project_id, {line["frame"] for line in lines})
     left = []
     for line in lines:
-        near = [found.mask for found in shown[line["frame"]] if _may_cover(found.mask, line["mask"])]
-        if not is_taken(bits_mask(line["mask"]), (bits_mask(mask.model_dump()) for mask in near)):
+        near = [found["mask"] for found in shown[line["frame"]] if _may_cover(found["mask"], line["mask"])]
+        if not is_taken(bits_mask(line["mask"]), (bits_mask(mask) for mask in near)):
             left.append(line)
     return left
 
 
-def _may_cover(mask: schemas.MaskBits, outline: dict[str, Any]) -> bool:
+def _may_cover(mask: dict[str, Any], outline: dict[str, Any]) -> bool:
     """Whether their boxes meet: most of a kitchen's masks need not be unpacked."""
     return (
-        (mask.width, mask.height) == (outline["width"], outline["height"])
-        and mask.left < outline["left"] + outline["box_width"]
-        and outline["left"] < mask.left + mask.box_width
-        and mask.top < outline["top"] + outline["box_height"]
-        and outline["top"] < mask.top + mask.box_height
+        (mask["width"], mask["height"]) == (outline["width"], outline["height"])
+        and mask["left"] < outline["left"] + outline["box_width"]
+        and outline["left"] < mask["left"] + mask["box_width"]
+        and mask["top"] < outline["top"] + outline["box_height"]
+        and outline["top"] < mask["top"] + mask["box_height"]
     )
 
 
