@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from app.security import Role
+from app.services import sending
 from app.services.context import Context
 
 
@@ -16,6 +17,7 @@ def context_for(role: Role) -> Callable[[Request], Awaitable[Context]]:
     async def get_context(request: Request) -> Context:
         context: Context = replace(request.app.state.context, person=request.state.person)
         context.require(role)
+        sending.promise(request.scope["route"].status_code or 200)
         return context
 
     return get_context

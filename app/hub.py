@@ -74,17 +74,20 @@ class Hub:
     _listeners: set[Listener] = field(default_factory=set)
     _recent: "deque[Message]" = field(default_factory=lambda: deque())
     _recent_bytes: int = 0
+    _told: dict[tuple[str, int], int] = field(default_factory=dict)  # versions, by what they are of
     _presence_due: set[str] = field(default_factory=set)  # projects whose people will be told who is here
 
     def publish(self, type: str, project: str | None, **content: Any) -> None:
         """Number the message, remember it, hand it to every tab that wants it."""
         with self._lock:
-            self._seq += 1
-            message = self._message(type, project, content)
-            self._remember(message)
-            for listener in tuple(self._listeners):
-                if listener.wants(message):
-                    self._hand(listener, message)
+            self._publish(type, project, content)
+
+    def publish_state(self, type: str, project: str, number: int, version: int, **content: Any) -> None:
+        """The same of how a row is by now; nothing once a newer version of it was told: who stored first may come second."""
+        with self._lock:
+            if version >= self._told.get((type, number), version):
+                self._told[type, number] = version
+                self._publish(type, project, content)
 
     def tell(self, listener: Listener, type: str, **content: Any) -> None:
         """Say something to one tab alone; it is not remembered."""
@@ -147,6 +150,14 @@ class Hub:
     def seq(self) -> int:
         """Number of the last message."""
         return self._seq
+
+    def _publish(self, type: str, project: str | None, content: dict[str, Any]) -> None:
+        self._seq += 1
+        message = self._message(type, project, content)
+        self._remember(message)
+        for listener in tuple(self._listeners):
+            if listener.wants(message):
+                self._hand(listener, message)
 
     def _message(self, type: str, project: str | None, content: dict[str, Any]) -> Message:
         said = {"type": type, "seq": self._seq, "project": project, **content}

@@ -14,12 +14,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import func, update
+import sqlalchemy
+from sqlalchemy import bindparam, func, update
 from sqlalchemy.orm import aliased
 from sqlmodel import Session, col, delete, select
 
 from app.db.keys import note_object, note_project
-from app.db.queries import clicks_of
+from app.db.queries import Click, clicks_of
 from app.db.tables import Event, Override, Point, Project, SceneObject, Verdict
 from app.errors import Conflict
 
@@ -48,7 +49,7 @@ def change(
     after = snapshot(session, item, scope)
     if after != before:
         _forget_undone(session, item, scope)
-        event = _record(session, item, scope, action, text, who=who, frame=frame)
+        event = _record(session, item, scope, action, text, who=who, frame=frame, state=after)
         event.before, event.after, event.standing = _without(before, after), _without(after, before), "done"
 
 
@@ -80,6 +81,19 @@ def steps(session: Session, project_id: str, scope: Scope, object_id: int | None
         query = query.where(Event.object_id == object_id)
     standing = set(session.exec(query.where(col(Event.standing).in_(("done", "undone"))).distinct()))
     return {key: Steps((key, "done") in standing, (key, "undone") in standing) for key, _ in standing}
+
+
+def steps_and_saved(session: Session, item: SceneObject, scope: Scope) -> tuple[Steps, float]:
+    """An object's steps, and when the last change about it was stored, whatever it was of; by one question."""
+    found = session.execute(_STEPS_AND_SAVED, {"project": item.project_id, "object": item.id, "of": scope}).one()
+    return Steps(bool(found[0]), bool(found[1])), found[2] or 0.0
+
+
+_STEPS_AND_SAVED = sqlalchemy.select(
+    func.max((col(Event.scope) == bindparam("of")) & (col(Event.standing) == "done")),
+    func.max((col(Event.scope) == bindparam("of")) & (col(Event.standing) == "undone")),
+    func.max(col(Event.at)),
+).where(col(Event.project_id) == bindparam("project"), col(Event.object_id) == bindparam("object"))
 
 
 def last_change(session: Session, project_id: str, scope: Scope, direction: Literal["undo", "redo"]) -> int | None:
@@ -168,11 +182,26 @@ def _replace(session: Session, item: SceneObject, scope: Scope, there: State, wa
     session.flush()
 
 
-def _record(session: Session, item: SceneObject, scope: Scope, action: str, text: str, *, who: str, frame: int | None) -> Event:
-    """An event of now, and what is stored with every change: the object's version and keys, the project's."""
+def _record(
+    session: Session,
+    item: SceneObject,
+    scope: Scope,
+    action: str,
+    text: str,
+    *,
+    who: str,
+    frame: int | None,
+    state: State | None = None,
+) -> Event:
+    """An event of now, and what is stored with every change: the object's version and keys, the project's.
+
+    `state` is the object's in that scope, where it was just read.
+    """
     project = session.get_one(Project, item.project_id)
     require_open(project)
-    clicks, override = clicks_of(session, item.id), override_data(session, item)
+    read = state if state is not None else snapshot(session, item, scope)
+    clicks = _clicks_in(read) if scope == "prompts" else clicks_of(session, item.id)
+    override = _named(read, _CORRECTION) if scope == "review" else override_data(session, item)
     item.version += 1  # after the questions, which store what was set before them: each row is written once
     note_object(session, item, project.segmenter, clicks, override)
     note_project(session, project)
@@ -188,6 +217,11 @@ def _without(state: State, other: State) -> State:
     return {key: value for key, value in state.items() if key not in other or other[key] != value}
 
 
+def _clicks_in(state: State) -> list[Click]:
+    """`clicks_of`, from a state."""
+    return [Click(id=int(number), **click) for number, click in _named(state, _POINT).items()]
+
+
 def _named(state: State, kind: str) -> State:
     """The state's entries of that kind, by what follows it."""
     return {key.removeprefix(kind): value for key, value in state.items() if key.startswith(kind)}
@@ -200,12 +234,22 @@ def _standing(item: SceneObject, scope: Scope, standing: str) -> Any:
 
 def _forget_undone(session: Session, item: SceneObject, scope: Scope) -> None:
     """What was undone cannot be redone over something else."""
-    mine = (col(Event.project_id) == item.project_id, col(Event.object_id) == item.id, col(Event.scope) == scope)
-    session.exec(update(Event).where(*mine, col(Event.standing) == "undone").values(standing="gone"))
+    session.execute(_FORGET_UNDONE, {"project": item.project_id, "object": item.id, "of": scope})
+
+
+_FORGET_UNDONE = (
+    update(Event)
+    .where(col(Event.project_id) == bindparam("project"), col(Event.object_id) == bindparam("object"))
+    .where(col(Event.scope) == bindparam("of"), col(Event.standing) == "undone")
+    .values(standing="gone")
+)
 
 
 def _override(session: Session, item: SceneObject) -> Override | None:
-    return session.exec(select(Override).where(Override.object_id == item.id)).first()
+    return session.execute(_OVERRIDE, {"object": item.id}).scalars().first()
+
+
+_OVERRIDE = select(Override).where(col(Override.object_id) == bindparam("object"))
 
 
 def _refuse_taken_name(session: Session, item: SceneObject, wanted: State) -> None:

@@ -8,7 +8,8 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from sqlmodel import Session, col, select
+from sqlalchemy import bindparam, select
+from sqlmodel import Session, col
 
 from app.db.queries import Click, clicks_by_object, live_objects
 from app.db.tables import Project, SceneObject
@@ -57,10 +58,17 @@ def note_object(session: Session, item: SceneObject, segmenter: str, clicks: lis
 def note_project(session: Session, project: Project) -> None:
     """Store the key of everything a person gave, after something of it changed."""
     session.flush()
-    mine = select(SceneObject.inputs).where(SceneObject.project_id == project.id, col(SceneObject.deleted).is_(False))
-    given = session.exec(mine.where(SceneObject.inputs != "").order_by(col(SceneObject.id))).all()
-    project.inputs = content_key(list(given), project.segmenter, _chosen(project))
+    given = [inputs for (inputs,) in session.execute(_GIVEN, {"project": project.id})]
+    project.inputs = content_key(given, project.segmenter, _chosen(project))
     session.add(project)
+
+
+_GIVEN = (
+    select(col(SceneObject.inputs))
+    .where(col(SceneObject.project_id) == bindparam("project"), col(SceneObject.deleted).is_(False))
+    .where(col(SceneObject.inputs) != "")
+    .order_by(col(SceneObject.id))
+)
 
 
 def note_segmenter(session: Session, project: Project) -> None:

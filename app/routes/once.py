@@ -61,7 +61,8 @@ class Once:
             await self.app(scope, receive, hold)
         status = said[0]["status"]
         if status < 300:
-            body = b"".join(message.get("body", b"") for message in said[1:])
-            await anyio.to_thread.run_sync(sending.keep, context, change, Answer(status, body.decode()))
+            answer = Answer(status, b"".join(message.get("body", b"") for message in said[1:]).decode())
+            if answer != change.kept:
+                await anyio.to_thread.run_sync(sending.keep, context, change, answer)
         for message in said:
             await send(message)

@@ -12,10 +12,10 @@ from app.services import clouds, masks, prompt_files, prompts, undoing
 router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
 
 
-@router.get("/objects", operation_id="listObjects")
-def list_objects(context: Ctx, project: str, deleted: bool = False) -> list[schemas.SceneObject]:
+@router.get("/objects", operation_id="listObjects", response_model=list[schemas.SceneObject])
+def list_objects(context: Ctx, project: str, deleted: bool = False) -> Response:
     """The project's objects in the order they were made; deleted ones too when asked."""
-    return prompts.list_objects(context, project, deleted)
+    return as_json(prompts.list_objects(context, project, deleted))
 
 
 @router.post("/objects", operation_id="createObject", status_code=201)

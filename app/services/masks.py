@@ -123,14 +123,25 @@ def resume(context: Context) -> None:
             segment(context, project_id, number or 0)
 
 
-def state_of(context: Context, project: Project, item: SceneObject) -> tuple[schemas.SegmentState, int, list[str]]:
+def state_of(
+    context: Context, project: Project, item: SceneObject, places: Places | None = None
+) -> tuple[schemas.SegmentState, int, list[str]]:
     """How far the object's masks are, on how many frames it is seen, and what went wrong."""
-    found = found_of(context, project, item)
+    found = found_of(context, project, item, places)
     if found is None:
         return "none", 0, []
     error = found.masks.error
     notices = [f"{error['message']}; {error['hint']}".rstrip("; ")] if error else []
     return found.state, len(found.masks), notices
+
+
+def state_after_follow(context: Context, project: Project, item: SceneObject) -> tuple[schemas.SegmentState, int, list[str]]:
+    """`state_of` as it will be once `follow` was there."""
+    found = found_of(context, project, item)
+    done = found is not None and found.state == "done"
+    if item.masks_key and not item.deleted and not done and project.status == "ready":
+        return "waiting", 0, []
+    return state_of(context, project, item)
 
 
 def lanes(context: Context, project_id: str) -> list[schemas.Lane]:

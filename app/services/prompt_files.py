@@ -5,7 +5,7 @@ from app.db import queries
 from app.db.engine import reading, writing
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
-from app.services.prompts import after_change, check_point
+from app.services.prompts import after_change, change_of, check_point
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
@@ -27,7 +27,8 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
             for point in entry.points:
                 check_point(context, project, point.frame, point.x, point.y)
         items = adopt_prompts(session, project, body.model_dump(), context.who)
-    return [after_change(context, project_id, item.id, infer=False) for item in items]
+        changes = [change_of(context, session, project, item, infer=False) for item in items]
+    return [after_change(context, change) for change in changes]
 
 
 def _file_point(click: queries.Click) -> schemas.PromptsFilePoint:

@@ -1,12 +1,13 @@
 """Objects and clicks. Every change is stored, with what was before it, before the answer goes out."""
 
 import re
+from typing import Any, NamedTuple
 
 from sqlalchemy import func
 from sqlmodel import Session, select
 
 from app import schemas
-from app.db import history, queries
+from app.db import history, once, queries
 from app.db.engine import reading, writing
 from app.db.tables import Point, Project, SceneObject
 from app.errors import Conflict, NotFound
@@ -15,28 +16,42 @@ from app.services.context import Context
 from app.services.projects import frame_table
 from r2c2r_core.errors import PromptError
 
+
+class Change(NamedTuple):
+    """An object that was changed, and how it goes over the wire."""
+
+    project: Project
+    item: SceneObject
+    shape: schemas.SceneObject
+    infer: bool
+
+
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 
-def list_objects(context: Context, project_id: str, deleted: bool) -> list[schemas.SceneObject]:
-    """The project's objects in the order they were made."""
+def list_objects(context: Context, project_id: str, deleted: bool) -> list[dict[str, Any]]:
+    """The project's objects in the order they were made, as schemas.SceneObject says: thousands of clicks, as stored."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id, deleted=deleted)
         clicks = queries.clicks_by_object(session, project_id)
         steps = history.steps(session, project_id, "prompts")
         saved = queries.saved(session, project_id)
+    places = masks.Places.of(context.files(project))
     return [
-        _shape(
-            context, project, item, clicks.get(item.id or 0, []), steps.get(item.id, history.Steps()), saved.get(item.id, 0.0)
-        )
+        _shape(context, project, item, [], steps.get(item.id, history.Steps()), saved.get(item.id, 0.0), places).model_dump()
+        | {"points": [click._asdict() for click in clicks.get(item.id or 0, [])]}
         for item in items
     ]
 
 
 def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
     """A new object, with its first clicks if there are any."""
-    return create_all(context, project_id, [body], infer, what="added")[0]
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = _create(context, session, project, body, "added")
+        change = answered_change(context, session, project, item, infer and bool(body.points))
+    return after_change(context, change)
 
 
 def create_all(
@@ -45,8 +60,12 @@ def create_all(
     """New objects, all or none; `what` was done, as the history says it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        made = [(_create(context, session, project, body, what).id, infer and bool(body.points)) for body in bodies]
-    return [after_change(context, project_id, number, follow) for number, follow in made]
+        items = [_create(context, session, project, body, what) for body in bodies]
+        made = [
+            change_of(context, session, project, item, infer and bool(body.points))
+            for item, body in zip(items, bodies, strict=True)
+        ]
+    return [after_change(context, change) for change in made]
 
 
 def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
@@ -61,7 +80,8 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
-    return after_change(context, project_id, object_id, infer="category" in wanted)
+        change = answered_change(context, session, project, item, infer="category" in wanted)
+    return after_change(context, change)
 
 
 def refuse_overtaken(
@@ -77,12 +97,14 @@ def refuse_overtaken(
 def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """Take the object out; undo brings it back."""
     with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.who):
             item.deleted = True
             session.add(item)
+        change = answered_change(context, session, project, item, infer=False)
     context.live.cancel(project_id, object_id)
-    return after_change(context, project_id, object_id, infer=False)
+    return after_change(context, change)
 
 
 def add_point(context: Context, project_id: str, object_id: int, body: schemas.PointIn, infer: bool) -> schemas.SceneObject:
@@ -94,7 +116,8 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
         text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
         with history.change(session, item, "prompts", "add point", text, who=context.who, frame=body.frame):
             session.add(Point(object_id=item.id or 0, **body.model_dump()))
-    return after_change(context, project_id, object_id, infer)
+        change = answered_change(context, session, project, item, infer)
+    return after_change(context, change)
 
 
 def add_points(context: Context, project_id: str, object_id: int, body: schemas.PointsIn, infer: bool) -> schemas.SceneObject:
@@ -108,7 +131,8 @@ def add_points(context: Context, project_id: str, object_id: int, body: schemas.
         text = f"{len(body.points)} points on {item.name}, frame {frame}"
         with history.change(session, item, "prompts", "add points", text, who=context.who, frame=frame):
             session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
-    return after_change(context, project_id, object_id, infer)
+        change = answered_change(context, session, project, item, infer)
+    return after_change(context, change)
 
 
 def move_point(
@@ -125,18 +149,21 @@ def move_point(
         with history.change(session, item, "prompts", "move point", text, who=context.who, frame=point.frame):
             point.sqlmodel_update(changes)
             session.add(point)
-    return after_change(context, project_id, object_id, infer)
+        change = answered_change(context, session, project, item, infer)
+    return after_change(context, change)
 
 
 def delete_point(context: Context, project_id: str, object_id: int, point_id: int, infer: bool) -> schemas.SceneObject:
     """Take a click away."""
     with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         text = f"removed a point of {item.name}, frame {point.frame}"
         with history.change(session, item, "prompts", "remove point", text, who=context.who, frame=point.frame):
             session.delete(point)
-    return after_change(context, project_id, object_id, infer)
+        change = answered_change(context, session, project, item, infer)
+    return after_change(context, change)
 
 
 def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
@@ -178,29 +205,52 @@ def object_shape(context: Context, project_id: str, object_id: int) -> schemas.S
 
 def tell_object(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """Show the object's state to every tab."""
-    shape = object_shape(context, project_id, object_id)
-    context.hub.publish("object", project_id, object=shape.model_dump())
+    return _tell(context, object_shape(context, project_id, object_id))
+
+
+def change_of(context: Context, session: Session, project: Project, item: SceneObject, infer: bool) -> Change:
+    """An object that the transaction changes; with `infer`, its masks will follow."""
+    shape = _shape_of(context, session, project, item)
+    if infer:
+        shape = _with_masks(shape, project, masks.state_after_follow(context, project, item))
+    return Change(project, item, shape, infer)
+
+
+def answered_change(context: Context, session: Session, project: Project, item: SceneObject, infer: bool) -> Change:
+    """`change_of`, whose shape is the answer: it is stored with the change."""
+    change = change_of(context, session, project, item, infer)
+    once.keep_answer(session, change.shape.model_dump_json())
+    return change
+
+
+def after_change(context: Context, change: Change) -> schemas.SceneObject:
+    """What follows from a stored change: masks where asked for, and every tab told."""
+    if change.infer:
+        masks.follow(context, change.project.id, change.shape.id)
+    now = masks.state_of(context, change.project, change.item)
+    return _tell(context, _with_masks(change.shape, change.project, now))
+
+
+def _tell(context: Context, shape: schemas.SceneObject) -> schemas.SceneObject:
+    context.hub.publish_state("object", shape.project, shape.id, shape.version, object=shape.model_dump())
     return shape
 
 
-def after_change(context: Context, project_id: str, object_id: int | None, infer: bool) -> schemas.SceneObject:
-    """What follows from a stored change: masks where asked for, and every tab told."""
-    if infer and object_id is not None:
-        masks.follow(context, project_id, object_id)
-    return tell_object(context, project_id, object_id or 0)
-
-
 def _shape_of(context: Context, session: Session, project: Project, item: SceneObject) -> schemas.SceneObject:
-    steps = history.steps(session, project.id, "prompts", item.id).get(item.id, history.Steps())
-    saved = queries.saved(session, project.id, item.id).get(item.id, 0.0)
+    steps, saved = history.steps_and_saved(session, item, "prompts")
     return _shape(context, project, item, queries.clicks_of(session, item.id), steps, saved)
 
 
 def _shape(
-    context: Context, project: Project, item: SceneObject, clicks: list[queries.Click], steps: history.Steps, saved: float
+    context: Context,
+    project: Project,
+    item: SceneObject,
+    clicks: list[queries.Click],
+    steps: history.Steps,
+    saved: float,
+    places: masks.Places | None = None,
 ) -> schemas.SceneObject:
-    state, frames, notices = masks.state_of(context, project, item)
-    return schemas.SceneObject(
+    shape = schemas.SceneObject(
         id=item.id or 0,
         project=item.project_id,
         name=item.name,
@@ -211,12 +261,23 @@ def _shape(
         points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
         can_undo=steps.undo,
         can_redo=steps.redo,
-        segment=state,
-        mask_frames=frames,
-        mask_backend=project.segmenter if frames else "",
-        notices=[*notices, *_category_notice(item.category)],
+        segment="none",
+        mask_frames=0,
+        mask_backend="",
+        notices=[],
         saved=saved,
     )
+    return _with_masks(shape, project, masks.state_of(context, project, item, places))
+
+
+def _with_masks(
+    shape: schemas.SceneObject, project: Project, state: tuple[schemas.SegmentState, int, list[str]]
+) -> schemas.SceneObject:
+    """The object with its masks in that state."""
+    segment, frames, notices = state
+    said = [*notices, *_category_notice(shape.category)]
+    backend = project.segmenter if frames else ""
+    return shape.model_copy(update={"segment": segment, "mask_frames": frames, "mask_backend": backend, "notices": said})
 
 
 def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:

@@ -2,28 +2,19 @@
 
 import hashlib
 import time
-from dataclasses import dataclass
 from urllib.parse import unquote
 
 from app.db import once
 from app.db.engine import reading, writing
-from app.db.once import Sending, marked
+from app.db.once import Answer, Sending, marked, promise
 from app.errors import Conflict, Unauthorised
 from app.security import Person
 from app.services.context import Context
 from r2c2r_core.errors import InputError
 
-__all__ = ["Answer", "Sending", "answer_of", "keep", "marked", "sending", "tidy"]
+__all__ = ["Answer", "Sending", "answer_of", "keep", "marked", "promise", "sending", "tidy"]
 
 LONGEST_KEY = 100
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What was answered the first time."""
-
-    status: int
-    body: str
 
 
 def sending(person: Person, key: str, method: str, path: str) -> Sending:
@@ -58,7 +49,7 @@ def answer_of(context: Context, change: Sending) -> Answer | None:
 
 
 def keep(context: Context, change: Sending, answer: Answer) -> None:
-    """Remember the answer."""
+    """Remember the answer that could not be stored with the change."""
     with writing(context.engine) as session:
         once.answered(session, change.digest, answer.status, answer.body)
 

@@ -5,7 +5,7 @@ from typing import Literal
 from sqlmodel import Session
 
 from app import schemas
-from app.db import history, queries
+from app.db import history, once, queries
 from app.db.engine import writing
 from app.db.tables import Project, SceneObject
 from app.errors import Conflict
@@ -36,10 +36,13 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
         step = history.undo if direction == "undo" else history.redo
         event = step(session, item, body.scope, who=context.who)
         version = item.version if body.scope == "prompts" else history.version_of(session, item, "review")
-    shape = prompts.after_change(context, project_id, number, infer=body.scope == "prompts")
+        change = prompts.change_of(context, session, project, item, infer=body.scope == "prompts")
+        undone = schemas.Undone(object=change.shape, text=event.text, frame=event.frame, version=version)
+        once.keep_answer(session, undone.model_dump_json())
+    shape = prompts.after_change(context, change)
     if body.scope == "review":
         context.hub.publish("review", project_id, object=number)
-    return schemas.Undone(object=shape, text=event.text, frame=event.frame, version=version)
+    return undone.model_copy(update={"object": shape})
 
 
 def _refuse_overtaken(

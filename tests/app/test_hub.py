@@ -142,6 +142,18 @@ def test_many_tabs_that_come_at_once_are_told_once_who_is_here() -> None:
     asyncio.run(scene())
 
 
+def test_an_older_state_that_comes_late_is_not_told() -> None:
+    async def scene() -> None:
+        hub = Hub()
+        tab = hub.join("kitchen", None, None)
+        for number, version in ((1, 2), (1, 1), (2, 1), (1, 2), (1, 3)):
+            hub.publish_state("object", "kitchen", number, version, said=(number, version))
+        await asyncio.sleep(0)
+        assert [each["said"] for each in told(tab, "object")] == [[1, 2], [2, 1], [1, 2], [1, 3]]
+
+    asyncio.run(scene())
+
+
 def told(listener: Listener, *types: str) -> list[dict[str, Any]]:
     """The messages that wait for a tab, of these types or all."""
     found = [json.loads(listener.queue.get_nowait()) for _ in range(listener.queue.qsize())]

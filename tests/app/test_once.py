@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import event
 from sqlmodel import select
 
 from app.db import once
@@ -78,14 +79,30 @@ def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_store
 ) -> None:
     with start() as web:
         at = f"/api/projects/{web.sample()}"
-        before = len(web.get(f"{at}/objects")[0]["points"])
         with monkeypatch.context() as patch:
             patch.setattr(sending, "keep", lambda *_: None)  # the server is gone
-            keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
+            keyed(web, "POST", f"{at}/comments", "k", {"text": "look"})
     with start() as web:
-        again = keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
+        again = keyed(web, "POST", f"{at}/comments", "k", {"text": "look"})
         assert (again.status_code, "is stored" in again.json()["message"]) == (409, True)
-        assert len(web.get(f"{at}/objects")[0]["points"]) == before + 1
+        assert len(web.get(f"{at}/comments")) == 1
+
+
+def test_a_click_and_its_answer_are_one_transaction(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    commits: list[object] = []
+    with start() as web:
+        at = f"/api/projects/{web.sample()}"
+        event.listen(web.context.engine, "commit", commits.append)
+        monkeypatch.setattr(sending, "keep", lambda *_: None)  # the server is gone once the change is stored
+        first = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
+        undone = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
+        assert len(commits) == 2
+    with start() as web:
+        click = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
+        undo = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
+        assert (click.status_code, click.content) == (201, first.content)
+        assert (undo.status_code, undo.json()["object"]["version"]) == (200, undone.json()["object"]["version"])
+        assert web.get(f"{at}/objects")[0]["points"] == undone.json()["object"]["points"]
 
 
 def test_what_was_refused_is_not_remembered(web: Running, at: str) -> None:
