@@ -51,6 +51,11 @@ class ProjectFiles:
         return self.root / "previews"
 
     @property
+    def kept_facts(self) -> Path:
+        """What was read from nouns for the browser; may be deleted at any time."""
+        return self.previews / "facts.json"
+
+    @property
     def masks(self) -> Path:
         """Live masks, one file per object and prompt state."""
         return self.root / "masks"

@@ -118,6 +118,13 @@ class Workspace:
             return None
         return self._attached(noun, header)
 
+    def load_bare(self, stage: str, name: str) -> Any | None:
+        """`load_latest` without a capture's images: its cameras alone need none of what reads those."""
+        try:
+            return decode_noun(self.noun_path(stage, name).read_bytes())[0]
+        except _UNREADABLE:
+            return None
+
     def names(self, stage: str) -> list[str]:
         """Names of the nouns a stage has stored."""
         return sorted(path.stem for path in (self.root / "nouns" / stage).glob("*.noun"))

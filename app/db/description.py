@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from sqlmodel import Session, col, select
 
 from app.db import queries
-from app.db.tables import Bundle, Comment, Event, Override, Point, Project, SceneObject, Verdict
+from app.db.tables import Bundle, Comment, Event, Override, Project, SceneObject, Verdict
 from app.files import ProjectFiles
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
@@ -23,9 +23,8 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
     of_project = SceneObject.project_id == project.id
     objects = session.exec(select(SceneObject).where(of_project).order_by(col(SceneObject.id))).all()
     points: dict[int, list[DescribedPoint]] = defaultdict(list)
-    for point in session.exec(select(Point).join(SceneObject).where(of_project).order_by(col(Point.id))):
-        click = DescribedPoint.model_construct(frame=point.frame, x=point.x, y=point.y, label=point.label)
-        points[point.object_id].append(click)
+    for number, clicks in queries.clicks_by_object(session, project.id).items():
+        points[number] = [DescribedPoint.model_construct(frame=c.frame, x=c.x, y=c.y, label=c.label) for c in clicks]
     verdicts: dict[int, list[dict[str, Any]]] = defaultdict(list)
     for verdict in session.exec(select(Verdict).join(SceneObject).where(of_project).order_by(col(Verdict.id))):
         verdicts[verdict.object_id].append(verdict.model_dump(exclude={"id", "object_id"}))

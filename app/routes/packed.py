@@ -4,6 +4,7 @@ Pictures, meshes and bundles are compressed already, and live connections are no
 """
 
 import zlib
+from typing import Any
 
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
@@ -37,8 +38,7 @@ class _Packing:
     def __init__(self, send: Send, threads: anyio.CapacityLimiter) -> None:
         self._send, self._threads = send, threads
         self._start: Message | None = None  # until it is known how much follows
-        self._packer = zlib.compressobj(LEVEL, zlib.DEFLATED, GZIP)
-        self._packs = False
+        self._packer: Any = None  # where the answer gains by it; to make one takes as long as a small answer
 
     async def send(self, message: Message) -> None:
         """Pass a message on, its bytes packed."""
@@ -49,7 +49,7 @@ class _Packing:
             if self._start is not None:
                 await self._begin(self._start, message)
                 self._start = None
-            if self._packs:
+            if self._packer is not None:
                 more = message.get("more_body", False)
                 message = {**message, "body": await self._packed(message.get("body", b""), more)}
         await self._send(message)
@@ -59,8 +59,9 @@ class _Packing:
         if headers.get("content-type", "").startswith(PACKED) and "content-encoding" not in headers:
             headers.add_vary_header("Accept-Encoding")
             more, size = first.get("more_body", False), len(first.get("body", b""))
-            self._packs = start["status"] == 200 and "content-range" not in headers and (more or size >= LEAST_BYTES)
-        if self._packs:
+            if start["status"] == 200 and "content-range" not in headers and (more or size >= LEAST_BYTES):
+                self._packer = zlib.compressobj(LEVEL, zlib.DEFLATED, GZIP)
+        if self._packer is not None:
             headers["content-encoding"] = "gzip"
             for name in ("content-length", "accept-ranges"):
                 del headers[name]
@@ -72,5 +73,5 @@ class _Packing:
         return await anyio.to_thread.run_sync(self._pack, body, more, limiter=self._threads)
 
     def _pack(self, body: bytes, more: bool) -> bytes:
-        packed = self._packer.compress(body)
-        return packed if more else packed + self._packer.flush()
+        packed: bytes = self._packer.compress(body)
+        return packed if more else packed + bytes(self._packer.flush())

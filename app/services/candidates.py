@@ -14,9 +14,10 @@ from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services import views
 from app.services.context import Context
+from app.services.views import KeptFacts
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.schema.overrides import MOST_BATCHES
-from r2c2r_core.workspace import Workspace
+from r2c2r_core.workspace import noun_path
 
 
 class _Said(NamedTuple):
@@ -43,17 +44,22 @@ def groups_of(
         versions=history.versions(session, project.id, "review", of),
     )
     files = context.files(project)
-    return [group for item in items if (group := _group(files, project, item, said)) is not None]
+    kept = KeptFacts(files)
+    groups = [group for item in items if (group := _group(files, kept, project, item, said)) is not None]
+    kept.keep()
+    return groups
 
 
-def _group(files: ProjectFiles, project: Project, item: SceneObject, said: _Said) -> schemas.CandidateGroup | None:
-    facts = facts_of(files, item.name)
+def _group(
+    files: ProjectFiles, kept: KeptFacts, project: Project, item: SceneObject, said: _Said
+) -> schemas.CandidateGroup | None:
+    facts = kept.of("generate", item.name, _candidate_facts)
     if facts is None:
         return None
     override, verdicts = said.overrides.get(item.id or 0, {}), said.verdicts.get(item.id or 0, {})
     accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
     steps = said.steps.get(item.id, history.Steps())
-    placement = views.facts(files, "align", item.name, plain)
+    placement = kept.of("align", item.name, plain)
     by_person: str | None = override.get("candidate")
     known = {c["candidate_id"] for c in facts["candidates"]}
     chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
@@ -139,5 +145,5 @@ def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
 
 def generate_key(files: ProjectFiles, name: str) -> str:
     """Changes whenever the object's candidates do."""
-    path = Workspace(files.work).noun_path("generate", name)
+    path = noun_path(files.work, "generate", name)
     return f"{path.stat().st_mtime_ns:x}" if path.is_file() else "0"

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from sqlmodel import select
 
+from app import schemas
 from app.db import history
 from app.db.engine import writing
 from app.db.queries import project_row
@@ -14,9 +15,12 @@ from app.file_cache import FileCache
 from app.files import project_files
 from app.jobs import mask_store
 from app.jobs.mask_store import mask_path
+from app.jobs.plain import plain
 from app.services import views
+from app.services.candidates import _candidate_facts
+from r2c2r_core.workspace import Workspace, content_key
 from tests.app.conftest import Running, statements
-from tests.app.nouns import finish
+from tests.app.nouns import candidates, finish, placement
 from tests.app.test_jobs import run
 
 OBJECTS, CLICKS = 40, 12  # more of each than there were
@@ -100,7 +104,58 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
 QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # once something waits, its place among all that do is looked up
 
 
-MOST_OF_A_CLICK = 19  # statements, the transactions' begins aside; a row is written once
+def test_what_is_sent_as_it_is_stored_is_what_its_schema_says(finished: tuple[Running, str, int]) -> None:
+    web, project, item = finished
+    grow(web, project)
+    frames = web.get(f"/api/projects/{project}/masks/4")
+    objects = web.get(f"/api/projects/{project}/objects?deleted=true")
+    assert len(frames) >= OBJECTS
+    assert max(len(each["points"]) for each in objects) == CLICKS
+    for address, shape, said in (("masks/{frame}", schemas.FrameMask, frames), ("objects", schemas.SceneObject, objects)):
+        assert [shape.model_validate(each, strict=True).model_dump() for each in said] == said
+        declared = web.app.openapi()["paths"][f"/api/projects/{{project}}/{address}"]["get"]["responses"]["200"]
+        assert declared["content"]["application/json"]["schema"]["items"] == {"$ref": f"#/components/schemas/{shape.__name__}"}
+    one = next(each for each in objects if each["id"] == item)
+    assert web.post(f"/api/projects/{project}/objects/{item}/segment/cancel", {}) == one
+
+
+def test_what_nouns_say_is_read_once_for_all_servers_and_anew_when_one_changed(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files, reads = project_files(tmp_path, "p"), []
+    files.work.mkdir(parents=True)
+    finish(files.work)
+
+    def told(noun: Any) -> list[str]:
+        reads.append(noun.object_name)
+        return [noun.object_name]
+
+    def look() -> list[str] | None:
+        monkeypatch.setattr(views, "_FACTS", FileCache(1000))  # as a server that was just started
+        kept = views.KeptFacts(files)
+        said = kept.of("generate", "drawer_1", told)
+        kept.keep()
+        return said
+
+    assert [look(), look(), reads] == [["drawer_1"], ["drawer_1"], ["drawer_1"]]
+    finish(files.work)  # another run
+    assert [look(), len(reads)] == [["drawer_1"], 2]
+    files.kept_facts.write_bytes(b"{")
+    assert [look(), len(reads)] == [["drawer_1"], 3]
+    monkeypatch.setattr(views, "FACTS_VERSION", 2)
+    assert [look(), len(reads)] == [["drawer_1"], 4]
+    Workspace(files.work).forget("generate", "drawer_1")
+    assert look() is None
+
+
+def test_facts_that_are_kept_say_which_version_they_are_of() -> None:
+    """A field more or less: FACTS_VERSION goes up with it, for what an older server kept lacks it."""
+    told = {"generate": _candidate_facts(candidates("drawer_1")), "align": plain(placement("drawer_1"))}
+    fields = sorted(f"{stage} {key}" for stage, said in told.items() for key in (*said, *said.get("candidates", [{}])[0]))
+    assert (views.FACTS_VERSION, content_key(fields)) == (1, "76d66364613bb625a1d514b4b602d08a")
+
+
+MOST_OF_A_CLICK = 16  # statements, the transactions' begins aside; a row is written once
 
 
 def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
