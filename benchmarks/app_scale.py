@@ -3,9 +3,12 @@
     python benchmarks/app_scale.py [--projects 200] [--objects 200] [--clicks 5000] [--json benchmarks/app_scale.json]
 
 The folder is made of rows and files at once. Every GET of the app's own OpenAPI document is asked in process, then a click, its
-undo and redo: processor time (median of some), the first time apart, for that fills caches; queries; bytes on the wire. Then a
-real server is scrubbed (a frame and its masks) and clicked, and its processor time says how many such requests a core answers
-in a second. The bars: 100 ms and 300 kB for every answer of /api, and 100 requests a second a core.
+undo and redo: processor time (median of some), queries, bytes on the wire. The first time is kept apart, for it fills caches:
+`first_ms` after the app was started anew on a folder whose pages were opened before, `unseen_ms` on one that a run has just
+left. What the app does by itself when it starts, and between changes (it writes each project's project.json), is over before
+anything is counted. Then a real server is scrubbed (a frame and its masks) and clicked, and its processor time, what follows
+from the clicks by itself included, says how many such requests a core answers in a second of its processor time. The bars:
+100 ms and 300 kB for every answer of /api, the first ones too, and 100 requests a second a core.
 """
 
 import argparse
@@ -18,7 +21,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,6 +61,7 @@ FRAMES = 500  # of every recording, at 960x720
 MASKED = 500  # frames with a mask, of each object of the large project
 SMALL = 14  # objects of the other projects, a kitchen's
 REPEATS = 5
+REST_S = 2.0
 ROUNDS = 150  # of scrubs and of clicks, when the server's processor time is taken
 LARGE = "large"
 HEADERS = {"host": "127.0.0.1:8000", "accept-encoding": "gzip", "x-requested-with": "bench", "content-type": "application/json"}
@@ -74,12 +78,16 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="r2c2r-scale-") as folder:
         data = Path(folder) / "data"
         build(data, options.projects, options.objects, options.clicks)
-        costs = asyncio.run(ask_everything(data))
+        unseen = {cost["request"]: cost["first_ms"] for cost in asyncio.run(ask_everything(data, changes=False))}
+        costs = asyncio.run(ask_everything(data, changes=True))
+        for cost in costs:
+            cost["unseen_ms"] = unseen.get(cost["request"])
         print(table(costs))
         rates = serve_people(data)
     sizes = {"projects": options.projects, "objects": options.objects, "clicks": options.clicks, "frames": FRAMES}
     figures = {"sizes": sizes, "bars": BARS, "requests_a_cpu_second": rates, "endpoints": costs}
-    missed = [f"{cost['request']}: {cost['cpu_ms']} ms, {cost['kb']} kB" for cost in costs if not _within(cost)]
+    missed = [f"{cost['request']}: {cost['cpu_ms']} ms, first {cost['first_ms']} ms, {cost['kb']} kB" for cost in costs]
+    missed = [line for line, cost in zip(missed, costs, strict=True) if not _within(cost)]
     missed += [f"{name}: {rate} a second" for name, rate in rates.items() if rate < BARS["requests_a_cpu_second"]]
     figures["missed"] = missed
     return report("app_scale", figures, options.json, failed=bool(missed))
@@ -87,17 +95,18 @@ def main() -> int:
 
 def table(costs: list[dict[str, Any]]) -> str:
     """The figures as Markdown."""
-    lines = ["| request | status | CPU ms | first | queries | kB |", "|---|---|---|---|---|---|"]
+    lines = ["| request | status | CPU ms | first | unseen | queries | kB |", "|---|---|---|---|---|---|---|"]
     for cost in sorted(costs, key=lambda cost: -float(cost["cpu_ms"])):
-        cells = [cost[name] for name in ("request", "status", "cpu_ms", "first_ms", "queries", "kb")]
+        cells = [cost[name] for name in ("request", "status", "cpu_ms", "first_ms", "unseen_ms", "queries", "kb")]
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
 
 def _within(cost: dict[str, Any]) -> bool:
-    """Whether an answer keeps to the bars; pictures and bundles are as large as they are."""
-    small = float(cost["kb"]) <= BARS["kb"] or not cost["request"].split()[1].startswith("/api/")
-    return small and float(cost["cpu_ms"]) <= BARS["cpu_ms"]
+    """Whether an answer keeps to the bars; pictures and bundles are as large as they are, and drawn the first time."""
+    said = cost["request"].split()[1].startswith("/api/")
+    quick = float(cost["cpu_ms"]) <= BARS["cpu_ms"]
+    return quick and (not said or (float(cost["kb"]) <= BARS["kb"] and float(cost["first_ms"]) <= BARS["cpu_ms"]))
 
 
 # The data folder
@@ -266,13 +275,16 @@ class Asker:
         return sent[0]["status"], b"".join(message.get("body", b"") for message in sent[1:]), said
 
 
-async def ask_everything(data: Path) -> list[dict[str, Any]]:
-    """The cost of every GET, of a click, of its undo and its redo."""
-    settings = Settings(data_dir=data, launch_token="key", run_jobs=False, min_free_bytes=0, job_memory_bytes=0)
+async def ask_everything(data: Path, *, changes: bool) -> list[dict[str, Any]]:
+    """The cost of every GET and, where it may change something, of a click, of its undo and its redo."""
+    key = f"key{changes}"  # a printed key is good for one browser
+    settings = Settings(data_dir=data, launch_token=key, run_jobs=False, min_free_bytes=0, job_memory_bytes=0)
     app = create_app(settings, commands=FAKE_COMMANDS)
     async with app.router.lifespan_context(app):
         asker = Asker(app)
-        _, _, headers = await asker.ask("GET", "/?token=key")
+        await asyncio.to_thread(rest, time.process_time)
+        app.state.context.descriptions.stop()
+        _, _, headers = await asker.ask("GET", f"/?token={key}")
         asker.cookie = headers["set-cookie"].split(";")[0]
         queries: list[str] = []
         event.listen(app.state.context.engine, "before_cursor_execute", lambda *said: queries.append(said[2]))
@@ -281,12 +293,23 @@ async def ask_everything(data: Path) -> list[dict[str, Any]]:
         requests = [("GET", target, None) for target in _questions(app.openapi(), item)]
         at = f"/api/projects/{LARGE}"
         click = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
-        requests += [
+        changing = [
             ("POST", f"{at}/objects/{item}/points?infer=false", click),
             ("POST", f"{at}/undo", {}),
             ("POST", f"{at}/redo", {}),
         ]
-        return [await _cost(asker, queries, *request) for request in requests]
+        return [await _cost(asker, queries, *request) for request in requests + changing * changes]
+
+
+def rest(cpu_s: Callable[[], float]) -> None:
+    """Wait until a process does nothing any more."""
+    before = cpu_s()
+    while True:
+        time.sleep(REST_S)
+        now = cpu_s()
+        if now - before < 0.02 * REST_S:
+            return
+        before = now
 
 
 def _questions(document: dict[str, Any], item: int) -> Iterator[str]:
@@ -327,6 +350,7 @@ def serve_people(data: Path) -> dict[str, float]:
         with httpx.Client(base_url=server.address, headers={"X-Requested-With": "bench"}, timeout=60) as client:
             client.get("/", params={"token": "key"})
             process = psutil.Process(server.process.pid if server.process else os.getpid())
+            rest(lambda: sum(process.cpu_times()[:2]))
             small = client.get("/api/projects/kitchen0001/objects").json()
             large = client.get(f"/api/projects/{LARGE}/objects").json()
             kinds = {

@@ -7,7 +7,7 @@ import shutil
 import time
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import func
 from sqlmodel import Session, select
@@ -22,13 +22,24 @@ from r2c2r_core.segment.prompts import parse_prompts
 from r2c2r_core.workspace import write_atomically
 
 
-def import_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+class KeptBundle(NamedTuple):
+    """A workspace's bundle, kept as a version."""
+
+    row: Bundle | None  # None: it is the newest version already
+
+
+def forget_previews(session: Session, project: Project, files: ProjectFiles) -> None:
+    """What was drawn of an older reading."""
+    shutil.rmtree(files.previews, ignore_errors=True)
+
+
+def import_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
     """The project shows its recording."""
     adopt_capture(project, files)
     session.add(project)
 
 
-def sample_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+def sample_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
     """The project shows its recording, and the sample's clicks are in it."""
     adopt_capture(project, files)
     session.add(project)
@@ -36,9 +47,9 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
         adopt_prompts(session, project, json.loads((files.source / "prompts.json").read_text()), job.who)
 
 
-def run_done(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
+def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
     """The bundle becomes a version, unless it is the same as the newest one."""
-    adopt_bundle(session, project, files, job.payload.get("inputs", ""))
+    adopt_bundle(session, project, files, job.payload.get("inputs", ""), kept)
     write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
 
 
@@ -67,7 +78,34 @@ def _delete_what_was_read(files: ProjectFiles) -> None:
         path.unlink(missing_ok=True)
 
 
-FINISHERS: dict[str, Finisher] = {"import": import_done, "sample": sample_done, "run": run_done}
+def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> KeptBundle:
+    """Keep a copy of the workspace's bundle as the next version, unless it is the same as the newest one.
+
+    It reads hundreds of megabytes: not in a transaction that writes.
+    """
+    made = files.work / "bundle.zip"
+    if not made.is_file():
+        raise ExportFailed("the run ended without a bundle", hint="see the job's log")
+    digest = _sha256(made)
+    newest = newest_bundle(session, project.id)
+    if newest is not None and newest.sha256 == digest:
+        return KeptBundle(None)
+    files.bundles.mkdir(parents=True, exist_ok=True)
+    version = _free_version(files, newest.version + 1 if newest else 1, digest)
+    kept = files.bundles / f"v{version}.zip"
+    temporary = kept.with_suffix(".part")
+    shutil.copyfile(made, temporary)
+    os.replace(temporary, kept)
+    row = bundle_row(project, kept, version)
+    row.certificate = _certificate(kept, files.work)
+    return KeptBundle(row)
+
+
+FINISHERS: dict[str, Finisher] = {
+    "import": Finisher(import_done, forget_previews),
+    "sample": Finisher(sample_done, forget_previews),
+    "run": Finisher(run_done, keep_bundle),
+}
 
 
 def adopt_capture(project: Project, files: ProjectFiles) -> None:
@@ -103,29 +141,22 @@ def adopt_prompts(session: Session, project: Project, document: dict[str, Any], 
     return items
 
 
-def adopt_bundle(session: Session, project: Project, files: ProjectFiles, inputs: str) -> Bundle:
-    """Keep a copy of the workspace's bundle as the next version."""
-    made = files.work / "bundle.zip"
-    if not made.is_file():
-        raise ExportFailed("the run ended without a bundle", hint="see the job's log")
-    digest = _sha256(made)
+def adopt_bundle(
+    session: Session, project: Project, files: ProjectFiles, inputs: str, kept: KeptBundle | None = None
+) -> Bundle:
+    """Store what was kept as the next version, or that the newest one is made from these inputs too."""
+    kept = kept or keep_bundle(session, project, files)
     newest = newest_bundle(session, project.id)
-    if newest is not None and newest.sha256 == digest:
+    if kept.row is None:
+        assert newest is not None
         newest.inputs = inputs
         session.add(newest)
         return newest
-    files.bundles.mkdir(parents=True, exist_ok=True)
-    version = _free_version(files, newest.version + 1 if newest else 1, digest)
-    kept = files.bundles / f"v{version}.zip"
-    temporary = kept.with_suffix(".part")
-    shutil.copyfile(made, temporary)
-    os.replace(temporary, kept)
-    bundle = bundle_row(project, kept, version)
-    bundle.certificate, bundle.inputs = _certificate(kept, files.work), inputs
+    kept.row.inputs = inputs
     project.updated = time.time()
-    session.add(bundle)
+    session.add(kept.row)
     session.add(project)
-    return bundle
+    return kept.row
 
 
 def bundle_row(project: Project, kept: Path, version: int) -> Bundle:

@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import Engine, text
 from sqlmodel import Session, col, select
@@ -20,7 +20,19 @@ from app.privacy import without_places
 from app.process import Worker, end_orphan, started_at
 from app.settings import Settings
 
-Finisher = Callable[[Session, Job, Project, ProjectFiles], None]
+
+def _nothing(session: Session, project: Project, files: ProjectFiles) -> None:
+    """Nothing takes long."""
+
+
+class Finisher(NamedTuple):
+    """How what a finished job made is taken over: files first, while others may write, then rows, in one transaction."""
+
+    store: Callable[[Session, Job, Project, ProjectFiles, Any], None]  # the last is what `files` returned
+    files: Callable[[Session, Project, ProjectFiles], Any] = _nothing
+
+
+Ender = Callable[[Session, Job, Project, ProjectFiles], None]
 
 _CLAIM = text(
     "UPDATE jobs SET state='running', owner_pid=:pid, attempts=attempts+1, started=COALESCE(started, :now), "
@@ -33,7 +45,7 @@ _CLAIM = text(
 class JobRows:
     """The table of jobs. `finishers` take over what a finished job made, `ended` what one that came to no end leaves."""
 
-    def __init__(self, engine: Engine, hub: Hub, settings: Settings, finishers: dict[str, Finisher], ended: Finisher) -> None:
+    def __init__(self, engine: Engine, hub: Hub, settings: Settings, finishers: dict[str, Finisher], ended: Ender) -> None:
         self.engine, self.hub, self.settings = engine, hub, settings
         self._finishers, self._ended = finishers, ended
 
@@ -128,11 +140,14 @@ class JobRows:
     def finish(self, job_id: int) -> None:
         """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""
         with reading(self.engine) as session:
-            size = folder_bytes(self._files(session, job_row(session, job_id)).root)
+            row = job_row(session, job_id)
+            finisher, files = self._finishers[row.kind], self._files(session, row)
+            made = finisher.files(session, project_row(session, row.project_id), files)
+        size = folder_bytes(files.root)
         with writing(self.engine) as session:
             row = job_row(session, job_id)
             note_size(session, row.project_id, size)
-            self._finishers[row.kind](session, row, project_row(session, row.project_id), self._files(session, row))
+            finisher.store(session, row, project_row(session, row.project_id), files, made)
             row.state, row.finished, row.progress, row.stage_fraction = "done", time.time(), 1.0, 1.0
             row.stage, row.eta_s, row.worker_pid, row.error = STAGES[row.kind][-1], None, None, None
             _note(session, row, "state", "done")

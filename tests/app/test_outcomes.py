@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from sqlite3 import connect
 
 import pytest
 
@@ -9,6 +10,8 @@ from app.db.engine import open_engine, writing
 from app.db.tables import Job, Project
 from app.files import project_files
 from app.jobs import outcomes
+from tests.app.conftest import Running
+from tests.app.test_jobs import run
 
 
 def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,3 +31,22 @@ def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypat
         assert json.load(former)["objects"] == ["former"]
     assert json.loads(files.finished_prompts.read_text())["objects"] == []
     engine.dispose()
+
+
+def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project, digest = web.sample(), outcomes._sha256
+    looked: list[Path] = []
+
+    def look(path: Path) -> str:
+        looked.append(path)
+        with connect(web.settings.database, timeout=0) as other:
+            other.execute("BEGIN IMMEDIATE")  # raises where somebody writes
+            other.rollback()
+        return digest(path)
+
+    monkeypatch.setattr(outcomes, "_sha256", look)
+    web.job(run(web, project), "done")
+    assert len(looked) >= 2  # what was made, and what is kept
+    assert [bundle["current"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [True]
+    web.job(run(web, project), "done")
+    assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")][-1] == 1
