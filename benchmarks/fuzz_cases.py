@@ -340,7 +340,7 @@ def _damaged_folder(folder: Path, rng: random.Random) -> None:
         if is_json:
             try:
                 _damaged_json(json.loads(content), path, rng)
-            except ValueError:
+            except (ValueError, RecursionError):  # it was damaged before: cut short, or 100,000 deep
                 path.write_bytes(_damaged(content, rng))
         else:
             path.write_bytes(_damaged(content, rng))

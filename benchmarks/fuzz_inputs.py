@@ -211,7 +211,7 @@ def main() -> int:
         return _show(options.seed, options.only)
     count = 300 if options.count is None and options.minutes is None else options.count
     figures = fuzz(options.seed, count=count, minutes=options.minutes)
-    return report("inputs", figures, options.json, failed=bool(figures["faults"]))
+    return report(f"inputs, seed {options.seed}", figures, options.json, failed=bool(figures["faults"]))
 
 
 def _show(seed: int, number: int) -> int:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: bool = False) -> int:
     """Print the figures, replace that part of the file, and say by the exit status whether a bar was missed."""
-    figures = {**figures, "load_average": round(os.getloadavg()[1], 1)}  # times mean little on a busy machine
+    figures = {
+        "commit": _commit(),
+        **figures,
+        "load_average": round(os.getloadavg()[1], 1),
+    }  # times mean little on a busy machine
     print(json.dumps(figures, indent=1))
     if file is not None:
         parts = json.loads(file.read_text()) if file.exists() else {}
@@ -23,3 +28,9 @@ def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: boo
         beside.write_text(json.dumps(dict(sorted(parts.items())), indent=1) + "\n")
         os.replace(beside, file)
     return 1 if failed else 0
+
+
+def _commit() -> str:
+    """What was measured, as git names it: with "-dirty" where files were changed since; empty outside a clone."""
+    command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
+    return subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False).stdout.strip()

@@ -174,9 +174,9 @@ def _mjcf_joints(urdf: Urdf, root: ET.Element) -> Iterator[Finding]:
         kind = {"revolute": "hinge", "prismatic": "slide"}[joint.type]
         if element.get("type", "hinge") != kind:
             yield finding("mjcf-joint", name, f"scene.xml says {element.get('type', 'hinge')}, expected {kind}")
-        span = [float(word) for word in element.get("range", "").split()]
+        span = [_number(word) for word in element.get("range", "").split()]
         limits = joint.limit or {}
-        if not np.allclose(span, [limits.get("lower", np.nan), limits.get("upper", np.nan)], atol=1e-5):
+        if len(span) != 2 or not np.allclose(span, [limits.get("lower", np.nan), limits.get("upper", np.nan)], atol=1e-5):
             yield finding("mjcf-joint", name, f"scene.xml has the range {element.get('range')}, not the URDF's")
 
 
@@ -184,9 +184,17 @@ def _mjcf_masses(urdf: Urdf, root: ET.Element) -> Iterator[Finding]:
     there = {}
     for body in root.iter("body"):
         inertial = body.find("inertial")
-        there[body.get("name")] = float(inertial.get("mass", "nan")) if inertial is not None else float("nan")
+        there[body.get("name")] = _number(inertial.get("mass", "")) if inertial is not None else float("nan")
     for link in urdf.links:
         if link.inertial is not None and link.name != WORLD:
             mass = there.get(link.name, float("nan"))
             if not abs(mass - link.inertial.mass_kg) <= 1e-5 * max(abs(mass), 1e-3):
                 yield finding("mjcf-mass", link.name, f"scene.xml says {mass:.6g} kg, the URDF {link.inertial.mass_kg:.6g} kg")
+
+
+def _number(text: str) -> float:
+    """NaN, which nothing equals, for what is no number."""
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

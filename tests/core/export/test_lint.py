@@ -276,6 +276,19 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         set(),
     ),
     ("mjcf-joint", "another range", xml("scene.xml", lambda r: named(r, "joint", "drawer_1_slide").set("range", "0 9")), set()),
+    (
+        "mjcf-joint",
+        "no number",
+        xml("scene.xml", lambda r: named(r, "joint", "drawer_1_slide").set("range", "0 1e308.42")),
+        set(),
+    ),
+    ("mjcf-joint", "no range", xml("scene.xml", lambda r: named(r, "joint", "drawer_1_slide").set("range", "")), set()),
+    (
+        "mjcf-mass",
+        "no number",
+        xml("scene.xml", lambda r: named(r, "body", "bottle_1_body").find("inertial").set("mass", "1,5")),
+        set(),
+    ),
     ("mjcf-joint", "a joint gone", xml("scene.xml", lambda r: without(named(r, "body", "drawer_1_drawer"), "joint")), set()),
     (
         "mjcf-mass",
