@@ -11,10 +11,9 @@ depends_on = None
 
 
 def upgrade() -> None:
-    with op.batch_alter_table("projects") as batch:
-        batch.add_column(sa.Column("register_depth", sa.Boolean(), nullable=False, server_default=sa.false()))
+    # Not in a batch: that makes the table anew, and with the old one go all rows that refer to it
+    op.add_column("projects", sa.Column("register_depth", sa.Boolean(), nullable=False, server_default=sa.false()))
 
 
 def downgrade() -> None:
-    with op.batch_alter_table("projects") as batch:
-        batch.drop_column("register_depth")
+    op.drop_column("projects", "register_depth")
