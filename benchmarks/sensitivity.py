@@ -5,7 +5,7 @@
 A RECORDING is a folder with scan.r3d or capture.r3d, prompts.json, truth.json, and true masks (`r2c2r sample` writes one). A
 first computation of one object of each kind writes down which numbers each step reads; a number is then moved, and only the
 steps that read it, and what follows from a step that gave something else, are computed again. What nothing reads is listed as
-such. Runs go on where an earlier one stopped (benchmarks/sensitivity.json) as long as the code and the recordings are the same;
+such. Runs go on where an earlier one stopped (benchmarks/sensitivity.json) while the code and the recordings are the same;
 --plot only draws docs/sensitivity.svg and docs/sensitivity.md again.
 
 loss: mean error of the sizes in percent + 100 (1 - mean mask IoU) + 100 (1 - share of right joints); an object that is lost
@@ -311,6 +311,8 @@ def moved_value(entry: Field, factor: float) -> Any:
     if isinstance(default, tuple):
         return tuple(one(v) if k in (None, i) else v for i, v in enumerate(default))
     value = one(default)
+    if value >= rules.get("lt", math.inf) or value <= rules.get("gt", -math.inf):
+        value = (default + rules["lt" if factor > 1 else "gt"]) / 2
     return type(default)(min(max(value, rules.get("ge", value)), rules.get("le", value)))
 
 
@@ -396,7 +398,7 @@ def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
 
 def tornado(document: Mapping[str, Any]) -> str:
     """The largest effects as bars to either side of the usual loss, SVG."""
-    rows = effects(document)[:SHOWN]
+    rows = [row for row in effects(document)[:SHOWN] if max(map(abs, row[1:])) > 0]
     most = max((abs(v) for row in rows for v in row[1:]), default=1.0) or 1.0
     height, middle, reach = 18, 560, 220
     lines = [
@@ -430,7 +432,7 @@ def table(document: Mapping[str, Any]) -> str:
         "# Which numbers matter",
         "",
         "`benchmarks/sensitivity.py` moves each tuned number by a quarter either way, alone, and compares what comes out with",
-        "the truth of sample kitchens of two generators. The loss adds the mean error of the sizes in percent,",
+        "the truth of the recordings below. The loss adds the mean error of the sizes in percent,",
         "100 (1 - mask IoU) and 100 (1 - share of right joints). Below 0 is better than as it is.",
         "",
         *(_run_line(run) for run in document["runs"]),
@@ -439,9 +441,12 @@ def table(document: Mapping[str, Any]) -> str:
         "",
         "| number | -25 % | +25 % |",
         "|---|---:|---:|",
-        *(f"| `{name}` | {down:+.3f} | {up:+.3f} |" for name, down, up in rows[:SHOWN]),
+        *(f"| `{name}` | {down:+.3f} | {up:+.3f} |" for name, down, up in rows[:SHOWN] if name not in still),
         "",
         f"## Moved without any effect ({len(still)})",
+        "",
+        "On sizes, masks and joints, that is: how much room boards and fronts leave shows in contacts, and how fine a mesh",
+        "or a texture is in pictures, which are not scored here.",
         "",
         ", ".join(f"`{name}`" for name in still) or "none",
         "",

@@ -19,6 +19,7 @@ from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.tuning import param, tuned
 
 _LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
+_CONFIDENCE = 0.975  # one-sided, of two standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,9 +27,6 @@ class Params:
     """When a placement is called uncertain."""
 
     sigmas: float = param(2.0, "σ", "at which a motion is stated")
-    confidence: float = param(
-        0.975, "share", "one-sided, of two standard deviations", source="normal distribution", gt=0.5, lt=1
-    )
     full_frames: int = param(9, "count", "frames as whose independent readings the weights of points and outlines count", gt=0)
     known_frames: int = param(3, "count", "frames' worth of what other objects tell of how much frames differ", gt=0)
 
@@ -81,7 +79,7 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)
-    widened = float(stdtrit(len(steps) - 1 + params.known_frames, params.confidence) / ndtri(params.confidence))
+    widened = float(stdtrit(len(steps) - 1 + params.known_frames, _CONFIDENCE) / ndtri(_CONFIDENCE))
     return np.asarray(noise + widened**2 * (len(steps) - 1) / len(steps) * apart.T @ apart)
 
 
