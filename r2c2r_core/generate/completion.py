@@ -1,6 +1,7 @@
 """The weight-free generator: what was seen, at LiDAR noise, completed by symmetry, to the wall or to the category's depth."""
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,14 +14,14 @@ from r2c2r_core.generate.boxed import appliance_hypotheses, front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.consistency import Params as ConsistencyParams
 from r2c2r_core.generate.consistency import self_consistency
-from r2c2r_core.generate.evidence import Evidence
+from r2c2r_core.generate.evidence import Evidence, View
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.standing import stands
 from r2c2r_core.generate.things import thing_hypotheses
 from r2c2r_core.generate.variation import Variation, draw_variation, whole_pool
-from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
+from r2c2r_core.geometry.meshes import face_areas, is_manifold, is_watertight, volume
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.tuning import param, tuned
 
@@ -29,9 +30,14 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """How fine textures are."""
 
-    front_px: int = param(768, "px", "long side of a front's picture", ge=16)
-    finest_texel_m: float = param(0.0012, "m", "side of a texel, at least", source="a phone at 1 m sees 1.3 mm per pixel", gt=0)
-    thing_px: int = param(512, "px", "side of a thing's picture", ge=16)
+    front_px: int = param(768, "px", "long side of a front's picture, where photos show no more", ge=16)
+    finest_texel_m: float = param(
+        0.0012, "m", "side of a texel, at least, where photos show no more", source="a phone at 1 m sees 1.3 mm per pixel", gt=0
+    )
+    thing_px: int = param(512, "px", "side of a thing's picture, where photos show no more", ge=16)
+    most_front_px: int = param(1536, "px", "long side of a front's picture: 9 views of it are baked in 0.1 GB", ge=16)
+    most_thing_px: int = param(1024, "px", "side of a thing's picture: 20 views of it are baked in 0.15 GB", ge=16)
+    packed: float = param(0.6, "share", "of a thing's picture that its charts cover", gt=0, le=1)
 
 
 class Completion(MeshGenerator):
@@ -46,7 +52,7 @@ class Completion(MeshGenerator):
         With seed 0 the first turn is from all good frames; every other is a draw of its own, from some.
         """
         guess = self._guess(evidence, candidate_id, seed)
-        atlas = _cut_open(guess.shape)
+        atlas = cut_open(guess.shape, evidence.pool)
         shape, variation = guess.shape, guess.variation
         # a bare side may show in a few frames only, so furniture is pictured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
@@ -142,11 +148,24 @@ def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesi
     return thing_hypotheses(evidence, everything)
 
 
-def _cut_open(shape: Shape) -> Atlas:
+def cut_open(shape: Shape, views: Sequence[View]) -> Atlas:
+    """The shape's atlas, as fine as the nearest photo shows it, within what memory allows."""
     params = tuned(Params)
+    pixel_m = _finest_pixel_m(shape, views)
     if shape.front_y_m is not None:
-        return planar_atlas(shape.vertices_local, shape.faces, params.front_px, params.finest_texel_m)
-    return unwrapped_atlas(shape.vertices_local, shape.faces, params.thing_px)
+        spans = np.ptp(shape.vertices_local, axis=0)
+        longest = int(np.clip(np.ceil(max(spans[0], spans[2]) / pixel_m), params.front_px, params.most_front_px))
+        return planar_atlas(shape.vertices_local, shape.faces, longest, min(params.finest_texel_m, pixel_m))
+    area_m2 = float(face_areas(shape.vertices_local, shape.faces).sum())
+    side = int(np.clip(np.ceil(np.sqrt(area_m2 / params.packed) / pixel_m), params.thing_px, params.most_thing_px))
+    return unwrapped_atlas(shape.vertices_local, shape.faces, side)
+
+
+def _finest_pixel_m(shape: Shape, views: Sequence[View]) -> float:
+    """What a pixel covers at the shape's distance in the photo that shows it finest."""
+    centre = shape.vertices_world.mean(axis=0)[None]
+    depths = [max(float(view.world_from_camera.inverse.apply(centre)[0, 2]), 0.1) for view in views]
+    return min((depth / view.rgb_camera.fx for depth, view in zip(depths, views, strict=True)), default=np.inf)
 
 
 def _is_solid(shape: Shape) -> bool:

@@ -5,6 +5,7 @@ import pytest
 
 from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.charts import planar_atlas, unwrapped_atlas
+from r2c2r_core.generate.completion import cut_open
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.camera import Intrinsics
@@ -85,3 +86,17 @@ def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):
         expected = plain[view.frame_index] * np.array((0.5, 0.6, 0.7))
         filmed = plain[view.frame_index].max(axis=-1) < 200  # towards white the gain fades out
         assert np.abs(view.rgb - expected)[filmed].max() <= 0.51
+
+
+@pytest.mark.parametrize(("name", "make", "most"), [("front", front_shape, 1536), ("bottle", best_thing, 1024)])
+def test_a_picture_is_as_fine_as_the_nearest_photo_shows_it(name, make, most, request):
+    evidence = gather_evidence(*request.getfixturevalue(f"{name}_scene"), 6)
+    shape = make(evidence, draw_variation(evidence, np.random.default_rng(0)))
+
+    def texels(times: int) -> int:
+        """Of photos so many times as large."""
+        views = [replace(v, rgb_camera=replace(v.rgb_camera, fx=times * v.rgb_camera.fx)) for v in evidence.pool]
+        return len(cut_open(shape, views).points)
+
+    assert texels(6) > 1.5 * texels(1)
+    assert texels(60) < 3 * most**2  # what memory allows, whatever the photos
