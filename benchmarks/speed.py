@@ -49,10 +49,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "run": run_seconds(options.workers, workdir),
             "stages": _stages_before() if options.quick else [],
         }
+        _write(document)
         for count, frames in () if options.quick else sorted(cases, key=lambda case: case[0] * case[1]):
             document["stages"].append(stage_seconds(count, frames, options.workers, workdir))
             print(json.dumps(document["stages"][-1]), file=sys.stderr, flush=True)
-    RESULTS.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+            _write(document)  # the larger ones take long: what was measured stays
     print(markdown(document))
     return 0
 
@@ -109,6 +110,10 @@ def _told(cost: Cost) -> dict[str, Any]:
         "largest_process_gb": round(cost.largest_bytes / 1e9, 2),
         "load": round(os.getloadavg()[0], 1),
     }
+
+
+def _write(document: dict[str, Any]) -> None:
+    RESULTS.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 def _stages_before() -> list[dict[str, Any]]:
