@@ -1,12 +1,14 @@
 """Revisions of the tables: which there are, and bringing a file to the newest with a copy of the older one kept."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Engine, inspect
+from sqlalchemy import Connection, Engine, inspect
 from sqlmodel import SQLModel
 
 from alembic import command
@@ -24,9 +26,14 @@ def migrate(engine: Engine, revision: str = "head") -> None:
         now = MigrationContext.configure(connection).get_current_revision()
     if now not in (None, revisions()[-1]):
         _keep_copy(Path(engine.url.database or ""), str(now))
-    with engine.begin() as connection:
+    with _without_foreign_keys(engine) as connection, connection.begin():
+        before = _loose_rows(connection)
         config.attributes["connection"] = connection
         command.upgrade(config, revision)
+        loose = _loose_rows(connection) - before
+        if loose > 0:  # nothing of it is stored
+            found = f"{loose} rows would refer to what is not there in revision {revision}"
+            raise DatabaseUnusable(f"{engine.url.database}: {found}, none expected", hint=RESTORE)
 
 
 def revisions() -> list[str]:
@@ -47,6 +54,28 @@ def require_tables(engine: Engine) -> None:
                 f"{engine.url.database}: a database without {what}",
                 hint=RESTORE,
             )
+
+
+@contextmanager
+def _without_foreign_keys(engine: Engine) -> Iterator[Connection]:
+    """A connection that follows no foreign key: dropping the old one of a table made anew would delete all that refers to it.
+
+    SQLite's own procedure (https://www.sqlite.org/lang_altertable.html, section 7); the pragma does nothing in a transaction.
+    """
+    with engine.connect() as connection:
+        driver = connection.connection.driver_connection
+        assert driver is not None
+        kept = driver.execute("PRAGMA foreign_keys").fetchone()[0]
+        driver.execute("PRAGMA foreign_keys=OFF")
+        try:
+            yield connection
+        finally:
+            driver.execute(f"PRAGMA foreign_keys={kept}")
+
+
+def _loose_rows(connection: Connection) -> int:
+    """How many rows refer to what is not there."""
+    return len(connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall())
 
 
 def _config() -> Config:

@@ -1,12 +1,16 @@
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from sqlalchemy import create_engine
 from sqlmodel import SQLModel
 
 from app.db.engine import migrate, open_engine
 from app.settings import shipped
+
+FIRST_TABLES = ("projects", "objects", "prompt_points", "verdicts", "overrides", "jobs", "job_events", "events", "bundles")
 
 
 def test_an_empty_file_becomes_what_tables_py_says(tmp_path: Path) -> None:
@@ -24,6 +28,19 @@ def test_migrations_can_go_down_and_up_again(tmp_path: Path) -> None:
     assert {"projects", "objects", "events", "jobs"} <= _tables(tmp_path / "round.db")
 
 
+def test_no_migration_deletes_what_refers_to_a_table_it_makes_anew(tmp_path: Path) -> None:
+    path = tmp_path / "first.db"
+    engine = create_engine(f"sqlite:///{path}")
+    migrate(engine, "0001")
+    engine.dispose()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        before = {table: _filled(connection, table) for table in FIRST_TABLES}
+    open_engine(path).dispose()  # foreign keys are followed by its connections
+    with closing(sqlite3.connect(path)) as connection:
+        after = {table: connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0] for table in before}
+    assert before == after == dict.fromkeys(before, 1)
+
+
 def test_the_database_is_in_wal_mode_and_keeps_foreign_keys(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "wal.db")
     with engine.connect() as connection:
@@ -36,6 +53,19 @@ def test_the_migrations_travel_with_the_app() -> None:
     folder = shipped("alembic", "env.py")
     assert (folder / "script.py.mako").is_file()
     assert not (folder / "__init__.py").exists()
+
+
+def _filled(connection: sqlite3.Connection, table: str) -> int:
+    """A row in the table, with something in every column that wants it, referring to the first of every other."""
+    columns = connection.execute(f"PRAGMA table_info({table})").fetchall()
+    referring = {row[3] for row in connection.execute(f"PRAGMA foreign_key_list({table})")}
+    values: dict[str, object] = {}
+    for _, name, kind, wanted, default, primary in columns:
+        if name in referring or primary or (wanted and default is None):
+            values[name] = "{}" if "JSON" in kind else 1
+    marks = ",".join("?" * len(values))
+    connection.execute(f"INSERT INTO {table} ({','.join(values)}) VALUES ({marks})", list(values.values()))
+    return int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
 
 
 def _tables(path: Path) -> set[str]:

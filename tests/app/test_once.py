@@ -225,6 +225,7 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     yield "showInViewer", "POST", f"{at}/viewer/show", {"mode": "cloud"}
     yield "setJoints", "POST", f"{at}/viewer/joints", {"values": {"door": 0.5}}
     yield "placeInViewer", "POST", f"{at}/viewer/place", {"pose": None}
+    yield "readAgain", "PUT", f"{at}/reading", {"register_depth": True}
     held = behave(web, project, segment="hang")
     yield "runProject", "POST", f"{at}/run", {}
     web.until(lambda: (held / "hanging").exists())
