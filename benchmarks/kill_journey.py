@@ -228,7 +228,8 @@ class Journey:
 
     def _click(self) -> dict[str, Any]:
         frame = self.rng.choice(self.frames)
-        x, y = self.rng.uniform(0, frame["width"] - 1), self.rng.uniform(0, frame["height"] - 1)
+        # the stand-in segmenter holds what is clicked at the right edge: its masks never come to an end
+        x, y = self.rng.uniform(0, 0.95 * frame["width"]), self.rng.uniform(0, frame["height"] - 1)
         return {"frame": frame["index"], "x": x, "y": y, "label": 1}
 
     def _judge(self, number: int) -> None:
