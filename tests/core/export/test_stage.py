@@ -77,6 +77,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
         "capture",
         "world_from_capture",
         "objects",
+        "contradictions",
         "stages",
         "files",
     ]
@@ -87,7 +88,8 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     door = document["objects"][0]
     keys = "name category dimensions_m world_from_object joint dimension_source mask candidates chosen placement warp meshes"
     assert set(keys.split()) | {"mass_kg", "warnings"} <= set(door)
-    assert set(door["joint"]) == {"name", "type", "axis", "origin", "lower", "upper", "source", "confidence", "blocked_by"}
+    joint_keys = "name type axis origin lower upper uncut source confidence blocked_by"
+    assert set(door["joint"]) == set(joint_keys.split())
     assert door["joint"]["blocked_by"] == []
     assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]
     assert door["joint"]["source"] == {"axis": "inferred", "origin": "inferred", "limits": "default"}
@@ -97,6 +99,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     assert door["chosen"] == {"candidate": "c0", "by": "consensus", "at": None}
     assert document["objects"][3]["joint"] is None
     assert len(document["objects"][2]["joints"]) == 2
+    assert document["contradictions"] == []
     assert document["stages"] == [{"name": "segment", "backend": "geometric", "config": {"voxel_m": 0.01}}]
 
 
