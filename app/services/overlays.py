@@ -188,6 +188,8 @@ def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrin
     if raw is None:
         raise NotFound(f"frame {index} has no depth image")
     measured = decode_depth(raw)
+    if measured.shape != (camera.height, camera.width):
+        raise NotReady("the recording was read again since this was made", hint="run the project again")
     _, depth = _render(parts, camera, camera_from_world)
     both = (depth > 0) & (measured > 0)
     off = np.clip((measured - depth) / FAR_M, -1, 1)

@@ -135,14 +135,22 @@ class ZipFiles:
         """The content; raises CaptureError when the member is damaged."""
         try:
             return self._zip.read(name)
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as problem:
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            NotImplementedError,
+            RuntimeError,
+            UnicodeDecodeError,
+            OSError,
+        ) as problem:
             raise self._damaged(name, problem) from problem
 
     def open(self, name: str) -> BinaryIO:
         """The member as a stream; raises CaptureError when it is damaged."""
         try:
             return cast(BinaryIO, self._zip.open(name))
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as problem:
+        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, UnicodeDecodeError, OSError) as problem:
             raise self._damaged(name, problem) from problem
 
     def place(self, name: str) -> tuple[str, ...]:

@@ -1,11 +1,13 @@
 """An object's points while it is being clicked."""
 
 import base64
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from r2c2r_core.ingest.store import depth_path
 from tests.app.test_reviews import Reviewed, reviewed
 
 __all__ = ["reviewed"]
@@ -53,3 +55,16 @@ def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, 
     assert image[0, 0, 3] == 0  # nothing where the mesh is not
     assert "immutable" in answer.headers["cache-control"]
     assert web.client.get(f"/media/{project}/overlay/{number}/999.png").status_code in (404, 409)
+
+
+def test_depth_of_another_reading_is_told(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    shown = web.get(f"/api/projects/{project}/objects/{number}/photos")
+    frame = shown["photos"][0]["frame"]
+    stored = list(web.settings.data_dir.rglob(depth_path(Path(), frame).as_posix()))
+    for path in stored:
+        cv2.imwrite(str(path), np.full((15, 20), 1000, np.uint16))
+    assert stored
+    answer = web.client.get(f"/media/{project}/overlay/{number}/{frame}.png?of=placed&look=residual&v={shown['version']}")
+    assert answer.status_code == 409, answer.content[:200]
+    assert answer.json()["kind"] == "not-ready"

@@ -28,6 +28,8 @@ class Trajectory(NamedTuple):
         if not 0 < after < len(self.times_s) or self.times_s[after] - self.times_s[after - 1] >= gap_s:
             return self.poses[nearest]
         a, b = self.poses[after - 1], self.poses[after]
+        if not (np.isfinite(a.matrix).all() and np.isfinite(b.matrix).all()):
+            return self.poses[nearest]  # told as a pose that is none, where frames are joined
         start_s, end_s = self.times_s[after - 1 : after + 1]
         share = (time_s - start_s) / (end_s - start_s)
         turn = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([a.rotation, b.rotation])))(share)

@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 from r2c2r_core.errors import CaptureError
-from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.files import FolderFiles, open_files
 from r2c2r_core.ingest.readers import decoder, video
 from r2c2r_core.ingest.readers.images import image_size
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
@@ -93,7 +93,7 @@ def test_a_decoder_ends_with_its_video_and_with_whoever_asked(tmp_path: Path) ->
     asking = f"""
 import psutil, signal
 from pathlib import Path
-from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.files import FolderFiles, open_files
 from r2c2r_core.ingest.readers.video import Video
 film = Video(FolderFiles(Path({str(HEVC.parent)!r})), {HEVC.name!r})
 print(psutil.Process().children()[0].pid, flush=True)
@@ -190,3 +190,15 @@ def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
     min((folder / "depths").glob("*.npy")).write_bytes(content)
     with pytest.raises(CaptureError, match="not a readable depth array"):
         open_recording(folder)
+
+
+def test_a_zip_whose_member_names_itself_in_no_encoding_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "scan.r3d"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("metadata", b"{}")
+    raw = bytearray(path.read_bytes())
+    raw[6:8] = (0x800).to_bytes(2, "little")  # of the member's own header: its name is UTF-8
+    raw[30] = 0xFF
+    path.write_bytes(raw)
+    with pytest.raises(CaptureError, match="metadata"):
+        open_files(path).read("metadata")
