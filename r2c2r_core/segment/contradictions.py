@@ -80,14 +80,14 @@ def _between(tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], p
                 rule="same-thing",
                 objects=(first.name, second.name),
                 message=f"{where} are on the same thing: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
-                mend="delete one, or click off each of them (right click) on the other",
+                mend="delete one, or click off each of them on the other",
             )
         else:
             yield Contradiction(
                 rule="masks-overlap",
                 objects=(first.name, second.name),
                 message=f"{where} claim the same surface: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
-                mend=f"click off one of them (right click) where the other is, in frame {frame}",
+                mend=f"click off one of them where the other is, in frame {frame}",
             )
 
 
@@ -163,7 +163,7 @@ def _size_mend(too_large: bool, category: Category) -> str:
     if too_large and category.kind == "front":
         return "where it is several, click each as an object of its own; else correct its category"
     if too_large:
-        return "click off it (right click) where its mask goes too far; else correct its category"
+        return "click off it where its mask goes too far; else correct its category"
     return "click on it where its mask stops short; else correct its category"
 
 
