@@ -11,8 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args
 
-from r2c2r_core.errors import EnvironmentProblem, R2C2RError
-from r2c2r_core.failing import OBJECT_FAILS, failure_line
+from r2c2r_core.errors import EnvironmentProblem
+from r2c2r_core.failing import OBJECT_FAILS, apart, record
 from r2c2r_core.pool import Failed, Pool, Task
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.sources import source_key
@@ -138,10 +138,8 @@ class Ledger:
         """Quick decisions on a stage's results, kept nowhere, with the same treatment of failures."""
         results: dict[str, T] = {}
         for name, item in items.items():
-            try:
+            with apart(stage, name, self.failures):
                 results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
-            except OBJECT_FAILS as error:
-                self._failed(stage, name, error)
         return results
 
     def _one_by_one(self, jobs: "dict[str, _Job]", progress: Progress) -> dict[str, Kept[Any]]:
@@ -149,10 +147,8 @@ class Ledger:
         for position, (name, job) in enumerate(jobs.items()):
             part = progress.part(position / len(jobs), (position + 1) / len(jobs))
             part.at(0.0, name)
-            try:
+            with apart(job.stage, name, self.failures):
                 results[name] = self._once(job, part)
-            except OBJECT_FAILS as error:
-                self._failed(job.stage, name, error)
         _opened.cache_clear()
         return results
 
@@ -172,7 +168,7 @@ class Ledger:
                 assert kept is not None, "it was stored a moment ago"
                 results[name] = kept
             elif isinstance(answer.error, OBJECT_FAILS):
-                self._failed(jobs[name].stage, name, answer.error, answer.where)
+                record(jobs[name].stage, name, answer.error, self.failures, answer.where)
             else:
                 _log.error("%s: %s", name, answer.where)
                 raise answer.error
@@ -191,14 +187,6 @@ class Ledger:
     def _kept(self, job: "_Job", noun: Any, seconds: float) -> Kept[Any]:
         self.seconds[job.stage] = self.seconds.get(job.stage, 0.0) + seconds
         return Kept(noun, job.key, _Place(job.root, job.stage, job.name, job.key))
-
-    def _failed(self, stage: str, name: str, error: Exception, where: str = "") -> None:
-        """One line for a person; the traceback of what nobody foresaw goes to the log."""
-        self.failures[name] = failure_line(stage, name, error)
-        if isinstance(error, R2C2RError):
-            _log.warning("%s: %s: %s", stage, name, error)
-        else:
-            _log.warning("%s: %s: %s%s", stage, name, error, where and f"\n{where}", exc_info=None if where else error)
 
     def _begin(self, stage: Stage) -> Progress:
         if STAGES.index(stage) > STAGES.index(self.until):

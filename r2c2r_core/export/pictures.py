@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Image
 from r2c2r_core.export.plan import Plan
 from r2c2r_core.export.preview import Soup, albedo, scene_soup, shaded, soup_faces
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.raster import rasterize
@@ -28,18 +29,17 @@ def write_pictures(reconstruction: Reconstruction, plan: Plan, folder: Path, *, 
     written = {}
     for item in progress.each(reconstruction.scene.objects, "pictures"):
         track = tracks.get(item.name)
-        if track is None:
+        frame = None if track is None else _best_frame(reconstruction.capture.frames, track)
+        if track is None or frame is None:
             continue
-        frame = _best_frame(reconstruction.capture.frames, track)
-        if frame is None:
-            continue
-        bodies = {number for number, body in enumerate(plan.bodies, start=1) if body.object_name == item.name}
-        photo = reconstruction.capture.images.rgb(frame.index)
-        name = f"pictures/{item.name}.jpg"
-        pair = side_by_side(photo, track.masks[frame.index], frame, soup, bodies)
-        (folder / "pictures").mkdir(exist_ok=True)
-        (folder / name).write_bytes(cv2.imencode(".jpg", pair[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])[1].tobytes())
-        written[item.name] = name
+        with apart("export", item.name, {}):
+            bodies = {number for number, body in enumerate(plan.bodies, start=1) if body.object_name == item.name}
+            photo = reconstruction.capture.images.rgb(frame.index)
+            name = f"pictures/{item.name}.jpg"
+            pair = side_by_side(photo, track.masks[frame.index], frame, soup, bodies)
+            (folder / "pictures").mkdir(exist_ok=True)
+            (folder / name).write_bytes(cv2.imencode(".jpg", pair[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])[1].tobytes())
+            written[item.name] = name
     return written
 
 

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from r2c2r_core.arrays import Faces, Mask, Points
 from r2c2r_core.export.plan import Plan
 from r2c2r_core.export.preview import Soup, scene_soup, soup_faces
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.camera import depth_points, sample_through
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.meshes import distances_to_mesh
@@ -58,7 +59,7 @@ class _Seen(NamedTuple):
 
 
 def scan_fits(reconstruction: Reconstruction, plan: Plan, *, progress: Progress = SILENT) -> dict[str, ScanFit]:
-    """The fit of every object by its name; objects with too few depth points are left out."""
+    """The fit of every object by its name; objects with too few depth points, or whose fit fails, are left out."""
     soup = scene_soup(plan, 0.0)
     capture = reconstruction.capture
     shared = _spread(capture.frames, _SHARED_FRAMES)
@@ -68,11 +69,12 @@ def scan_fits(reconstruction: Reconstruction, plan: Plan, *, progress: Progress 
         bodies = [k for k, body in enumerate(plan.bodies, start=1) if body.object_name == track.name and not body.is_support]
         if not bodies:
             continue
-        frames = _frames(capture.frames, shared, track)
-        sides = [_sides(seen(frame), frame, track, bodies) for frame in frames]
-        scan, surface = (np.concatenate([np.zeros((0, 3)), *(side[k] for side in sides)]) for k in (0, 1))
-        if len(scan) >= _FEWEST_POINTS:
-            found[track.name] = _fit(scan, surface, soup, _turned_to(frames, soup, bodies))
+        with apart("export", track.name, {}):
+            frames = _frames(capture.frames, shared, track)
+            sides = [_sides(seen(frame), frame, track, bodies) for frame in frames]
+            scan, surface = (np.concatenate([np.zeros((0, 3)), *(side[k] for side in sides)]) for k in (0, 1))
+            if len(scan) >= _FEWEST_POINTS:
+                found[track.name] = _fit(scan, surface, soup, _turned_to(frames, soup, bodies))
     return found
 
 

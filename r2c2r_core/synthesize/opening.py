@@ -37,13 +37,13 @@ class Params:
 def open_all(
     built: Sequence[SceneObject],
     hinges: Mapping[str, Hinge],
-    rebuild: Callable[[int, Hinge], SceneObject],
+    rebuild: Callable[[str, Hinge], SceneObject],
     walls: Sequence[Wall],
     kept: frozenset[str],
 ) -> list[SceneObject]:
     """The objects with free upper limits; a door that cannot open is hung on its other side where that one opens.
 
-    `rebuild` makes object k anew with another hinge. A person's hinge stays, and one that a handle told: there something
+    `rebuild` makes an object anew with another hinge. A person's hinge stays, and one that a handle told: there something
     else was measured wrong. Every turned one carries a warning.
     """
     params = tuned(Params)
@@ -55,7 +55,7 @@ def open_all(
         if hinge is None or told or _travel(opened[index]) > params.blocked_rad:
             continue
         reason = f"hung on the {hinge.side} it could not open"
-        turned = rebuild(index, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=params.opens))
+        turned = rebuild(item.name, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=params.opens))
         trial = [*fixtures[:index], turned, *fixtures[index + 1 :]]
         tried = open_freely(trial, walls, kept)
         others_lose = any(

@@ -1,14 +1,13 @@
 """Placements to an articulated scene of primitives (paper sections 4.4-4.5)."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
-from r2c2r_core.errors import R2C2RError, StageError
-from r2c2r_core.failing import OBJECT_FAILS, failure_line
+from r2c2r_core.errors import StageError
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.capture import Capture
@@ -33,8 +32,6 @@ from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 from r2c2r_core.tuning import Changes, param, tuned
-
-_log = logging.getLogger(__name__)
 
 _WOOD = (0.80, 0.76, 0.70)
 
@@ -69,42 +66,41 @@ def build_scene(
 ) -> ArticulatedScene:
     """Measure every object, arrange them, and build each as a fixture that opens.
 
-    One that cannot be measured is left out, and why is said; raises StageError where none can.
+    One that cannot be measured or built is left out, and why is said; raises StageError where none can.
     """
     carcass = CARCASSES.load(config.fixtures)
     measured: list[MeasuredObject] = []
-    meshes: list[tuple[Placement, MeshAsset]] = []
+    meshes: dict[str, tuple[Placement, MeshAsset]] = {}
     failures: dict[str, str] = {}
     for track, placement, asset in progress.part(0.0, 0.5).each(
         list(zip(tracks, placements, assets, strict=True)), "measuring"
     ):
-        try:
+        with apart("synthesize", track.name, failures):
             measured.append(_measured(capture, track, placement, asset, overrides.of(track.name), config))
-            meshes.append((placement, asset))
-        except OBJECT_FAILS as error:
-            _log.warning("synthesize: %s: %s", track.name, error, exc_info=not isinstance(error, R2C2RError))
-            failures[track.name] = failure_line("synthesize", track.name, error)
+            meshes[track.name] = placement, asset
     if not measured:
         raise StageError("no object could be measured", hint="; ".join(failures.values()))
     progress.at(0.5, "arranging")
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     hinges = choose_hinges(layout.objects, overrides)
-    built = []
-    shapes = list(zip(layout.objects, meshes, strict=True))
-    for item, (placement, asset) in progress.part(0.5, 0.9).each(shapes, "building"):
-        if item.spec.fixture is None:
-            built.append(_thing(item, placement, asset, config.seed))
-        else:
-            built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
+    built: list[SceneObject] = []
+    for item in progress.part(0.5, 0.9).each(layout.objects, "building"):
+        with apart("synthesize", item.name, failures):
+            if item.spec.fixture is None:
+                built.append(_thing(item, *meshes[item.name], config.seed))
+            else:
+                built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
+    if not built:
+        raise StageError("no object could be built", hint="; ".join(failures.values()))
     progress.at(0.9, "opening every joint")
+    arranged = {item.name: item for item in layout.objects if item.name not in failures}
 
-    def rebuild(index: int, hinge: Hinge) -> SceneObject:
-        item = layout.objects[index]
-        return _fixture(item, hinge, overrides.of(item.name), carcass)
+    def rebuild(name: str, hinge: Hinge) -> SceneObject:
+        return _fixture(arranged[name], hinge, overrides.of(name), carcass)
 
     kept = frozenset(name for item in built for name in _uppers_said(item, overrides.of(item.name)))
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
-    made = surroundings_of(capture, layout.objects) if config.surroundings else []
+    made = surroundings_of(capture, list(arranged.values())) if config.surroundings else []
     opened += standing_clear(opened, made, _painted, capture.room.walls, kept)
     return ArticulatedScene(
         name=capture.name,

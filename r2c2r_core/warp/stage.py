@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
+from r2c2r_core.errors import StageError
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.raster import sample_texture
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import Placement
@@ -38,10 +40,6 @@ class WarpConfig:
     params: Changes = tuned_numbers("warp")
 
 
-class _Unusable(Exception):  # not an error: the primitive stays visible and says so
-    """Why a mesh cannot dress its object."""
-
-
 def fit_meshes(
     scene: ArticulatedScene,
     tracks: Sequence[MaskTrack],
@@ -54,15 +52,16 @@ def fit_meshes(
     """Every object with the visual of its mesh; where a mesh cannot be used the primitive stays, with a warning."""
     placed = {p.object_name: (p, a) for p, a in zip(placements, assets, strict=True)}
     objects = []
+    failures: dict[str, str] = {}
     for item in progress.each(list(scene.objects), "fitting"):
-        if item.name not in placed:
-            objects.append(item)
-            continue
-        placement, asset = placed[item.name]
-        try:
-            objects.append(fit_mesh(item, placement, asset, config))
-        except _Unusable as reason:
-            objects.append(replace(item, warnings=(*item.warnings, f"the primitive is shown instead of the mesh: {reason}")))
+        dressed = item
+        if item.name in placed:
+            with apart("warp", item.name, failures):
+                dressed = fit_mesh(item, *placed[item.name], config)
+        if item.name in failures:
+            reason = failures[item.name].removeprefix("warp: ")
+            dressed = replace(item, warnings=(*item.warnings, f"the primitive is shown instead of the mesh: {reason}"))
+        objects.append(dressed)
     return replace(scene, objects=tuple(objects))
 
 
@@ -80,7 +79,7 @@ def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: 
     elif paper is not None:
         warped = paper.apply(canonical.vertices)
     else:
-        raise _Unusable("the paper's corners were not found on it")
+        raise StageError("the paper's corners were not found on it")
     colour = _front_colour(asset.mesh, warped, item)
     painted, paint = with_plain_colours(
         TexturedMesh(vertices=warped, faces=asset.mesh.faces, uv=asset.mesh.uv, texture=asset.mesh.texture),
@@ -104,7 +103,7 @@ def _warped(item: SceneObject, canonical: Points, faces: Faces, target: Points, 
     upright = canonical if tilted is None else canonical @ tilted.upright_from_mesh.T
     front = find_front(upright, faces, seed=config.seed)
     if front is None:
-        raise _Unusable("no flat front was found on it")
+        raise StageError("no flat front was found on it")
     axis_map = _believable(_map_to(front, upright, target, float(item.dimensions_m[1])), config)
     return warp_vertices(upright, faces, axis_map, float(front.centre[1]))
 
@@ -144,9 +143,9 @@ def _believable(axis_map: AxisMap, config: WarpConfig) -> AxisMap:
     """The map, if it stretches no more than a placement can be wrong by."""
     across, (least, most) = axis_map.scale[[0, 2]], config.front_scale
     if (across < least).any() or (across > most).any():
-        raise _Unusable(f"its front would have to be stretched by {across[0]:.2f} x {across[1]:.2f}")
+        raise StageError(f"its front would have to be stretched by {across[0]:.2f} x {across[1]:.2f}")
     if not config.depth_scale[0] <= axis_map.scale[1] <= config.depth_scale[1]:
-        raise _Unusable(f"its depth would have to be stretched by {axis_map.scale[1]:.2f}")
+        raise StageError(f"its depth would have to be stretched by {axis_map.scale[1]:.2f}")
     return axis_map
 
 

@@ -1,12 +1,15 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from r2c2r_core.export import pictures, scan_fit
+from r2c2r_core.export.pictures import write_pictures
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.preview import scene_soup, soup_faces
 from r2c2r_core.export.scan_fit import f_score, scan_fits
-from r2c2r_core.geometry.masks import pack_mask, unpack_mask
+from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Depth
 from r2c2r_core.model.reconstruction import Reconstruction
@@ -55,6 +58,24 @@ def test_a_model_as_far_from_the_scan_as_it_is(behind_m: float) -> None:
     assert fit.median_m == pytest.approx(behind_m, abs=0.0015)
     assert fit.f_score_1cm == pytest.approx(1.0 if behind_m < 0.01 else 0.0, abs=0.02)
     assert fit.f_score_2cm == pytest.approx(1.0, abs=0.02)
+
+
+def test_an_object_that_cannot_be_judged_or_pictured_ends_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    item = filmed(0.0)
+    plan = plan_bundle(item.scene)
+    clicked = {track.name for track in item.tracks}
+    broken = item.tracks[0].masks
+
+    def unpacked(mask: PackedMask) -> np.ndarray:
+        if any(mask is other for other in broken.values()):
+            raise ValueError("cannot reshape array")
+        return unpack_mask(mask)
+
+    monkeypatch.setattr(scan_fit, "unpack_mask", unpacked)
+    window = pictures._window
+    monkeypatch.setattr(pictures, "_window", lambda mask: (unpacked(mask), window(mask))[1])
+    assert set(scan_fits(item, plan)) == clicked - {item.tracks[0].name}
+    assert set(write_pictures(item, plan, tmp_path)) == clicked - {item.tracks[0].name}
 
 
 def test_surface_that_something_unnamed_hides_is_not_judged() -> None:

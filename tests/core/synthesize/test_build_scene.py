@@ -64,6 +64,28 @@ def test_an_object_whose_measuring_fails_is_left_out_and_the_others_stand(monkey
         built(*[unit for unit in units if unit.name == "bottle"])
 
 
+def test_an_object_whose_building_fails_is_left_out_and_the_others_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    find = stage.fixture_of
+
+    def found(spec: Any) -> Any:
+        if spec.name == "microwave":
+            raise IndexError("index 0 is out of bounds")
+        return find(spec)
+
+    def flat(*_: Any, **__: Any) -> Any:
+        raise RuntimeError("QH6154 initial simplex is flat")
+
+    monkeypatch.setattr(stage, "fixture_of", found)
+    monkeypatch.setattr(stage, "convex_pieces", flat)
+    units = [unit for unit in KITCHEN if unit.name in ("cab_l", "cab_r", "bottle", "micro")]
+    scene = built(*units)
+    assert {item.name for item in scene.objects} - {"plinth_1"} == {"cab_l", "cab_r"}
+    assert scene.failures["micro"].startswith("synthesize: micro: IndexError: index 0 is out of bounds")
+    assert scene.failures["bottle"].startswith("synthesize: bottle: RuntimeError: QH6154")
+    with pytest.raises(StageError, match="no object could be built"):
+        built(*[unit for unit in units if unit.name == "bottle"])
+
+
 def test_nothing_touches_at_rest(kitchen: ArticulatedScene) -> None:
     assert deepest_contact(compile_scene(kitchen)) < 5e-4
 

@@ -7,10 +7,29 @@ from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
+from r2c2r_core.warp import stage
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes, front_corners
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 CABINET = Unit("a", "cabinet", (0.3, 0.2, 0.5), (0.6, 0.58, 0.7), yaw=0.4, handle=Handle(0.24, 0.2))
+
+
+def test_a_mesh_whose_fit_fails_leaves_its_primitive_and_the_others_dressed(monkeypatch: pytest.MonkeyPatch) -> None:
+    face_outwards = stage.face_outwards
+
+    def facing(vertices: np.ndarray, *further: object, **settings: object) -> object:
+        if vertices[:, 0].mean() > 1.0:
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return face_outwards(vertices, *further, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stage, "face_outwards", facing)
+    units = (CABINET, Unit("b", "cabinet", (2.3, 0.2, 0.5), (0.6, 0.58, 0.7), handle=Handle(0.24, 0.2)))
+    tracks, placements, assets = zip(*[placed_unit(unit, np.random.default_rng(0)) for unit in units], strict=True)
+    scene = build_scene(capture(), tracks, placements, assets, Overrides(objects={}), SynthesizeConfig())
+    fitted = {item.name: item for item in fit_meshes(scene, tracks, placements, assets, WarpConfig()).objects}
+    assert all(link.visual is not None for link in fitted["a"].links)
+    assert all(link.visual is None for link in fitted["b"].links)
+    assert any("the primitive is shown instead of the mesh: b: LinAlgError: SVD" in line for line in fitted["b"].warnings)
 
 
 Stretch = tuple[float, float, float]
