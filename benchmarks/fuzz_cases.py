@@ -6,6 +6,7 @@ members, folders by their files, everything as bytes; paths and numbers on the c
 
 import json
 import os
+import pkgutil
 import random
 import shutil
 import string
@@ -20,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from r2c2r_core import commands
 from tests.core.export.conftest import write_folder
 from tests.core.export.kitchen import kitchen
 from tests.core.ingest.test_damage import FOLDERS
@@ -27,6 +29,9 @@ from tests.core.ingest.tiny import TinyRoom, write_r3d, zip_folder
 from tests.core.ingest.tiny_formats import write_nerfstudio
 
 ROOM = TinyRoom(count=3)
+
+
+_COMMANDS = {module.name.replace("_", "-") for module in pkgutil.iter_modules(commands.__path__)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,10 @@ class Case:
     @property
     def command(self) -> str:
         """What is run, for the counts."""
-        return self.arguments[0] if self.run == "cli" and self.arguments else self.run
+        if self.run != "cli":
+            return self.run
+        first = self.arguments[0] if self.arguments else ""
+        return first if first in _COMMANDS else "no command"
 
 
 class Inputs:

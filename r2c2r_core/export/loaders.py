@@ -121,14 +121,15 @@ def _usd(scene: Path) -> dict[str, Any]:
 
 
 def _probe(command: list[str], scene: Path) -> dict[str, Any]:
-    """Run a loader in a process of its own: it may crash, print and change the process as it likes."""
+    """Run a loader in a process and a folder of its own: it may crash, print, and write logs where it stands."""
     with tempfile.TemporaryDirectory() as scratch:
         answer = Path(scratch) / "answer.json"
-        run = subprocess.run([*command, str(scene.resolve()), str(answer)], capture_output=True, timeout=_SECONDS, check=False)
+        words = [*command, str(scene.resolve()), str(answer)]
+        run = subprocess.run(words, capture_output=True, timeout=_SECONDS, check=False, cwd=scratch)
         if run.returncode != 0 or not answer.is_file():
-            words = run.stderr.decode(errors="replace").strip().splitlines()
+            said = run.stderr.decode(errors="replace").strip().splitlines()
             died = f"died of {signal.Signals(-run.returncode).name}" if run.returncode < 0 else "gave up"
-            raise RuntimeError(f"{died}: {words[-1] if words else 'without a word'}")
+            raise RuntimeError(f"{died}: {said[-1] if said else 'without a word'}")
         document: dict[str, Any] = json.loads(answer.read_text())
     return document
 

@@ -5,6 +5,7 @@ which passes also opens in engines that know neither. Free-standing things are t
 way is named, it is not the door's defect.
 """
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from r2c2r_core.export.sweeps import examine_joint
 from r2c2r_core.export.together import Meeting, all_together, meetings
 from r2c2r_core.model.report import Finding, JointResult
 from r2c2r_core.progress import SILENT, Progress
+
+_LOG = logging.getLogger(__name__)
 
 ALLOWED_OVERLAP_M = 0.005  # of fixed parts, which no engine moves apart; LRA's gate
 
@@ -96,6 +99,7 @@ def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loose
     """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go."""
     import mujoco
 
+    mujoco.set_mju_user_warning(_LOG.debug)  # else a scene that diverges leaves MUJOCO_LOG.TXT where the person works
     spec = mujoco.MjSpec.from_file(str(mjcf))
     for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
         spec.delete(geom)

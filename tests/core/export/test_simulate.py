@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.export.contacts import touches
-from r2c2r_core.export.simulate import simulate
+from r2c2r_core.export.simulate import compiled, simulate
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import ArticulatedScene, Box, SceneObject
 from tests.core.export.conftest import write_folder
@@ -42,6 +42,20 @@ def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> Non
     assert result.rest_penetration_m == 0.0
     assert result.most_drift_m < 5e-4  # the bottle settles through a tenth of a millimetre
     assert result.realtime_factor > 1.0
+
+
+def test_a_scene_that_diverges_leaves_no_log_where_the_person_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo appends its warnings to MUJOCO_LOG.TXT in the working folder, unless somebody else takes them."""
+    monkeypatch.chdir(tmp_path)
+    Path("scene.xml").write_text(
+        '<mujoco><worldbody><body name="b"><freejoint/><geom size="1" mass="1"/></body></worldbody></mujoco>'
+    )
+    model = compiled(Path("scene.xml"))
+    data = mujoco.MjData(model)
+    data.qvel[:] = np.nan
+    mujoco.mj_step(model, data)
+    assert data.warning[int(mujoco.mjtWarning.mjWARN_BADQVEL)].number == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.xml"]
 
 
 def test_a_door_without_a_gap_to_its_neighbours_jams(tmp_path: Path) -> None:
