@@ -122,6 +122,7 @@ def running(
 ASKED_ON_THE_LOOP: list[tuple[URL, str]] = []
 """The database, and what asked it on the thread of an event loop, where everybody waits for the answer."""
 _COUNTED: dict[URL, list[str]] = {}  # the statements that a database is asked, while a test counts them
+_COMMITTED: dict[URL, list[Connection]] = {}  # and what it stores for good, likewise
 _SILENT: dict[URL, Exception] = {}  # what a database answers instead
 
 
@@ -133,6 +134,16 @@ def statements(engine: Engine) -> Iterator[list[str]]:
         yield _COUNTED[engine.url]
     finally:
         del _COUNTED[engine.url]
+
+
+@contextmanager
+def commits(engine: Engine) -> Iterator[list[Connection]]:
+    """The transactions that are committed meanwhile, by any thread."""
+    _COMMITTED[engine.url] = []
+    try:
+        yield _COMMITTED[engine.url]
+    finally:
+        del _COMMITTED[engine.url]
 
 
 @contextmanager
@@ -150,6 +161,12 @@ def refusing(engine: Engine, error: Exception) -> Iterator[None]:
 def _note_statement(connection: Connection, _cursor: object, statement: str, *_: object) -> None:
     if (counted := _COUNTED.get(connection.engine.url)) is not None:
         counted.append(statement)
+
+
+@event.listens_for(Engine, "commit")
+def _note_commit(connection: Connection) -> None:
+    if (counted := _COMMITTED.get(connection.engine.url)) is not None:
+        counted.append(connection)
 
 
 @event.listens_for(Engine, "begin")

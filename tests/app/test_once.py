@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import event
 from sqlmodel import select
 
 from app.db import once
@@ -19,7 +18,7 @@ from app.routes.once import COVERED
 from app.services import prompts, sending
 from app.settings import Settings
 from app.viewer.client import Viewer
-from tests.app.conftest import Running, fake
+from tests.app.conftest import Running, commits, fake
 from tests.app.nouns import finish
 from tests.app.test_jobs import behave, run
 
@@ -89,14 +88,13 @@ def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_store
 
 
 def test_a_click_and_its_answer_are_one_transaction(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    commits: list[object] = []
     with start() as web:
         at = f"/api/projects/{web.sample()}"
-        event.listen(web.context.engine, "commit", commits.append)
         monkeypatch.setattr(sending, "keep", lambda *_: None)  # the server is gone once the change is stored
-        first = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
-        undone = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
-        assert len(commits) == 2
+        with commits(web.context.engine) as stored:
+            first = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
+            undone = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
+            assert len(stored) == 2
     with start() as web:
         click = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
         undo = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
