@@ -16,6 +16,19 @@ class Params:
     inside_m: float = param(0.010, "m", "inside the cut, where an edge is looked for")
     outside_m: float = param(0.010, "m", "outside the cut, where an edge is looked for")
     depth_ends_m: float = param(0.008, "m", "depth that stops this far short of the cut moves the search there")
+    depth_short_m: float = param(
+        0.04,
+        "m",
+        "by which depth may end before the panel",
+        source="phones leave out 1-2 of 256 columns at an edge: 1-3 cm at 2 m",
+    )
+    least_gradient: float = param(1.5, "grey", "CIELAB units a cell, of an edge on a panel without texture")
+    shadow_m: float = param(
+        0.03, "m", "height of the shadow of a lip", source="worktops stand 1-3 cm over fronts, lights are above"
+    )
+    even_shade: float = param(0.1, "share", "by which colours may be darkened unequally in a shadow")
+    darkest_shade: float = param(0.2, "share", "of the light that a shadow leaves: a gap is darker")
+    least_shade: float = param(0.75, "share", "of the light in what is a shadow")
     half_gap_m: float = param(0.0015, "m", "half a gap, assumed where no edge is clear", source="gaps are 2-4 mm")
     widest_gap_m: float = param(0.012, "m", "of a gap, as blurred as it looks")
     clear: float = param(3.5, "ratio", "to the panel's own median gradient, of an edge")
@@ -29,7 +42,7 @@ def panel_edges(cell: Cell, lab: np.ndarray, seen: np.ndarray, on_plane: np.ndar
         return cell
     left, right = _ends(cell.left, cell.right, *_profiles(lab, seen, on_plane, rows, axis=0), cell_m)
     top, bottom = _ends(cell.top, cell.bottom, *_profiles(lab, seen, on_plane, columns, axis=1), cell_m)
-    return Cell(left, top, right, bottom)
+    return Cell(left, _above_shadow(top, bottom, lab[:, columns], cell_m), right, bottom)
 
 
 def _profiles(
@@ -74,15 +87,16 @@ def _end(
     start = low
     if usual > 0.2 and len(covered) and covered[0] * cell_m > params.depth_ends_m:
         start = low + float(covered[0])  # the cut followed a shadow or an edge of something beside the panel
-    first = max(round(start - params.outside_m / cell_m), 1)
+    least = max(params.clear * own, params.least_gradient)
+    first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
-    window = gradient[first:last]
-    if len(window) < 3 or window.max() < params.clear * own + 0.5:
-        return start + (params.half_gap_m / cell_m if start == low else 0.0)
-    clear = window >= max(params.strong_share * window.max(), params.clear * own)
-    peaks = [i for i in range(1, len(window) - 1) if clear[i] and window[i] >= window[i - 1] and window[i] >= window[i + 1]]
+    peaks = _peaks(gradient[first:last], least)
+    if not peaks:  # the cut followed depth, which ends before the panel does
+        first, last = max(round(low - params.depth_short_m / cell_m), 1), first + 2
+        peaks = _peaks(gradient[first:last], least)
     if not peaks:
         return start + (params.half_gap_m / cell_m if start == low else 0.0)
+    window = gradient[first:last]
     i = peaks[-1]  # the innermost
     gap = _gap_centre(slope[first:last], i, round(params.widest_gap_m / cell_m))
     if gap is not None:
@@ -91,6 +105,44 @@ def _end(
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0
     return first + i + 0.5 + offset
+
+
+def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> float:
+    """The upper edge, moved up where what it follows is the end of a shadow that a lip, as a worktop's, throws on the panel.
+
+    In shadow a surface is darker by one factor in all colours: up to where that stops being so, or it is darkest.
+    """
+    params = tuned(Params)
+    middle = lab[:, lab.shape[1] // 8 : lab.shape[1] - lab.shape[1] // 8]
+    start, reach = round(top), round(params.shadow_m / cell_m)
+    below = slice(start + reach // 2, max(round((top + bottom) / 2), start + reach // 2 + 1))
+    light = _linear(np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1))
+    relative = light / np.maximum(_linear(np.median(middle[below].reshape(-1, 3), axis=0)[None]), 1e-3)
+    shade = relative.mean(axis=1)
+    even = np.abs(relative / np.maximum(shade, 1e-3)[:, None] - 1).max(axis=1) < params.even_shade
+    first = k = start - max(start - reach, 0)
+    while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
+        k -= 1
+    darkened = shade[k] < params.least_shade
+    while darkened and k > 0 and even[k - 1] and shade[k - 1] > shade[k]:
+        k -= 1
+    beyond = slice(max(k - reach, 0), k)
+    gap = bool((even[beyond] & (shade[beyond] > params.least_shade)).any())  # between two panels of one colour
+    return top - (first - k) if darkened and not gap else top
+
+
+def _linear(lab: np.ndarray) -> np.ndarray:
+    """Linear light in red, green and blue, 0..1, of rows of colours."""
+    rgb = cv2.cvtColor(np.clip(lab, 0, 255).astype(np.uint8)[None], cv2.COLOR_LAB2RGB)[0]
+    return np.asarray((rgb / 255.0) ** 2.2)
+
+
+def _peaks(window: np.ndarray, least: float) -> list[int]:
+    """Where the gradient has clear peaks."""
+    least = max(least, tuned(Params).strong_share * float(window.max(initial=0.0)))
+    return [
+        i for i in range(1, len(window) - 1) if window[i] >= least and window[i] >= window[i - 1] and window[i] >= window[i + 1]
+    ]
 
 
 def _gap_centre(slope: np.ndarray, inner: int, reach: int) -> float | None:

@@ -1,0 +1,52 @@
+"""A panel's edges by colour: where depth stops short of them, and below the shadow of a worktop."""
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.orthomosaic import Cell
+
+CELL_M = 0.0025
+WALL, BLUE, STONE = (225, 225, 215), (70, 100, 130), (120, 120, 125)
+PANEL = Cell(60, 60, 260, 300)
+EDGE_CELLS = 2.0  # 5 mm: a mosaic is blurred by as much
+
+
+def mosaic(*areas: tuple[Cell, tuple[int, int, int]], background: tuple[int, int, int] = WALL) -> np.ndarray:
+    image = np.full((360, 320, 3), background, np.uint8)
+    for cell, colour in areas:
+        image[round(cell.top) : round(cell.bottom), round(cell.left) : round(cell.right)] = colour
+    return np.asarray(cv2.GaussianBlur(image, (5, 5), 1.0))
+
+
+def edges(image: np.ndarray, cut: Cell, on_plane: Cell) -> tuple[float, ...]:
+    plane = np.zeros(image.shape[:2], bool)
+    plane[round(on_plane.top) : round(on_plane.bottom), round(on_plane.left) : round(on_plane.right)] = True
+    found = panel_edges(cut, *as_lab(image), plane, CELL_M)
+    return found.left, found.top, found.right, found.bottom
+
+
+def test_an_edge_is_where_colour_changes_though_depth_ends_3_cm_short_of_it() -> None:
+    short = Cell(72, 72, 248, 288)
+    true = pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
+    assert edges(mosaic((PANEL, BLUE)), short, short) == true  # the cut followed depth
+    assert edges(mosaic((PANEL, BLUE)), PANEL, short) == true  # the cut followed colour
+
+
+def in_shade(colour: tuple[int, int, int], share: float) -> tuple[int, int, int]:
+    red, green, blue = (round(value * share ** (1 / 2.2)) for value in colour)
+    return red, green, blue
+
+
+@pytest.mark.parametrize("colour", [BLUE, WALL])
+def test_the_shadow_of_a_worktop_lies_on_the_panel(colour: tuple[int, int, int]) -> None:
+    worktop, shadow = Cell(40, 46, 280, 60), Cell(60, 60, 260, 67)
+    image = mosaic((PANEL, colour), (worktop, STONE), (shadow, in_shade(colour, 0.4)))
+    assert edges(image, PANEL, PANEL)[1] == pytest.approx(60, abs=EDGE_CELLS)
+
+
+def test_a_gap_between_two_panels_is_no_shadow() -> None:
+    upper, gap = Cell(60, 20, 260, 57), Cell(60, 57, 260, 60)
+    image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.3)))
+    assert edges(image, PANEL, PANEL)[1] == pytest.approx(59, abs=EDGE_CELLS)
