@@ -56,6 +56,11 @@ class ProjectFiles:
         return self.previews / "facts.json"
 
     @property
+    def elevations(self) -> Path:
+        """The planes of the scan as fronts are drawn on them, made by the live segmenter; may be deleted at any time."""
+        return self.previews / "elevations"
+
+    @property
     def masks(self) -> Path:
         """Live masks, one file per object and prompt state."""
         return self.root / "masks"

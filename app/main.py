@@ -24,6 +24,7 @@ from app.jobs.runner import Runner
 from app.privacy import without_places
 from app.process import Workers
 from app.routes import (
+    elevations,
     jobs,
     live,
     media,
@@ -70,6 +71,7 @@ ROUTERS = (
     members,
     uploads,
     prompts,
+    elevations,
     proposals,
     jobs,
     reviews,

@@ -33,10 +33,10 @@ def app_document() -> dict[str, Any]:
 def _declaration(name: str, schema: dict[str, Any]) -> str:
     lines = [f"/** {_one_line(schema['description'])} */"] if schema.get("description") else []
     if schema.get("type") != "object":
-        return "\n".join([*lines, f"export type {name} = {_type(schema)};", ""])
+        return "\n".join([*lines, f"export type {_shape_name(name)} = {_type(schema)};", ""])
     required = set(schema.get("required", ()))
     fields = [_field(key, value, key in required) for key, value in schema.get("properties", {}).items()]
-    return "\n".join([*lines, f"export interface {name} {{", *fields, "}", ""])
+    return "\n".join([*lines, f"export interface {_shape_name(name)} {{", *fields, "}", ""])
 
 
 def _field(name: str, schema: dict[str, Any], required: bool) -> str:
@@ -75,7 +75,7 @@ def _answer(operation: dict[str, Any]) -> str:
 def _type(schema: dict[str, Any]) -> str:
     """The TypeScript of a JSON schema."""
     if "$ref" in schema:
-        return str(schema["$ref"]).rsplit("/", 1)[-1]
+        return _shape_name(str(schema["$ref"]).rsplit("/", 1)[-1])
     for union in ("anyOf", "oneOf"):
         if union in schema:
             return " | ".join(dict.fromkeys(_type(option) for option in schema[union]))
@@ -103,6 +103,11 @@ def _array(schema: dict[str, Any]) -> str:
 
 def _key(name: str) -> str:
     return name if name.isidentifier() else json.dumps(name)
+
+
+def _shape_name(name: str) -> str:
+    """What goes in with defaults left out and comes out with all is two shapes: `Front-Input`, `Front-Output`."""
+    return name.replace("-", "")
 
 
 def _one_line(text: str) -> str:

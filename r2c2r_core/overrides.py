@@ -1,11 +1,12 @@
 """overrides.json: what a person corrected. An input saved beside the recording; absent keys are computed."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from r2c2r_core.documents import read_json
 from r2c2r_core.errors import OverrideError
-from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.model.inputs import Overrides, Prompts
 from r2c2r_core.schema.document import checked
 from r2c2r_core.schema.overrides import OverridesFile
 
@@ -22,6 +23,14 @@ def overrides_from(document: Any, path: Path) -> Overrides:
     """Corrections from a parsed document; `path` names it in errors and anchors relative mesh files."""
     file = checked(OverridesFile, document, str(path), OverrideError, hint=_HINT)
     return file.room({name: entry.override(_found(entry.candidate, path.parent)) for name, entry in file.objects.items()})
+
+
+def with_drawn_hinges(overrides: Overrides, prompts: Prompts) -> Overrides:
+    """The corrections, and the hinge sides of drawn fronts where no correction says otherwise."""
+    drawn = {item.name: item.front.hinge for item in prompts.objects if item.front is not None and item.front.hinge is not None}
+    said = {name: overrides.of(name) for name in drawn}
+    hinges = {name: replace(said[name], hinge=said[name].hinge or side) for name, side in drawn.items()}
+    return replace(overrides, objects={**overrides.objects, **hinges})
 
 
 def _found(candidate: str | None, folder: Path) -> str | None:

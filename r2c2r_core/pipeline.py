@@ -24,11 +24,11 @@ from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.reconstruction import Reconstruction, StageRun
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.model.track import MaskTrack
-from r2c2r_core.overrides import NO_OVERRIDES
+from r2c2r_core.overrides import NO_OVERRIDES, with_drawn_hinges
 from r2c2r_core.pool import Pool, usual_workers
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.contradictions import find_contradictions
-from r2c2r_core.segment.prompts import check_prompts
+from r2c2r_core.segment.prompts import check_prompts, without_hinge
 from r2c2r_core.segment.stage import SEGMENTERS, open_session, track_object
 from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
@@ -94,7 +94,7 @@ def reconstruct(
 
 
 def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
-    config, said, work = request.config, request.overrides, run.work
+    config, said, work = request.config, with_drawn_hinges(request.overrides, request.prompts), run.work
     if run.until != "ingest":
         require_tools(request)
 
@@ -177,7 +177,7 @@ def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> di
     name, config = request.tools.segmenter, request.config.segment
     config = replace(config, weights=SEGMENTERS.weights_named(name, config.weights))
     session = Shared(open_session, (capture, aside(run.work.cache), name, config))
-    prompts = {prompt.name: prompt for prompt in request.prompts.objects}
+    prompts = {prompt.name: without_hinge(prompt) for prompt in request.prompts.objects}
     return run.each("segment", track_object, prompts, session, prompts, alone=SEGMENTERS.get(name).alone)
 
 

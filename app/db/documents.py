@@ -5,18 +5,28 @@ from typing import Any
 from sqlmodel import Session
 
 from app.db.keys import overrides_entry
-from app.db.queries import clicks_by_object, live_objects, overrides_by_object
+from app.db.queries import Click, clicks_by_object, live_objects, overrides_by_object
+from app.db.tables import SceneObject
 
 
 def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
-    """prompts.json of the project as it is now; objects without a click on them are left out."""
-    clicks, objects = clicks_by_object(session, project_id), []
-    for item in live_objects(session, project_id):
-        mine = clicks.get(item.id or 0, [])
-        if any(click.label for click in mine):
-            points = [{"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in mine]
-            objects.append({"name": item.name, "category": item.category, "points": points})
-    return {"version": 1, "objects": objects}
+    """prompts.json of the project as it is now; objects neither clicked nor drawn are left out."""
+    clicks, items = clicks_by_object(session, project_id), live_objects(session, project_id)
+    objects = [prompt_entry(item, clicks.get(item.id or 0, [])) for item in items]
+    given = [entry for entry in objects if "front" in entry or any(point["label"] for point in entry["points"])]
+    return {"version": prompts_version(given), "objects": given}
+
+
+def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
+    """One object of prompts.json."""
+    points = [{"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in clicks]
+    drawn = {} if item.front is None else {"front": item.front}
+    return {"name": item.name, "category": item.category, "points": points, **drawn}
+
+
+def prompts_version(objects: list[dict[str, Any]]) -> int:
+    """The version of prompts.json that these need: an older r2c2r reads what is only clicked."""
+    return 2 if any("front" in entry for entry in objects) else 1
 
 
 def overrides_document(session: Session, project_id: str) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from app.errors import Conflict
 Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
-_FIELDS = ("name", "category", "colour", "deleted")
+_FIELDS = ("name", "category", "colour", "deleted", "front")
 _POINT, _CORRECTION, _VERDICT = "point ", "override ", "verdict "  # what follows: its id, its name, its candidate
 
 

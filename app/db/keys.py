@@ -17,18 +17,26 @@ from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.workspace import content_key
 
+Front = dict[str, Any] | None  # drawn: as in prompts.json
 
-def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]]) -> str:
-    """Key of what an object's masks depend on, its name not among it; empty while no click (frame, x, y, label) is on it."""
-    given = [[frame, x, y, label] for frame, x, y, label in clicks]
-    if not any(label for *_, label in given):
+
+def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]], front: Front = None) -> str:
+    """Key of what an object's masks depend on, its name not among it.
+
+    Empty while no click (frame, x, y, label) is on it and no front is drawn.
+    """
+    given: list[Any] = [[frame, x, y, label] for frame, x, y, label in clicks]
+    if front is None and not any(label for *_, label in given):
         return ""
-    return hashlib.sha256(json.dumps([segmenter, category, given]).encode()).hexdigest()[:20]
+    drawn = [{key: value for key, value in front.items() if key != "hinge"}] if front is not None else []
+    return hashlib.sha256(json.dumps([segmenter, category, given, *drawn]).encode()).hexdigest()[:20]
 
 
-def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any]) -> str:
+def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any], front: Front = None) -> str:
     """Key of everything about an object that a result depends on; empty where none does."""
-    prompt = [[c.frame, c.x, c.y, c.label] for c in clicks] if any(c.label for c in clicks) else None
+    prompt: list[Any] | None = [[c.frame, c.x, c.y, c.label] for c in clicks] if any(c.label for c in clicks) else None
+    if front is not None:
+        prompt = [*(prompt or []), front]
     corrected = overrides_entry(override)
     return content_key(name, category if prompt else "", prompt, corrected) if prompt or corrected else ""
 
@@ -50,8 +58,8 @@ def stored_entry(entry: dict[str, Any]) -> dict[str, Any]:
 
 def note_object(session: Session, item: SceneObject, segmenter: str, clicks: list[Click], override: dict[str, Any]) -> None:
     """Store the keys of an object that changed."""
-    item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks])
-    item.inputs = object_key(item.name, item.category, clicks, override)
+    item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks], item.front)
+    item.inputs = object_key(item.name, item.category, clicks, override, item.front)
     session.add(item)
 
 
@@ -76,7 +84,7 @@ def note_segmenter(session: Session, project: Project) -> None:
     clicks = clicks_by_object(session, project.id)
     for item in live_objects(session, project.id, deleted=True):
         drawn = [(c.frame, c.x, c.y, c.label) for c in clicks.get(item.id or 0, [])]
-        item.masks_key = masks_key(project.segmenter, item.category, drawn)
+        item.masks_key = masks_key(project.segmenter, item.category, drawn, item.front)
         session.add(item)
 
 

@@ -139,6 +139,7 @@ class SceneObject(SQLModel, table=True):
     colour: int  # index into the palette
     version: int = 1  # grows with every change
     deleted: bool = False
+    front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
 

@@ -111,7 +111,8 @@ class LiveSegmenters:
             session.worker.close()
 
     def _started(self, project: str, files: ProjectFiles, segmenter: str) -> LiveSession:
-        options = ("--width", str(self._settings.preview_width), "--segmenter", segmenter)
+        width = str(self._settings.preview_width)
+        options = ("--width", width, "--segmenter", segmenter, "--elevations", str(files.elevations))
         worker = Worker((*self._commands.live, str(files.work), *options), files.root / "logs" / "live.log")
         session = LiveSession(project, files, segmenter, worker, self._hub, self._lock, self._tell_object)
         session.proposals_path = None if files.proposals.is_file() else files.proposals

@@ -1,12 +1,12 @@
 """The live segmenter of one project, in a process of its own: `python -m app.jobs.live_segment WORKDIR --width 960
---segmenter geometric`.
+--segmenter geometric --elevations FOLDER`.
 
 Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · {"cmd": "propose"} · end of
 input stops it.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
 {"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
-differs) and {"object", "key", "end"}. The newest click goes first; the objects it interrupted go on afterwards. Proposals,
-{"proposals": [...], "fraction"}, wait until no click does.
+differs) and {"object", "key", "end", "front"}. The newest click goes first; the objects it interrupted go on afterwards.
+Proposals, {"proposals": [...], "fraction"}, wait until no click does.
 """
 
 import argparse
@@ -22,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import told
+from app.jobs.elevation_files import write_elevations
+from app.jobs.front_wire import front_line
 from app.jobs.mask_wire import mask_bits
 from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
@@ -46,11 +48,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("workdir", type=Path)
     parser.add_argument("--width", type=int, default=960)
     parser.add_argument("--segmenter", default=SEGMENTERS.default)
+    parser.add_argument("--elevations", type=Path, help="folder that the planes are drawn into, for whoever edits fronts")
     options = parser.parse_args(arguments)
     commands: Commands = queue.Queue()
     threading.Thread(target=_read_commands, args=(commands,), daemon=True).start()
     try:
         desk = _open_desk(options.workdir, options.width, options.segmenter)
+        if options.elevations is not None:
+            write_elevations(options.elevations, desk.session.elevations())
     except R2C2RError as error:
         _say(state="failed", error=told(error))
         return error.exit_code
@@ -75,6 +80,7 @@ class _Followed:
     """An object on its way through the frames."""
 
     key: str
+    prompt: ObjectPrompt
     masks: Iterator[Glimpse]
     glimpsed: Glimpse | None  # already shown
 
@@ -134,7 +140,7 @@ class Desk:
         with self._changed:
             if glimpsed is not None:
                 self._show(number, key, glimpsed)
-            self._open[number] = _Followed(key, masks, glimpsed)
+            self._open[number] = _Followed(key, prompt, masks, glimpsed)
             self._changed.notify()
 
     def _work(self) -> None:
@@ -189,9 +195,13 @@ class Desk:
             if failure is not None:
                 _fail(number, followed.key, failure)
             elif found is None:
-                _say(object=number, key=followed.key, end="done")
+                _say(object=number, key=followed.key, end="done", front=self._front(followed.prompt))
             elif found != followed.glimpsed:
                 self._show(number, followed.key, found)
+
+    def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
+        panel = self.session.panel(prompt)
+        return front_line(panel, self.capture.world_from_capture) if panel is not None else None
 
     def _show(self, number: int, key: str, found: Glimpse) -> None:
         frame, packed, confidence = found
@@ -214,7 +224,7 @@ def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
 
 
 def _prompt(document: dict[str, Any]) -> ObjectPrompt:
-    return parse_prompts({"version": 1, "objects": [document]}).objects[0]
+    return parse_prompts({"version": 2, "objects": [document]}).objects[0]
 
 
 def _waiting(commands: Commands) -> list[dict[str, Any]] | None:

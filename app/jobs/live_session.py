@@ -169,6 +169,7 @@ class LiveSession:
             self.used = time.monotonic()
             if "end" in line:
                 error = told_body(line["error"]) if line.get("error") else None
+                task.masks.front = line.get("front")
                 self._end_task(number, task, line["end"], error)
                 return
             first = task.state == "waiting"
@@ -197,7 +198,7 @@ class LiveSession:
         task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
         self.deaths = 0 if end == "done" else self.deaths
         try:
-            mask_store.finish(task.path, end, error)
+            mask_store.finish(task.path, end, error, task.masks.front)
         except OSError:
             task.kept = False
         self._note_work()

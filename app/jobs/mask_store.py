@@ -26,6 +26,7 @@ class Masks(Protocol):
 
     end: str | None  # done | failed | cancelled; None when it never came to an end
     error: dict[str, Any] | None
+    front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
 
     def __len__(self) -> int:
         """On how many frames there is one."""
@@ -44,6 +45,7 @@ class MaskFile:
     frames: dict[int, Entry] = field(default_factory=dict)
     end: str | None = None
     error: dict[str, Any] | None = None
+    front: dict[str, Any] | None = None
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -67,6 +69,7 @@ class StoredMasks:
     end: str | None = None
     error: dict[str, Any] | None = None
     backend: str = ""  # that drew them, where the file says so
+    front: dict[str, Any] | None = None
 
     def __len__(self) -> int:
         return len(self.index)
@@ -116,13 +119,13 @@ def append(path: Path, line: dict[str, Any]) -> None:
         handle.write(json.dumps(line) + "\n")
 
 
-def finish(path: Path, end: str, error: dict[str, Any] | None) -> None:
-    """Say how it came to its end, and where each mask is."""
+def finish(path: Path, end: str, error: dict[str, Any] | None, front: dict[str, Any] | None = None) -> None:
+    """Say how it came to its end, what flat front it has, and where each mask is."""
     found = _scanned(path, path.read_bytes() if path.exists() else b"")
-    append(path, {"end": end, "error": error, "index": _packed(found.index)})
+    append(path, {"end": end, "error": error, "front": front, "index": _packed(found.index)})
 
 
-def write(path: Path, entries: list[Entry], backend: str) -> None:
+def write(path: Path, entries: list[Entry], backend: str, front: dict[str, Any] | None = None) -> None:
     """A whole file at once, of what the backend drew."""
     lines, index, at = [], [], 0
     for entry in sorted(entries, key=lambda entry: int(entry["frame"])):
@@ -130,7 +133,7 @@ def write(path: Path, entries: list[Entry], backend: str) -> None:
         index.append([entry["frame"], entry["confidence"], entry["area"], at, len(line)])
         lines.append(line)
         at += len(line)
-    end = {"end": "done", "error": None, "backend": backend, "index": _packed(np.array(index, float))}
+    end = {"end": "done", "error": None, "backend": backend, "front": front, "index": _packed(np.array(index, float))}
     write_atomically(path, b"".join(lines) + json.dumps(end).encode() + b"\n")
 
 
@@ -182,6 +185,7 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
+    found.front = line.get("front")
     index = line.get("index", [])  # numbers, in files of before they were packed
     rows = np.frombuffer(base64.b64decode(index), "<f8") if isinstance(index, str) else np.array(index, float)
     found.index = rows.reshape(-1, 5)

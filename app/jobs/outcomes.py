@@ -123,7 +123,7 @@ def adopt_prompts(session: Session, project: Project, document: dict[str, Any], 
     known = {item.name: item for item in live_objects(session, project.id)}
     colours = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
     items = []
-    for prompt in parse_prompts(document).objects:
+    for prompt, entry in zip(parse_prompts(document).objects, document["objects"], strict=True):
         item = known.get(prompt.name)
         if item is None:
             item = SceneObject(project_id=project.id, name=prompt.name, category=prompt.category, colour=colours, deleted=True)
@@ -131,7 +131,7 @@ def adopt_prompts(session: Session, project: Project, document: dict[str, Any], 
             session.flush()
             colours += 1
         with history.change(session, item, "prompts", "import", f"imported {prompt.name}", who=who):
-            item.deleted, item.category = False, prompt.category
+            item.deleted, item.category, item.front = False, prompt.category, entry.get("front")
             session.add(item)
             for old in session.exec(select(Point).where(Point.object_id == item.id)):
                 session.delete(old)

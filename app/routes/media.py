@@ -9,7 +9,7 @@ from app import schemas
 from app.deps import Ctx
 from app.routes.files import send
 from app.routes.numbers import FrameNumber, RowId
-from app.services import bundles, media, overlays
+from app.services import bundles, elevations, media, overlays
 
 router = APIRouter(prefix="/media/{project}", tags=["media"], default_response_class=Response)
 
@@ -39,6 +39,12 @@ def thumbnail(context: Ctx, request: Request, project: str, v: str = "") -> Resp
 def scan_picture(context: Ctx, request: Request, project: str, side: Literal["plan", "view"], v: str = "") -> Response:
     """The fused scan with the camera's path, from above or from where it was filmed; transparent around it."""
     return send(request, media.scan(context, project, side), "image/png", immutable=bool(v))
+
+
+@router.get("/elevations/{elevation}.png", operation_id="elevationPicture")
+def elevation_picture(context: Ctx, request: Request, project: str, elevation: RowId, v: str = "") -> Response:
+    """A plane of the scan from the front, a pixel a cell."""
+    return send(request, elevations.picture(context, project, elevation), "image/png", immutable=bool(v))
 
 
 @router.get("/candidates/{object}/{candidate}.glb", operation_id="candidateMesh")

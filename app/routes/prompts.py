@@ -80,9 +80,9 @@ def redo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undon
     return undoing.redo(context, project, body)
 
 
-@router.get("/prompts.json", operation_id="exportPrompts")
+@router.get("/prompts.json", operation_id="exportPrompts", response_model_exclude_unset=True)  # version 1 knows no front
 def export_prompts(context: Ctx, project: str) -> schemas.PromptsFile:
-    """The clicks as the command line reads them."""
+    """The clicks and drawn fronts as the command line reads them."""
     return prompt_files.export(context, project)
 
 

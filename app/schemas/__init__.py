@@ -3,6 +3,7 @@
 from app.schemas.base import ErrorBody
 from app.schemas.bundles import Bundle, BundleChange, BundleCheck, Certificate, Finding
 from app.schemas.captures import CaptureFacts, FrameInfo
+from app.schemas.elevations import Elevation, ElevationLines, Elevations, FoundFront
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
 from app.schemas.live import ProjectId, Watch
 from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits
@@ -51,7 +52,7 @@ from app.schemas.system import Backend, BundleFormat, Category, FolderEntry, Fol
 from app.schemas.unknown import UnknownFolder, UnknownKind
 from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
-from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject, PromptsFilePoint
+from r2c2r_core.schema.prompts import PromptsFile, PromptsFileFront, PromptsFileHandle, PromptsFileObject, PromptsFilePoint
 
 __all__ = [
     "AccountIn",
@@ -75,11 +76,15 @@ __all__ = [
     "CommentPatch",
     "Credentials",
     "Deleted",
+    "Elevation",
+    "ElevationLines",
+    "Elevations",
     "ErrorBody",
     "Figures",
     "Finding",
     "FolderEntry",
     "FolderListing",
+    "FoundFront",
     "FrameInfo",
     "FrameMask",
     "HistoryEntry",
@@ -114,6 +119,8 @@ __all__ = [
     "ProjectPatch",
     "ProjectSummary",
     "PromptsFile",
+    "PromptsFileFront",
+    "PromptsFileHandle",
     "PromptsFileObject",
     "PromptsFilePoint",
     "Proposal",

@@ -28,6 +28,7 @@ class DescribedObject(Shape):
     colour: int
     deleted: bool = False
     points: list[DescribedPoint]
+    front: dict[str, Any] | None = None
     override: dict[str, Any] = Field(default_factory=dict)
     verdicts: list[dict[str, Any]] = Field(default_factory=list)
 

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from app.schemas.base import Shape
 from app.schemas.text import Word
+from r2c2r_core.schema.prompts import PromptsFileFront
 
 SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"]
 
@@ -49,14 +50,16 @@ class ObjectIn(Shape):
     name: Word | None = None
     category: Word = "object"
     points: list[PointIn] = Field(default_factory=list, max_length=100)
+    front: PromptsFileFront | None = None  # drawn in its elevation
 
 
 class ObjectPatch(Shape):
-    """What changes; with `version`, only if nobody changed it meanwhile."""
+    """What changes, a drawn front also to none; with `version`, only if nobody changed it meanwhile."""
 
     name: Word | None = None
     category: Word | None = None
     colour: int | None = Field(default=None, ge=0, le=999)
+    front: PromptsFileFront | None = None
     version: int | None = None
 
 
@@ -71,6 +74,7 @@ class SceneObject(Shape):
     version: int
     deleted: bool
     points: list[Point]
+    front: PromptsFileFront | None  # drawn; None: what the clicks find
     can_undo: bool
     can_redo: bool
     segment: SegmentState

@@ -9,6 +9,7 @@ from sqlmodel import col, select
 
 from app import schemas
 from app.db import queries
+from app.db.documents import prompt_entry
 from app.db.engine import reading
 from app.db.keys import masks_key
 from app.db.queries import Drawn, DrawnIn
@@ -17,10 +18,13 @@ from app.errors import NotReady
 from app.file_cache import FileCache
 from app.files import ProjectFiles, project_files
 from app.jobs import mask_store
+from app.jobs.front_wire import front_line
 from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_file, mask_path
 from app.jobs.mask_wire import mask_bits
 from app.services.context import Context
 from r2c2r_core.errors import PromptError
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace, noun_path
 
@@ -76,7 +80,7 @@ def segment(context: Context, project_id: str, object_id: int) -> None:
         item = queries.object_row(session, project_id, object_id)
         clicks = queries.clicks_of(session, object_id)
     if not item.masks_key:
-        raise PromptError(f"{item.name} has no click on it", hint="click on the object first")
+        raise PromptError(f"{item.name} has no click on it", hint="click on the object first, or draw its front")
     _start(context, project, item, clicks)
 
 
@@ -200,8 +204,7 @@ def _frame_mask(number: int, found: Found, entry: Entry) -> FrameMask:
 
 
 def _start(context: Context, project: Project, item: SceneObject, clicks: list[queries.Click]) -> None:
-    points = [{"frame": click.frame, "x": click.x, "y": click.y, "label": click.label} for click in clicks]
-    prompt = {"name": item.name, "category": item.category, "points": points}
+    prompt = prompt_entry(item, clicks)
     context.live.segment(project.id, context.files(project), project.segmenter, item.id or 0, item.masks_key, prompt)
 
 
@@ -233,9 +236,15 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
             return None
         for older in kept.parent.glob(f"{item.name}-*.jsonl"):
             older.unlink(missing_ok=True)
-        mask_store.write(kept, _entries(track, width), track.backend)
+        front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
+        mask_store.write(kept, _entries(track, width), track.backend, front)
     found = _stored(kept)
     return found if found is not None and found.backend == segmenter else None
+
+
+def _world_from_capture(files: ProjectFiles) -> Rigid3:
+    capture: Capture | None = Workspace(files.work).load_latest("ingest", "scene")
+    return capture.world_from_capture if capture is not None else Rigid3()
 
 
 def _entries(track: MaskTrack, width: int) -> list[Entry]:
@@ -261,7 +270,9 @@ def _finished_key(files: ProjectFiles, segmenter: str, name: str) -> str | None:
 def _keys_in(path: Path, segmenter: str) -> dict[str, str]:
     objects: list[dict[str, Any]] = json.loads(path.read_text())["objects"]
     clicks = {entry["name"]: [_click(point) for point in entry["points"]] for entry in objects}
-    return {entry["name"]: masks_key(segmenter, entry["category"], clicks[entry["name"]]) for entry in objects}
+    return {
+        entry["name"]: masks_key(segmenter, entry["category"], clicks[entry["name"]], entry.get("front")) for entry in objects
+    }
 
 
 def _click(point: dict[str, Any]) -> tuple[int, float, float, int]:

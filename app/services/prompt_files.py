@@ -1,7 +1,8 @@
-"""prompts.json: the clicks as the command line reads and writes them."""
+"""prompts.json: the clicks and drawn fronts as the command line reads and writes them."""
 
 from app import schemas
 from app.db import queries
+from app.db.documents import prompt_entry, prompts_version
 from app.db.engine import reading, writing
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
@@ -9,14 +10,12 @@ from app.services.prompts import after_change, change_of, check_point
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
-    """The clicks as the command line reads them."""
+    """What people gave, as the command line reads it."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
-        clicks, objects = queries.clicks_by_object(session, project_id), []
-        for item in queries.live_objects(session, project_id):
-            points = [_file_point(click) for click in clicks.get(item.id or 0, [])]
-            objects.append(schemas.PromptsFileObject(name=item.name, category=item.category, points=points))
-        return schemas.PromptsFile(version=1, objects=objects)
+        clicks, items = queries.clicks_by_object(session, project_id), queries.live_objects(session, project_id)
+        objects = [prompt_entry(item, clicks.get(item.id or 0, [])) for item in items]
+    return schemas.PromptsFile.model_validate({"version": prompts_version(objects), "objects": objects})
 
 
 def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[schemas.SceneObject]:
@@ -29,7 +28,3 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
         items = adopt_prompts(session, project, body.model_dump(), context.who)
         changes = [change_of(context, session, project, item, infer=False) for item in items]
     return [after_change(context, change) for change in changes]
-
-
-def _file_point(click: queries.Click) -> schemas.PromptsFilePoint:
-    return schemas.PromptsFilePoint(frame=click.frame, x=click.x, y=click.y, label=1 if click.label else 0)

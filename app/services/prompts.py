@@ -50,7 +50,7 @@ def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: boo
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = _create(context, session, project, body, "added")
-        change = answered_change(context, session, project, item, infer and bool(body.points))
+        change = answered_change(context, session, project, item, infer and _gives_masks(body))
     return after_change(context, change)
 
 
@@ -62,7 +62,7 @@ def create_all(
         project = queries.project_row(session, project_id)
         items = [_create(context, session, project, body, what) for body in bodies]
         made = [
-            change_of(context, session, project, item, infer and bool(body.points))
+            change_of(context, session, project, item, infer and _gives_masks(body))
             for item, body in zip(items, bodies, strict=True)
         ]
     return [after_change(context, change) for change in made]
@@ -75,12 +75,12 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
         item = queries.object_row(session, project_id, object_id)
         refuse_overtaken(context, session, project, item, body)
         wanted = _wanted(session, item, body)
-        text = ", ".join(f"{key} of {item.name} → {value}" for key, value in wanted.items()) or "nothing"
+        text = ", ".join(_said_of(item, key, value) for key, value in wanted.items()) or "nothing"
         with history.change(session, item, "prompts", "edit", text, who=context.who):
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
-        change = answered_change(context, session, project, item, infer="category" in wanted)
+        change = answered_change(context, session, project, item, infer=bool(wanted.keys() & {"category", "front"}))
     return after_change(context, change)
 
 
@@ -190,6 +190,7 @@ def _create(context: Context, session: Session, project: Project, body: schemas.
     frame = body.points[0].frame if body.points else None
     with history.change(session, item, "prompts", "create", f"{what} {name}", who=context.who, frame=frame):
         item.deleted = False
+        item.front = body.front.model_dump() if body.front is not None else None
         session.add(item)
         session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in body.points)
     return item
@@ -261,6 +262,7 @@ def _shape(
         points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
         can_undo=steps.undo,
         can_redo=steps.redo,
+        front=schemas.PromptsFileFront.model_validate(item.front) if item.front is not None else None,
         segment="none",
         mask_frames=0,
         mask_backend="",
@@ -289,7 +291,21 @@ def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> d
         wanted["category"] = body.category
     if body.colour is not None and body.colour != item.colour:
         wanted["colour"] = body.colour
+    front = body.front.model_dump() if body.front is not None else None
+    if "front" in body.model_fields_set and front != item.front:
+        wanted["front"] = front
     return wanted
+
+
+def _said_of(item: SceneObject, key: str, value: object) -> str:
+    """A field's change in words."""
+    if key != "front":
+        return f"{key} of {item.name} → {value}"
+    return f"front of {item.name} {'drawn' if value is not None else 'as found'}"
+
+
+def _gives_masks(body: schemas.ObjectIn) -> bool:
+    return bool(body.points) or body.front is not None
 
 
 def _point(session: Session, item: SceneObject, point_id: int) -> Point:

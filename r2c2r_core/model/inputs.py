@@ -20,12 +20,33 @@ class PromptPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnHandle:
+    """A handle as a person drew it: x to the right and z up from the front's centre, metres."""
+
+    left_m: float
+    bottom_m: float
+    right_m: float
+    top_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnFront:
+    """A front's rectangle as a person drew it in the elevation of its run."""
+
+    # metres, capture frame: top left, top right, bottom right, bottom left, as a person facing the front sees them
+    corners_capture: tuple[tuple[float, float, float], ...]
+    handle: DrawnHandle | Literal["none"] | None = None  # None: looked for in the picture
+    hinge: HingeSide | None = None  # None: inferred
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectPrompt:
-    """One object a person named and clicked."""
+    """One object a person named, and clicked or drew."""
 
     name: str  # unique, [A-Za-z0-9_]+ (scene_synthesizer and simulators accept no more)
     category: str
     points: tuple[PromptPoint, ...]
+    front: DrawnFront | None = None  # drawn: used as it is, whatever is clicked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,16 +1,20 @@
-"""prompts.json: which objects there are, and where a person clicked them."""
+"""prompts.json: which objects there are, and where a person clicked or drew them."""
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
+from r2c2r_core.model.inputs import DrawnFront, DrawnHandle, HingeSide, ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.schema.document import Document
 from r2c2r_core.texts import OBEYED
 
 MOST_OBJECTS, MOST_POINTS = 10_000, 1000
 MOST_FRAMES = 2**31  # as they are stored
 FARTHEST_PX = 100_000  # no image is wider
+FARTHEST_M = 1000  # no scan reaches farther
+SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
+_SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
 LONGEST = 60  # characters of a name: a mesh's file name holds it twice, and file systems end at 255 bytes
 
 
@@ -27,9 +31,11 @@ def _whole(value: Any) -> Any:
 
 
 Version = Annotated[Literal[1], BeforeValidator(_whole)]
+PromptsVersion = Annotated[Literal[1, 2], BeforeValidator(_whole)]
 Label = Annotated[Literal[0, 1], BeforeValidator(_whole)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$", max_length=LONGEST)]
 Category = Annotated[str, Field(max_length=LONGEST), AfterValidator(_shows)]
+Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M, allow_inf_nan=False)]
 Pixel = Annotated[float, Field(ge=-FARTHEST_PX, le=FARTHEST_PX, allow_inf_nan=False)]
 
 
@@ -42,18 +48,70 @@ class PromptsFilePoint(Document):
     label: Label = Field(description="0 or 1: 1 is on the object, 0 off it")
 
 
+class PromptsFileHandle(Document):
+    """Where a front's handle is: to the right and up from the front's centre."""
+
+    left_m: Metres = Field(description="a number of metres")
+    bottom_m: Metres = Field(description="a number of metres")
+    right_m: Metres = Field(description="a number of metres, more than left_m")
+    top_m: Metres = Field(description="a number of metres, more than bottom_m")
+
+    @model_validator(mode="after")
+    def _right_way_round(self) -> "PromptsFileHandle":
+        if self.left_m >= self.right_m or self.bottom_m >= self.top_m:
+            raise ValueError("a handle without width or height found, left_m < right_m and bottom_m < top_m expected")
+        return self
+
+
+class PromptsFileFront(Document):
+    """A front's rectangle, drawn in the elevation of its run: used exactly as it is."""
+
+    corners_m: list[Annotated[list[Metres], Field(min_length=3, max_length=3)]] = Field(
+        min_length=4,
+        max_length=4,
+        description="four corners [x, y, z] in metres, in the recording's own world: top left, top right, bottom right, "
+        "bottom left, as a person facing the front sees them",
+    )
+    handle: PromptsFileHandle | Literal["none"] | None = Field(
+        default=None, description='a box, "none" for a front without a handle, or null: looked for in the picture'
+    )
+    hinge: HingeSide | None = Field(
+        default=None, description="left, right, top or bottom, as a person facing the front sees it, or null: inferred"
+    )
+
+    @model_validator(mode="after")
+    def _rectangle(self) -> "PromptsFileFront":
+        corners = np.array(self.corners_m)
+        across, down = corners[1] - corners[0], corners[3] - corners[0]
+        sides = [float(np.linalg.norm(side)) for side in (across, down)]
+        if not all(SMALLEST_FRONT_M <= side <= LARGEST_FRONT_M for side in sides):
+            found = " by ".join(f"{side:.3f}" for side in sides)
+            raise ValueError(f"a front of {found} m found, sides of {SMALLEST_FRONT_M} to {LARGEST_FRONT_M:g} m expected")
+        slant_m = abs(across @ down) / max(sides)
+        if np.abs(corners[0] + across + down - corners[2]).max() > _SQUARE_M or slant_m > _SQUARE_M:
+            raise ValueError("corners of no rectangle found, top left, top right, bottom right, bottom left expected")
+        return self
+
+    def drawn(self) -> DrawnFront:
+        """The noun of the pipeline."""
+        handle = DrawnHandle(**self.handle.model_dump()) if isinstance(self.handle, PromptsFileHandle) else self.handle
+        corners = tuple((x, y, z) for x, y, z in self.corners_m)
+        return DrawnFront(corners_capture=corners, handle=handle, hinge=self.hinge)
+
+
 class PromptsFileObject(Document):
     """One object of prompts.json."""
 
     name: Name = Field(description=f"1 to {LONGEST} letters, digits and underscores: simulators accept no more")
     category: Category = Field(description=f"a word such as drawer, of at most {LONGEST} characters")
     points: list[PromptsFilePoint] = Field(max_length=MOST_POINTS, description=f"a list of at most {MOST_POINTS} clicks")
+    front: PromptsFileFront | None = Field(default=None, description="from version 2 on: drawn, whatever is clicked")
 
 
 class PromptsFile(Document):
     """prompts.json."""
 
-    version: Version = Field(description="1, the current format")
+    version: PromptsVersion = Field(description="1 or 2: 2 where a front is drawn")
     objects: list[PromptsFileObject] = Field(
         max_length=MOST_OBJECTS, description="a list of objects, each with a name of its own"
     )
@@ -65,6 +123,8 @@ class PromptsFile(Document):
             if item.name in seen:
                 raise ValueError(f"two objects named '{item.name}' found, unique names expected")
             seen.add(item.name)
+            if item.front is not None and self.version == 1:
+                raise ValueError(f"a drawn front of '{item.name}' found in version 1, version 2 expected")
         return self
 
     def prompts(self) -> Prompts:
@@ -75,6 +135,7 @@ class PromptsFile(Document):
                     name=item.name,
                     category=item.category,
                     points=tuple(PromptPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in item.points),
+                    front=item.front.drawn() if item.front is not None else None,
                 )
                 for item in self.objects
             )

@@ -195,8 +195,8 @@ def _range(size: Size) -> str:
 
 def _clicks(prompt: ObjectPrompt) -> str:
     """The object and where it was clicked first."""
-    first = next(point for point in prompt.points if point.label == 1)
-    return f"{prompt.name} (clicked {_at(first)})"
+    first = next((point for point in prompt.points if point.label == 1), None)
+    return f"{prompt.name} ({f'clicked {_at(first)}' if first is not None else 'drawn'})"
 
 
 def _at(point: PromptPoint) -> str:

@@ -1,11 +1,13 @@
 """prompts.json, and what must hold before anything is computed from clicks."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from r2c2r_core.documents import read_json
 from r2c2r_core.errors import PromptError
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, Prompts
 from r2c2r_core.schema.document import checked
@@ -39,9 +41,16 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
     _check_name(prompt.name)
     if not prompt.category.strip():
         raise PromptError(f"{prompt.name}: empty category found, a word such as drawer expected", hint="name its category")
-    if not any(point.label == 1 for point in prompt.points):
+    if prompt.front is not None and category_of(prompt.category).kind == "thing":
+        raise PromptError(
+            f"{prompt.name}: a front drawn of a '{prompt.category}' found, a furniture front or an appliance expected",
+            hint="correct its category",
+        )
+    if prompt.front is None and not any(point.label == 1 for point in prompt.points):
         found = f"{len(prompt.points)} clicks off it" if prompt.points else "no clicks"
-        raise PromptError(f"{prompt.name}: {found} found, at least one click on it expected", hint="click on the object")
+        raise PromptError(
+            f"{prompt.name}: {found} found, at least one click on it expected", hint="click on the object, or draw its front"
+        )
     frames = {frame.index: frame for frame in capture.frames}
     for point in prompt.points:
         if point.frame not in frames:
@@ -57,6 +66,11 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
                 f"0 <= x < {camera.width} and 0 <= y < {camera.height} expected",
                 hint="click inside the image",
             )
+
+
+def without_hinge(prompt: ObjectPrompt) -> ObjectPrompt:
+    """What masks depend on: a hinge moves none, and turned around it computes none anew."""
+    return prompt if prompt.front is None else replace(prompt, front=replace(prompt.front, hinge=None))
 
 
 def _check_names(objects: tuple[ObjectPrompt, ...]) -> None:

@@ -9,9 +9,10 @@ from typing import Literal, Protocol
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.tuning import Changes
@@ -61,6 +62,12 @@ class SegmentSession(Protocol):
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:
         """Frame, mask and confidence: the frame clicked last, then outwards both ways; only frames that see the object."""
+
+    def elevations(self) -> Iterator[Elevation]:
+        """The planes of the capture as a person draws fronts on them."""
+
+    def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
+        """The flat front of an object that was streamed; None where it has none, or it is not measured yet."""
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Objects to confirm, surest first, found so far with the share of the work done; the last step has them all."""

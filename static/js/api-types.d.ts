@@ -230,6 +230,36 @@ export interface Deleted {
   freed_bytes: number;
 }
 
+/** A plane to scale. Cells are counted from its top left corner, to the right and down; axes are unit vectors. */
+export interface Elevation {
+  id: number;
+  url: string;
+  cell_m: number;
+  columns: number;
+  rows: number;
+  origin_m: number[];
+  right: number[];
+  down: number[];
+  top_m: number;
+  upright: ElevationLines;
+  level: ElevationLines;
+  cells: number[][];
+}
+
+/** How clearly lines of one direction show: what edges snap to. */
+export interface ElevationLines {
+  block: number;
+  blocks: number;
+  positions: number;
+  clarity: string;
+}
+
+/** All of them, the one with the most panels first; none while the live segmenter has not drawn them. */
+export interface Elevations {
+  drawn: boolean;
+  items: Elevation[];
+}
+
 /** The one shape of an error; `current` is what is stored now when the kind is `conflict`. */
 export interface ErrorBody {
   kind: string;
@@ -271,6 +301,13 @@ export interface FolderListing {
   path: string;
   parent: string | null;
   entries: FolderEntry[];
+}
+
+/** The flat front of an object, as its masks were drawn with it. */
+export interface FoundFront {
+  object: number;
+  corners_m: number[][];
+  handle: PromptsFileHandle | null;
 }
 
 /** One frame; `index` is its number in the recording. Image: /media/{project}/frames/{index}.jpg?w=960&v={media_version}. */
@@ -406,13 +443,15 @@ export interface ObjectIn {
   name?: string | null;
   category?: string;
   points?: PointIn[];
+  front?: PromptsFileFrontInput | null;
 }
 
-/** What changes; with `version`, only if nobody changed it meanwhile. */
+/** What changes, a drawn front also to none; with `version`, only if nobody changed it meanwhile. */
 export interface ObjectPatch {
   name?: string | null;
   category?: string | null;
   colour?: number | null;
+  front?: PromptsFileFrontInput | null;
   version?: number | null;
 }
 
@@ -612,16 +651,53 @@ export interface ProjectSummary {
 }
 
 /** prompts.json. */
-export interface PromptsFile {
-  version: 1;
-  objects: PromptsFileObject[];
+export interface PromptsFileInput {
+  version: 1 | 2;
+  objects: PromptsFileObjectInput[];
+}
+
+/** prompts.json. */
+export interface PromptsFileOutput {
+  version: 1 | 2;
+  objects: PromptsFileObjectOutput[];
+}
+
+/** A front's rectangle, drawn in the elevation of its run: used exactly as it is. */
+export interface PromptsFileFrontInput {
+  corners_m: number[][];
+  handle?: PromptsFileHandle | "none" | null;
+  hinge?: "left" | "right" | "top" | "bottom" | null;
+}
+
+/** A front's rectangle, drawn in the elevation of its run: used exactly as it is. */
+export interface PromptsFileFrontOutput {
+  corners_m: number[][];
+  handle: PromptsFileHandle | "none" | null;
+  hinge: "left" | "right" | "top" | "bottom" | null;
+}
+
+/** Where a front's handle is: to the right and up from the front's centre. */
+export interface PromptsFileHandle {
+  left_m: number;
+  bottom_m: number;
+  right_m: number;
+  top_m: number;
 }
 
 /** One object of prompts.json. */
-export interface PromptsFileObject {
+export interface PromptsFileObjectInput {
   name: string;
   category: string;
   points: PromptsFilePoint[];
+  front?: PromptsFileFrontInput | null;
+}
+
+/** One object of prompts.json. */
+export interface PromptsFileObjectOutput {
+  name: string;
+  category: string;
+  points: PromptsFilePoint[];
+  front: PromptsFileFrontOutput | null;
 }
 
 /** One click of prompts.json. */
@@ -750,6 +826,7 @@ export interface SceneObject {
   version: number;
   deleted: boolean;
   points: Point[];
+  front: PromptsFileFrontOutput | null;
   can_undo: boolean;
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
@@ -982,6 +1059,10 @@ export interface Operations {
   addComment: { parameters: { project: string }; body: CommentIn; answer: Comment };
   /** PATCH /api/projects/{project}/comments/{comment} */
   changeComment: { parameters: { project: string; comment: number }; body: CommentPatch; answer: Comment };
+  /** GET /api/projects/{project}/elevations */
+  getElevations: { parameters: { project: string }; body: undefined; answer: Elevations };
+  /** GET /api/projects/{project}/elevations/fronts */
+  getFoundFronts: { parameters: { project: string }; body: undefined; answer: FoundFront[] };
   /** GET /api/projects/{project}/figures */
   getFigures: { parameters: { project: string }; body: undefined; answer: Figures };
   /** GET /api/projects/{project}/frames */
@@ -1035,9 +1116,9 @@ export interface Operations {
   /** POST /api/projects/{project}/objects/{object}/verdicts */
   giveVerdict: { parameters: { project: string; object: number }; body: VerdictIn; answer: Reviewed };
   /** GET /api/projects/{project}/prompts.json */
-  exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFile };
+  exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFileOutput };
   /** POST /api/projects/{project}/prompts.json */
-  importPrompts: { parameters: { project: string }; body: PromptsFile; answer: SceneObject[] };
+  importPrompts: { parameters: { project: string }; body: PromptsFileInput; answer: SceneObject[] };
   /** GET /api/projects/{project}/proposals */
   getProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
   /** POST /api/projects/{project}/proposals/confirm */
@@ -1098,6 +1179,8 @@ export interface Operations {
   candidatePicture: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/depth/{frame}.png */
   depthImage: { parameters: { project: string; frame: number; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/elevations/{elevation}.png */
+  elevationPicture: { parameters: { project: string; elevation: number; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/frames/{frame}.jpg */
   frameImage: { parameters: { project: string; frame: number; w?: number | null; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/overlay/{object}/{frame}.png */

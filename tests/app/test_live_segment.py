@@ -44,6 +44,9 @@ class Session:
     def prefetch(self) -> Iterator[None]:
         return iter(())
 
+    def panel(self, prompt: ObjectPrompt) -> None:
+        return None
+
     def propose(self) -> Iterator[Any]:
         return iter([(1.0, ())])
 

@@ -54,7 +54,7 @@ def about(kept: Kept) -> list[tuple[str, str, str]]:
     for path, methods in kept.web.app.openapi()["paths"].items():
         if "{project}" in path or "{job}" in path:
             filled = path.replace("{project}", kept.project).replace("{job}", str(kept.jobs[0]))
-            filled = re.sub(r"\{side\}", "plan", re.sub(r"\{(object|point|frame|version|comment)\}", "1", filled))
+            filled = re.sub(r"\{side\}", "plan", re.sub(r"\{(object|point|frame|version|comment|elevation)\}", "1", filled))
             found += [
                 (said["operationId"], method.upper(), re.sub(r"\{\w+\}", "c0", filled)) for method, said in methods.items()
             ]

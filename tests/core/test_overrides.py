@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import OverrideError
-from r2c2r_core.overrides import read_overrides
+from r2c2r_core.model.inputs import DrawnFront, ObjectOverride, ObjectPrompt, Overrides, Prompts
+from r2c2r_core.overrides import read_overrides, with_drawn_hinges
 
 
 def write(tmp_path: Path, document: object) -> Path:
@@ -85,3 +86,14 @@ def test_limits_may_name_their_joint_and_leave_one_end_open(tmp_path: Path) -> N
 def test_a_list_of_objects_is_read_as_in_prompts(tmp_path: Path) -> None:
     overrides = read_overrides(write(tmp_path, {"objects": [{"name": "door", "hinge": "left"}]}))
     assert overrides.of("door").hinge == "left"
+
+
+def test_a_drawn_hinge_counts_where_no_correction_says_otherwise() -> None:
+    corners = ((0.0, 0.0, 0.8), (0.6, 0.0, 0.8), (0.6, 0.0, 0.1), (0.0, 0.0, 0.1))
+    drawn = [
+        ObjectPrompt(name=name, category="cabinet", points=(), front=DrawnFront(corners_capture=corners, hinge=side))
+        for name, side in (("a", "left"), ("b", "left"), ("c", None))
+    ]
+    said = Overrides(objects={"b": ObjectOverride(hinge="right")})
+    both = with_drawn_hinges(said, Prompts(objects=tuple(drawn)))
+    assert {name: entry.hinge for name, entry in both.objects.items()} == {"a": "left", "b": "right"}

@@ -7,12 +7,13 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.kitchen.category import Category
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
+from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import depth_to_wall, find_front, seen_sides
+from r2c2r_core.segment.fronts.front import Front, depth_to_wall, find_front, seen_sides
 from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundThing
@@ -52,6 +53,17 @@ def find_object(prepared: PreparedCapture, prompt: ObjectPrompt, category: Categ
     )
 
 
+def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFront, category: Category) -> Found:
+    """The front that a person drew, as it was drawn: nothing is cut. Raises ObjectNotSeen where no frame sees it."""
+    scene = prepared.scene
+    front = drawn_front(drawn, scene, prepared.config)
+    depth_m = depth_to_wall(front, scene.capture.room, category)
+    front = replace(front, depth_m=depth_m or category.depth.usual)
+    if category.kind == "appliance":
+        return FoundAppliance(front, scene, warnings=() if depth_m else (_assumed_depth(front, prompt),))
+    return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, swings=_swings(category))
+
+
 def glimpse_object(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits
 ) -> Found | None:
@@ -78,8 +90,12 @@ def _front(prepared: PreparedCapture, category: Category, positives: Points, neg
         return None
     depth = depth_to_wall(front, prepared.scene.capture.room, category) or category.depth.usual
     front = replace(front, depth_m=depth)
-    swings = category.opens in ("side", "bottom") and not category.may_be_pair
-    return FoundFront(replace(front, sides=seen_sides(front, prepared.scene)), prepared.scene, swings=swings)
+    return FoundFront(replace(front, sides=seen_sides(front, prepared.scene)), prepared.scene, swings=_swings(category))
+
+
+def _swings(category: Category) -> bool:
+    """Whether it is one door: drawers slide, and of a pair each leaf would have to be told apart."""
+    return category.opens in ("side", "bottom") and not category.may_be_pair
 
 
 def _appliance(
@@ -88,8 +104,11 @@ def _appliance(
     front, seen = appliance_front(prepared, prompt, category, negatives, glimpse=glimpse) or (None, False)
     if front is None:
         return None
-    assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
-    return FoundAppliance(front, prepared.scene, warnings=() if seen else (assumed,))
+    return FoundAppliance(front, prepared.scene, warnings=() if seen else (_assumed_depth(front, prompt),))
+
+
+def _assumed_depth(front: Front, prompt: ObjectPrompt) -> str:
+    return f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
 
 
 def _thing(

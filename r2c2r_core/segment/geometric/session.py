@@ -15,14 +15,16 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import MaskTrack, Swing
+from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
+from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.geometric.cache import kept
-from r2c2r_core.segment.geometric.finders import find_object, glimpse_object
+from r2c2r_core.segment.geometric.finders import find_drawn, find_object, glimpse_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.proposals.propose import propose_steps
@@ -74,6 +76,8 @@ class GeometricSession:
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
         """A first mask in the frame clicked last: what `stream` brings there; of things and appliances, nearly that."""
+        if prompt.front is not None:
+            return None
         found = self._found.get(prompt) or glimpse_object(self, prompt, *self._clicked(prompt)) or self.find(prompt)
         frame = self.scene.frame(prompt.points[-1].frame)
         view = found.see(frame)
@@ -124,6 +128,14 @@ class GeometricSession:
         for index, view in self._views(prompt):
             yield index, pack_mask(view.mask), view.trust
 
+    def elevations(self) -> Iterator[Elevation]:
+        """The planes of the capture as a person draws fronts on them."""
+        return elevations(self)
+
+    def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
+        """The object's flat front."""
+        return self.find(prompt).panel()
+
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Proposals so far, surest first, with the share of the work done; the last step has them all."""
         return propose_steps(self)
@@ -132,9 +144,15 @@ class GeometricSession:
         """What the clicks mean, computed once a prompt."""
         found = self._found.get(prompt)
         if found is None:
-            hint, positives, negatives = self._clicked(prompt)
-            found = self._found[prompt] = find_object(self, prompt, hint, positives, negatives)
+            found = self._found[prompt] = self._find(prompt)
         return found
+
+    def _find(self, prompt: ObjectPrompt) -> Found:
+        if prompt.front is not None:
+            check_prompt(self.scene.capture, prompt)
+            return find_drawn(self, prompt, prompt.front, category_of(prompt.category))
+        hint, positives, negatives = self._clicked(prompt)
+        return find_object(self, prompt, hint, positives, negatives)
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
         """The furniture run on a plane, and this far around it; computed once."""
@@ -155,7 +173,8 @@ class GeometricSession:
     def _views(self, prompt: ObjectPrompt) -> Iterator[tuple[int, View]]:
         """Frames that show it, the one clicked last first, then outwards both ways."""
         found = self.find(prompt)
-        for frame in _outwards(self.scene.frames, prompt.points[-1].frame):
+        first = prompt.points[-1].frame if prompt.points else self.scene.frames[0].index
+        for frame in _outwards(self.scene.frames, first):
             view = found.see(frame)
             if self._shows(view):
                 yield frame.index, view

@@ -10,9 +10,10 @@ from r2c2r_core.arrays import Image, Mask
 from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.geometric.session import GeometricSegmenter, GeometricSession
 from r2c2r_core.segment.learned.fuse import DepthPictures, Fused, both_masks, with_evidence
@@ -80,6 +81,8 @@ class LearnedSession:
 
     def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
         """The model's mask in one frame; follows the object up to there when that was not done yet."""
+        if prompt.front is not None:
+            return self.prepared.mask_at(prompt, frame_index)
         known = {frame.index for frame in self.capture.frames}
         if frame_index not in known:
             raise PromptError(
@@ -104,10 +107,14 @@ class LearnedSession:
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
         """As the model gives them: the frame clicked last, the other clicked ones, then outwards both ways."""
+        if prompt.front is not None:
+            return self.prepared.stream(prompt)
         return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
         """The object in every frame that sees it, after all frames had their say; raises ObjectNotSeen."""
+        if prompt.front is not None:  # as it was drawn: there is nothing to find
+            return self.prepared.track(prompt, progress=progress)
         total, followed = len(self.capture.frames), self._of(prompt)
         masks: dict[int, PackedMask] = {}
         confidence: dict[int, float] = {}
@@ -127,6 +134,14 @@ class LearnedSession:
             fused = with_evidence(self.prepared.scene, fused, body, self.config.least_area_px)
         progress.at(0.95, f"{prompt.name}: measuring it")
         return self._track(prompt, fused, measure(self.prepared, prompt, fused.masks, body))
+
+    def elevations(self) -> Iterator[Elevation]:
+        """Those of the weight-free segmenter."""
+        return self.prepared.elevations()
+
+    def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
+        """What was drawn; what is found is measured when all frames had their say."""
+        return self.prepared.panel(prompt) if prompt.front is not None else None
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """What the weight-free segmenter sees; the model follows what is confirmed."""

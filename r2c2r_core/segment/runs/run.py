@@ -15,7 +15,7 @@ from r2c2r_core.segment.runs.xy_cut import cut_panels
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
-_STEADY_CELLS = 1.0  # slides below this are measurement noise: poses agree
+STEADY_CELLS = 1.0  # slides below this are measurement noise: poses agree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +84,7 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     vertical, horizontal = _evidence(tiles, grid, region, margin_m)
     vertical, horizontal = _with_edges(vertical, relief, 0, grid), _with_edges(horizontal, relief, 1, grid)
     spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
-    poses_agree = bool(spread <= _STEADY_CELLS)
+    poses_agree = bool(spread <= STEADY_CELLS)
     if poses_agree:
         for tile in tiles:
             tile.shift = (0.0, 0.0)

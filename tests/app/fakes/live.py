@@ -1,7 +1,7 @@
 """A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
 A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded; one at x >= 156 gets one
-frame and no further until it is superseded or stopped. Two drawers and a bottle are proposed.
+frame and no further until it is superseded or stopped. Two drawers and a bottle are proposed, one plane is drawn.
 """
 
 import json
@@ -13,8 +13,10 @@ from queue import Empty, Queue
 
 import numpy as np
 
+from app.jobs.elevation_files import write_elevations
 from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.model.elevation import Elevation, Lines
 
 FRAMES = (3, 0, 7)
 PROPOSED = (("front", "drawer", 0.95, 30.5), ("front", "drawer", 0.9, 60.5), ("thing", "bottle", 0.4, 100.5))
@@ -52,6 +54,23 @@ def propose() -> None:
     say(proposals=found, fraction=1.0)
 
 
+def elevation() -> Elevation:
+    """A plane of 2.4 by 0.9 m with seams every 60 cm."""
+    upright = np.zeros((9, 240), np.uint8)
+    upright[:, 60::60] = 255
+    return Elevation(
+        picture=np.full((90, 240, 3), 230, np.uint8),
+        cell_m=0.01,
+        origin_capture=np.array([0.0, 2.0, 0.9]),
+        right_capture=np.array([1.0, 0.0, 0.0]),
+        down_capture=np.array([0.0, 0.0, -1.0]),
+        top_m=0.9,
+        upright=Lines(clarity=upright, block=10),
+        level=Lines(clarity=np.zeros((24, 90), np.uint8), block=10),
+        cells=((0.0, 10.0, 60.0, 80.0),),
+    )
+
+
 def superseded(commands: Queue, number: int, *, wait: bool) -> bool:
     """Whether a later command ends this one; what it reads stays in the queue, in its order."""
     read, found = [], False
@@ -80,13 +99,17 @@ def main() -> None:
     while Path(sys.argv[1], "prepare_slowly").exists():
         say(state="preparing", fraction=0.6, text="slowly")
         time.sleep(0.02)
+    if "--elevations" in sys.argv:
+        write_elevations(Path(sys.argv[sys.argv.index("--elevations") + 1]), [elevation()])
     say(state="ready", total=3)
     while (command := commands.get()) is not None:
         if command["cmd"] == "propose":
             propose()
         if command["cmd"] != "segment":
             continue
-        number, key, point = command["object"], command["key"], command["prompt"]["points"][0]
+        number, key, prompt = command["object"], command["key"], command["prompt"]
+        point = (prompt["points"] or [{"x": 80.5, "y": 60.5, "label": 1}])[0]
+        front = {"corners_m": prompt["front"]["corners_m"], "handle": None} if "front" in prompt else None
         if point["label"] == 0:
             say(
                 object=number,
@@ -101,7 +124,7 @@ def main() -> None:
             if superseded(commands, number, wait=point["x"] >= 156):
                 break
         else:
-            say(object=number, key=key, end="done")
+            say(object=number, key=key, end="done", front=front)
 
 
 main()

@@ -6,13 +6,19 @@ import pytest
 
 from r2c2r_core.errors import PromptError
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import PromptPoint, Prompts
+from r2c2r_core.model.inputs import DrawnHandle, PromptPoint, Prompts
 from r2c2r_core.segment.prompts import check_prompts, read_prompts
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import prompt
 
 POINT = {"frame": 60, "x": 100.0, "y": 50.5, "label": 1}
 OBJECT: dict[str, Any] = {"name": "drawer_1", "category": "drawer", "points": [POINT]}
+
+
+CORNERS = [[0.0, 0.0, 0.8], [0.6, 0.0, 0.8], [0.6, 0.0, 0.1], [0.0, 0.0, 0.1]]
+SLANTED = [[0.0, 0.0, 0.8], [0.6, 0.0, 0.9], [0.6, 0.0, 0.1], [0.0, 0.0, 0.1]]
+HANDLE = {"left_m": -0.1, "bottom_m": 0.2, "right_m": 0.1, "top_m": 0.22}
+FRONT: dict[str, Any] = {"corners_m": CORNERS, "handle": HANDLE, "hinge": "left"}
 
 
 def written(tmp_path: Path, document: Any) -> Path:
@@ -27,13 +33,36 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
     assert prompts.objects[0].points == (PromptPoint(frame=60, x=100.0, y=50.5, label=1),)
 
 
+def test_a_drawn_front_needs_no_click(tmp_path: Path) -> None:
+    document = {"version": 2, "objects": [{"name": "a", "category": "cabinet", "points": [], "front": FRONT}]}
+    drawn = read_prompts(written(tmp_path, document)).objects[0].front
+    assert drawn is not None
+    assert drawn.corners_capture[2] == (0.6, 0.0, 0.1)
+    assert drawn.handle == DrawnHandle(**HANDLE)
+    assert drawn.hinge == "left"
+
+
 @pytest.mark.parametrize(
     ("document", "message"),
     [
         ("{", "not usable JSON: line 1, column 2"),
         ([], "the document is []"),
         ({"objects": []}, "the document lacks 'version'; expected 1"),
-        ({"version": 2, "objects": []}, "version is 2; expected 1"),
+        ({"version": 3, "objects": []}, "version is 3; expected 1 or 2"),
+        (
+            {"version": 1, "objects": [{**OBJECT, "front": FRONT}]},
+            "a drawn front of 'drawer_1' found in version 1, version 2 expected",
+        ),
+        (
+            {"version": 2, "objects": [{**OBJECT, "front": {**FRONT, "corners_m": SLANTED}}]},
+            "objects.drawer_1.front: corners of no rectangle found",
+        ),
+        (
+            {"version": 2, "objects": [{**OBJECT, "front": {"corners_m": [[0.0, 0.0, 0.0]] * 4}}]},
+            "a front of 0.000 by 0.000 m found, sides of 0.02 to 10 m expected",
+        ),
+        ({"version": 2, "objects": [{**OBJECT, "front": {**FRONT, "hinge": "middle"}}]}, "front.hinge is 'middle'"),
+        ({"version": 2, "objects": [{**OBJECT, "front": {**FRONT, "handle": "bar"}}]}, "front.handle is 'bar'"),
         ({"version": True, "objects": []}, "version: found True; expected 1"),
         ({"version": 1, "objects": [], "notes": ""}, "unknown key 'notes' in the document; expected version, objects"),
         ({"version": 1, "objects": {}}, "objects is {}; expected a list of objects"),

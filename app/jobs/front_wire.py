@@ -1,0 +1,22 @@
+"""A front that was found, as it goes over the wire: its corners in the capture frame and its handle."""
+
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.track import FrontPanel
+
+
+def front_line(panel: FrontPanel, world_from_capture: Rigid3) -> dict[str, Any]:
+    """What schemas.FoundFront says of it: top left, top right, bottom right, bottom left; the handle from its centre."""
+    c, s = np.cos(panel.roll_rad), np.sin(panel.roll_rad)
+    right, up = np.array([c, 0.0, s]) * panel.width_m / 2, np.array([-s, 0.0, c]) * panel.height_m / 2
+    corners = panel.world_from_front.apply(np.stack([up - right, up + right, right - up, -up - right]))
+    handle = panel.handle
+    return {
+        "corners_m": world_from_capture.inverse.apply(corners).round(6).tolist(),
+        "handle": None
+        if handle is None
+        else {"left_m": handle.left_m, "bottom_m": handle.bottom_m, "right_m": handle.right_m, "top_m": handle.top_m},
+    }

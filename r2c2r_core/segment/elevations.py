@@ -1,0 +1,46 @@
+"""Each plane of a prepared capture drawn to scale, with its lines and the panels cut on it, for a person to correct.
+
+The one place where the editor of fronts asks the runs; what it needs of them is named in `Elevation`.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from r2c2r_core.model.elevation import Elevation, Lines
+from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.segment.runs.run import Run
+
+_LEAST_SIDE_M = 0.3  # of a plane that is shown: a single front is as large
+_CLEAR_Z = 6.0  # of a line that is drawn as the clearest
+
+
+def elevations(prepared: PreparedCapture) -> Iterator[Elevation]:
+    """Those of planes large enough, the one with the most panels first."""
+    large = [plane for plane in prepared.planes if min(plane.width_m, plane.height_m) >= _LEAST_SIDE_M]
+    runs = [run for plane in large if (run := prepared.run_of(plane)) is not None]
+    for run in sorted(runs, key=lambda run: (-len(run.cells), -run.region.area_m2)):
+        yield _elevation(run, prepared)
+
+
+def _elevation(run: Run, prepared: PreparedCapture) -> Elevation:
+    grid, capture_from_world = run.grid, prepared.scene.capture.world_from_capture.inverse
+    corners_world = grid.points_at(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    corners = capture_from_world.apply(corners_world)
+    return Elevation(
+        picture=run.mosaic,
+        cell_m=grid.cell_m,
+        origin_capture=corners[0],
+        right_capture=(corners[1] - corners[0]) / grid.cell_m,
+        down_capture=(corners[2] - corners[0]) / grid.cell_m,
+        top_m=float(corners_world[0, 2]),
+        upright=_lines(run.vertical),
+        level=_lines(run.horizontal),
+        cells=tuple((cell.left, cell.top, cell.right, cell.bottom) for cell in run.cells),
+    )
+
+
+def _lines(evidence: Evidence) -> Lines:
+    shares = np.clip(np.nan_to_num(evidence.score) / _CLEAR_Z, 0.0, 1.0)
+    return Lines(clarity=np.round(255 * shares).astype(np.uint8), block=evidence.block)

@@ -1,0 +1,126 @@
+"""A front as a person drew it: its rectangle as it is, its picture for the handle and the frames' pose errors; no cut."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.model.inputs import DrawnFront, DrawnHandle
+from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.fronts.front import Front, front_panel
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.protocol import SegmentConfig
+from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.lines import gather
+from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, blend, choose_frames, make_tile
+from r2c2r_core.segment.runs.relief import STEP, measure_relief
+from r2c2r_core.segment.runs.run import STEADY_CELLS, Run
+from r2c2r_core.segment.scene import Scene
+
+_AROUND_M = 0.08  # of the plane that is looked at beside it: its neighbours' lines tell the frames' pose errors
+_SUPPORT_M = 0.02  # side of the region's cells
+
+
+def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front:
+    """The drawn rectangle on a grid of its own; `depth_m` is not known here. Raises ObjectNotSeen where no frame sees it."""
+    corners = scene.capture.world_from_capture.apply(np.array(drawn.corners_capture))
+    grid, cell = _grid_around(corners, config.cell_m)
+    run = _run_of(grid, cell, scene, config.mosaic_frames)
+    handle = _handle_on(drawn.handle, cell, grid.cell_m) if drawn.handle is not None else run.handles[0]
+    return Front(run, cell, handle, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundDrawn(FoundFront):
+    """A furniture front whose rectangle a person drew."""
+
+    def panel(self) -> FrontPanel | None:
+        """The rectangle, sure as it is said, and its handle."""
+        return replace(front_panel(self.front), confidence=1.0)
+
+
+def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]:
+    """A grid whose axes are the rectangle's edges, and the rectangle on it."""
+    across, up = corners_world[1] - corners_world[0], corners_world[0] - corners_world[3]
+    width_m, height_m = float(np.linalg.norm(across)), float(np.linalg.norm(up))
+    right = across / width_m
+    into = np.cross(up / height_m, right)
+    into /= np.linalg.norm(into)
+    rotation = np.column_stack([right, into, np.cross(right, into)])
+    pad = round(_AROUND_M / cell_m)
+    cell = Cell(pad, pad, pad + width_m / cell_m, pad + height_m / cell_m)
+    grid = PlaneGrid(
+        Rigid3(rotation, corners_world.mean(axis=0)),
+        -width_m / 2 - pad * cell_m,
+        height_m / 2 + pad * cell_m,
+        cell_m,
+        int(np.ceil(cell.right)) + pad,
+        int(np.ceil(cell.bottom)) + pad,
+    )
+    return grid, cell
+
+
+def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
+    """What `make_run` gives, of one known panel."""
+    region = _region(grid, cell)
+    chosen = choose_frames(grid, region, scene, frame_count)
+    tiles = [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
+    if not tiles:
+        raise ObjectNotSeen(
+            f"the drawn front is seen in 0 of {len(scene.frames)} frames, at least 1 expected", hint="draw it where the scan is"
+        )
+    relief = measure_relief(grid, scene, chosen)
+    vertical, horizontal = (gather(tiles, axis, grid.cell_m) for axis in (0, 1))
+    spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
+    poses_agree = bool(spread <= STEADY_CELLS)
+    if poses_agree:
+        for tile in tiles:
+            tile.shift = (0.0, 0.0)
+    mosaic = blend(tiles, max(frame_count // 2, 8))
+    seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
+    return Run(
+        region=region,
+        grid=grid,
+        roll_rad=float(np.arcsin(np.clip(grid.world_from_plane.rotation[2, 0], -1.0, 1.0))),
+        vertical=vertical,
+        horizontal=horizontal,
+        mosaic=mosaic,
+        relief=relief,
+        seen=seen[: grid.rows, : grid.columns],
+        cells=(cell,),
+        handles=find_handles(mosaic, relief, (cell,), grid.cell_m),
+        poses_agree=poses_agree,
+        slides={tile.frame_index: tile.shift for tile in tiles},
+    )
+
+
+def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:
+    """The rectangle as a plane that was seen all over, its axes level."""
+    width_m, height_m = cell.width * grid.cell_m, cell.height * grid.cell_m
+    rows, columns = (max(round(side / _SUPPORT_M), 1) for side in (height_m, width_m))
+    return PlaneRegion(
+        world_from_plane=Rigid3(front_rotation(grid.outward), grid.world_from_plane.translation),
+        width_m=width_m,
+        height_m=height_m,
+        support=np.ones((rows, columns), bool),
+        cell_m=_SUPPORT_M,
+        area_m2=width_m * height_m,
+    )
+
+
+def _handle_on(handle: DrawnHandle | str, cell: Cell, cell_m: float) -> GridHandle | None:
+    """The drawn handle on the grid; None where the person said that there is none."""
+    if not isinstance(handle, DrawnHandle):
+        return None
+    column, row = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
+    return GridHandle(
+        left=column + handle.left_m / cell_m,
+        top=row - handle.top_m / cell_m,
+        right=column + handle.right_m / cell_m,
+        bottom=row - handle.bottom_m / cell_m,
+        confidence=1.0,
+    )

@@ -1,0 +1,107 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.jobs.front_wire import front_line
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.model.track import FrontPanel
+from tests.app.conftest import Running
+
+CORNERS = [[0.0, 2.0, 0.8], [0.6, 2.0, 0.8], [0.6, 2.0, 0.1], [0.0, 2.0, 0.1]]
+FRONT: dict[str, Any] = {"corners_m": CORNERS, "handle": "none", "hinge": "left"}
+DRAWN = {"category": "cabinet", "front": FRONT}
+
+
+def drawn(web: Running, project: str) -> dict[str, Any]:
+    """What the live segmenter drew."""
+    at = f"/api/projects/{project}"
+    assert web.get(f"{at}/elevations") == {"drawn": False, "items": []}
+    web.post(f"{at}/live/open")
+    web.until(lambda: web.get(f"{at}/elevations")["drawn"])
+    found: dict[str, Any] = web.get(f"{at}/elevations")
+    return found
+
+
+def test_planes_are_drawn_when_the_scan_is_prepared(web: Running) -> None:
+    project = web.sample()
+    (plane,) = drawn(web, project)["items"]
+    assert (plane["columns"], plane["rows"], plane["cell_m"]) == (240, 90, 0.01)
+    assert plane["cells"] == [[0.0, 10.0, 60.0, 80.0]]
+    picture = web.client.get(plane["url"])
+    assert picture.headers["content-type"] == "image/png"
+    web.get(f"/media/{project}/elevations/7.png", 404)
+
+
+def test_a_drawn_front_is_an_object_with_masks_and_no_click(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", DRAWN, 201)
+    assert (made["name"], made["points"], made["segment"]) == ("cabinet_1", [], "waiting")
+    assert made["front"]["corners_m"] == CORNERS
+    web.until(lambda: any(front["object"] == made["id"] for front in web.get(f"{at}/elevations/fronts")))
+    (found,) = [front for front in web.get(f"{at}/elevations/fronts") if front["object"] == made["id"]]
+    assert found["corners_m"] == CORNERS
+
+
+def test_what_is_drawn_is_changed_undone_and_redone(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", DRAWN, 201)
+    here = f"{at}/objects/{made['id']}"
+    wider = {**FRONT, "corners_m": [[x + (0.1 if x else 0.0), y, z] for x, y, z in CORNERS]}
+    moved = web.patch(here, {"front": wider, "version": made["version"]})
+    assert moved["front"]["corners_m"][1][0] == 0.7
+    stale = web.client.patch(here, json={"front": FRONT, "version": made["version"]})
+    assert stale.status_code == 409
+    assert stale.json()["current"]["front"]["corners_m"][1][0] == 0.7
+    assert web.patch(here, {"front": None})["front"] is None
+    assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.7
+    assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.6
+    assert web.post(f"{at}/redo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.7
+    assert web.patch(here, {"name": "renamed"})["front"]["corners_m"][1][0] == 0.7  # absent is not none
+
+
+def test_a_hinge_computes_no_masks_anew(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", DRAWN, 201)
+
+    def state() -> str:
+        (item,) = [one for one in web.get(f"{at}/objects") if one["id"] == made["id"]]
+        return str(item["segment"])
+
+    web.until(lambda: state() == "done")
+    turned = web.patch(f"{at}/objects/{made['id']}", {"front": {**FRONT, "hinge": "right"}})
+    assert turned["segment"] == "done"
+
+
+def test_prompts_json_holds_what_was_drawn_and_is_read_again(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    assert web.get(f"{at}/prompts.json")["version"] == 1
+    web.post(f"{at}/objects", {**DRAWN, "name": "door"}, 201)
+    file = web.get(f"{at}/prompts.json")
+    assert file["version"] == 2
+    (entry,) = [entry for entry in file["objects"] if entry["name"] == "door"]
+    assert entry == {"name": "door", "category": "cabinet", "points": [], "front": FRONT}
+    other = web.sample()
+    web.post(f"/api/projects/{other}/prompts.json", file)
+    (taken,) = [one for one in web.get(f"/api/projects/{other}/objects") if one["name"] == "door"]
+    assert taken["front"] == FRONT
+
+
+@pytest.mark.parametrize("corners", [CORNERS[:3], [[0.0, 0.0, 0.0]] * 4, [[0, 0, 1], [1, 0, 2], [1, 0, 0], [0, 0, 0]]])
+def test_what_is_no_rectangle_is_refused(web: Running, corners: Any) -> None:
+    project = web.sample()
+    web.post(f"/api/projects/{project}/objects", {"front": {"corners_m": corners}}, 422)
+
+
+def test_a_found_front_goes_out_as_it_would_be_drawn() -> None:
+    into_capture = Rigid3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    at = Rigid3(front_rotation(np.array([0.0, -1.0, 0.0])), np.array([0.3, 2.0, 0.45]))
+    panel = FrontPanel(world_from_front=at, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
+    line = front_line(panel, into_capture.inverse)
+    there = np.array(CORNERS) + np.array([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(line["corners_m"], there, atol=1e-6)
+    assert line["handle"] is None
