@@ -17,7 +17,7 @@ from r2c2r_core.threads import in_threads
 OPEN_FRACTION = 0.75
 """How far joints stand open in the picture: doors at full travel hide behind their own edge."""
 
-_SUPERSAMPLE = 2
+_SUPERSAMPLE = 1.5
 _LONG = 1.9  # width over height, as seen, from which the two pictures go one above the other
 _SUN_FROM = np.array([-0.45, -0.35, 1.0])  # in the view's own right, back, up
 _BACKGROUND = np.array([244.0, 245.0, 247.0], np.float32)
@@ -118,8 +118,7 @@ def _view_axes(direction: Vector3) -> np.ndarray:
 
 def draw(soup: Soup, floor_z_m: float, camera: Intrinsics, camera_from_world: Rigid3) -> Image:
     """The lit scene on its floor."""
-    size = (camera.width * _SUPERSAMPLE, camera.height * _SUPERSAMPLE)
-    large = camera.resized(*size)
+    large = camera.resized(round(camera.width * _SUPERSAMPLE), round(camera.height * _SUPERSAMPLE))
     marks = rasterize(soup.corners, soup_faces(soup), np.column_stack([soup.uv, soup.ids]), large, camera_from_world)
     normals = rasterize(soup.corners, soup_faces(soup), soup.normals, large, camera_from_world).attributes
     points, depth = _floor_behind(marks.depth_m, floor_z_m, large, camera_from_world)
@@ -238,7 +237,7 @@ def _sunlit(soup: Soup, points: np.ndarray, valid: np.ndarray, sun: Vector3) -> 
     z = np.where(valid, z, np.float32(1.0))
     x, y = np.float32(focal) * across / z + size / 2 - 0.5, np.float32(focal) * along / z + size / 2 - 0.5
     lit = np.zeros(valid.shape, np.float32)
-    offsets = [(dx, dy) for dx in (-2.5, -0.8, 0.8, 2.5) for dy in (-2.5, -0.8, 0.8, 2.5)]
+    offsets = [(dx, dy) for dx in (-2.0, 0.0, 2.0) for dy in (-2.0, 0.0, 2.0)]
     for dx, dy in offsets:
         nearest = cv2.remap(depth, x + np.float32(dx), y + np.float32(dy), cv2.INTER_NEAREST)
         lit += (nearest == 0) | (nearest > z - 0.015)

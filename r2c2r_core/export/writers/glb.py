@@ -1,36 +1,49 @@
-"""scene.glb: the scene for web viewers, closed, with its joints as clips; one node a link with the link's name.
+"""scene.glb: the scene for web viewers, closed, with its joints as glTF animations: one clip a joint, and `all`.
 
-glTF is +Y up: the root node turns it.
+One node a link with the link's name (glTF 2.0). glTF is +Y up: the root node turns the world. It has no word for a joint: type,
+axis and limits stand in the node's `extras`.
 """
 
+import json
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Image
 from r2c2r_core.export.plan import WORLD, Body, Plan
-from r2c2r_core.export.writers.glb_motion import with_motion
 from r2c2r_core.export.writers.meshes import box_mesh
+from r2c2r_core.geometry.transforms import Rigid3
 
 Y_UP_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+SECONDS = 3.0  # of a clip: closed, open in the middle, closed
+
+_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
+_FLOAT, _UNSIGNED = 5126, 5125  # component types, section 3.6.2.2
+_PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 
 
 def write_glb(plan: Plan, path: Path) -> None:
-    """Write the plan as one binary glTF."""
-    import trimesh
-
-    scene = trimesh.Scene(base_frame="root")
-    scene.graph.update(frame_to=WORLD, frame_from="root", matrix=Y_UP_FROM_WORLD)
-    pictures: dict[str, Any] = {}  # one material a texture: encoding pictures is what takes the time
+    """Write the plan as one binary glTF; the textures that stand beside it (meshes.py) go into it as they are."""
+    gltf = _Gltf()
+    nodes = {WORLD: _node(WORLD, Rigid3(Y_UP_FROM_WORLD[:3, :3], np.zeros(3)))}
+    materials: dict[str, int] = {}  # one a texture
     for body in plan.bodies:
-        scene.graph.update(frame_to=body.name, frame_from=body.parent, matrix=body.parent_from_body.matrix)
-        mesh = _mesh_of(body, pictures)
-        if mesh is not None:
-            scene.add_geometry(mesh, node_name=f"{body.name}_vis", geom_name=f"{body.name}_vis", parent_node_name=body.name)
-    path.write_bytes(with_motion(scene.export(file_type="glb"), plan.bodies))
+        nodes[body.parent].setdefault("children", []).append(len(nodes))
+        nodes[body.name] = _node(body.name, body.parent_from_body) | _mesh(body, gltf, materials, path.parent)
+    clips = _clips(plan, gltf, nodes)
+    document = {
+        "asset": {"version": "2.0", "generator": "r2c2r"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": list(nodes.values()),
+        "animations": clips,
+        **gltf.tables,
+        "buffers": [{"byteLength": len(gltf.binary)}],
+    }
+    path.write_bytes(_container({key: value for key, value in document.items() if value != []}, bytes(gltf.binary)))
 
 
 def check_glb(path: Path) -> Iterator[str]:
@@ -46,33 +59,114 @@ def check_glb(path: Path) -> Iterator[str]:
         yield f"holds {len(content)} bytes, {length} are expected"
 
 
-def _mesh_of(body: Body, pictures: dict[str, Any]) -> Any:
-    import trimesh
-    from trimesh.visual.material import PBRMaterial
-    from trimesh.visual.texture import TextureVisuals
+class _Gltf:
+    """The tables of a document that refer to one buffer, and the buffer."""
 
-    visual = body.link.visual
-    if visual is not None:
-        file = body.texture_file or body.name
-        if file not in pictures:
-            pictures[file] = _material(file, visual.texture)
-        dressed = TextureVisuals(uv=visual.uv, material=pictures[file])
-        return trimesh.Trimesh(visual.vertices, visual.faces, visual=dressed, process=False)
-    vertices, faces = box_mesh(body)
-    if len(faces) == 0:
-        return None
-    colour = [*(round(255 * c) for c in body.link.colour), 255]
-    material = PBRMaterial(name=f"{body.name}_vis", baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.9)
-    # flat shading: every triangle has corners of its own
-    mesh = trimesh.Trimesh(vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3), process=False)
-    mesh.visual = TextureVisuals(material=material)
-    return mesh
+    def __init__(self) -> None:
+        self.tables: dict[str, list[dict[str, Any]]] = {
+            name: [] for name in ("meshes", "materials", "textures", "images", "accessors", "bufferViews")
+        }
+        self.binary = bytearray()
+
+    def add(self, table: str, entry: dict[str, Any]) -> int:
+        """Number of the new entry."""
+        self.tables[table].append(entry)
+        return len(self.tables[table]) - 1
+
+    def view(self, content: bytes) -> int:
+        """Number of a new buffer view, aligned as accessors need it."""
+        start = len(self.binary)
+        self.binary += content + b"\0" * (-len(content) % 4)
+        return self.add("bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(content)})
+
+    def accessor(self, values: np.ndarray, kind: str, *, bounds: bool = False) -> int:
+        """Number of a new accessor: 32-bit floats, or indices."""
+        whole = values.dtype.kind in "iu"
+        raw = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
+        entry: dict[str, Any] = {"componentType": _UNSIGNED if whole else _FLOAT, "count": len(raw), "type": kind}
+        if bounds:
+            ends = raw.reshape(len(raw), -1)
+            entry |= {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
+        return self.add("accessors", entry | {"bufferView": self.view(raw.tobytes())})
 
 
-def _material(file: str, texture: Image) -> Any:
-    from PIL.Image import fromarray
-    from trimesh.visual.material import PBRMaterial
+def _node(name: str, parent_from_node: Rigid3) -> dict[str, Any]:
+    translation, rotation = parent_from_node.translation.tolist(), _quat_xyzw(parent_from_node).tolist()
+    return {"name": name, "translation": translation, "rotation": rotation}
 
-    picture = fromarray(np.ascontiguousarray(texture))
-    name = Path(file).stem
-    return PBRMaterial(name=name, baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=0.9, doubleSided=True)
+
+def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int], folder: Path) -> dict[str, int]:
+    """The node's reference to the mesh of a body; nothing for one without a shape."""
+    visual, attributes = body.link.visual, dict[str, int]()
+    if visual is not None and body.texture_file is not None:
+        vertices, faces = visual.vertices, visual.faces
+        attributes["TEXCOORD_0"] = gltf.accessor(visual.uv * (1, -1) + (0, 1), "VEC2")  # v runs down in glTF
+        if body.texture_file not in materials:
+            materials[body.texture_file] = _textured(gltf, folder / body.texture_file)
+        material = materials[body.texture_file]
+    else:
+        vertices, faces = box_mesh(body)
+        vertices, faces = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces))  # flat shading: corners of their own
+        plain = {"baseColorFactor": [*map(float, body.link.colour), 1.0], **_PLAIN}
+        material = gltf.add("materials", {"name": f"{body.name}_vis", "pbrMetallicRoughness": plain})
+    if not len(faces):
+        return {}
+    attributes["POSITION"] = gltf.accessor(vertices, "VEC3", bounds=True)
+    shape = {"attributes": attributes, "indices": gltf.accessor(faces.ravel(), "SCALAR"), "material": material}
+    return {"mesh": gltf.add("meshes", {"name": f"{body.name}_vis", "primitives": [shape]})}
+
+
+def _textured(gltf: _Gltf, file: Path) -> int:
+    """Number of a new material that shows a PNG file."""
+    image = gltf.add("images", {"name": file.stem, "mimeType": "image/png", "bufferView": gltf.view(file.read_bytes())})
+    look = {"baseColorTexture": {"index": gltf.add("textures", {"source": image})}, **_PLAIN}
+    return gltf.add("materials", {"name": file.stem, "pbrMetallicRoughness": look, "doubleSided": True})
+
+
+def _clips(plan: Plan, gltf: _Gltf, nodes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    """A clip of every joint, and before them one of all."""
+    moving = [body for body in plan.bodies if body.joint is not None]
+    if not moving:
+        return []
+    times = gltf.accessor(np.array([0.0, SECONDS / 2, SECONDS]), "SCALAR", bounds=True)
+    clips = [_clip(body, gltf, times, nodes) for body in moving]
+    everything = {
+        "name": "all",
+        "samplers": [clip["samplers"][0] for clip in clips],
+        "channels": [clip["channels"][0] | {"sampler": number} for number, clip in enumerate(clips)],
+    }
+    return [everything, *clips]
+
+
+def _clip(body: Body, gltf: _Gltf, times: int, nodes: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """One joint's clip."""
+    joint, axis, closed = body.joint, body.axis_body, body.parent_from_body
+    assert joint is not None
+    assert axis is not None
+    limits = [joint.lower, joint.upper]
+    nodes[body.name]["extras"] = {"joint": body.joint_name, "type": joint.type, "axis": axis.tolist(), "range": limits}
+    if joint.type == "revolute":
+        opened = closed @ Rigid3(np.asarray(cv2.Rodrigues(axis * joint.upper)[0]), np.zeros(3))
+        path, kind, ends = "rotation", "VEC4", (_quat_xyzw(closed), _quat_xyzw(opened))
+    else:
+        path, kind, ends = "translation", "VEC3", (closed.translation, closed.apply(axis[None] * joint.upper)[0])
+    output = gltf.accessor(np.stack([ends[0], ends[1], ends[0]]), kind)
+    return {
+        "name": body.joint_name,
+        "samplers": [{"input": times, "output": output, "interpolation": "LINEAR"}],
+        "channels": [{"sampler": 0, "target": {"node": list(nodes).index(body.name), "path": path}}],
+    }
+
+
+def _quat_xyzw(pose: Rigid3) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(pose.rotation).as_quat(canonical=True))
+
+
+def _container(document: dict[str, Any], binary: bytes) -> bytes:
+    """The file: a header, the document, the buffer (glTF 2.0, section 4.4)."""
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), _JSON) + text + struct.pack("<II", len(binary), _BIN) + binary
+    return struct.pack("<III", _MAGIC, 2, 12 + len(chunks)) + chunks
