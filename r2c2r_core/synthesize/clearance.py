@@ -83,26 +83,26 @@ def free_travel(
     near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < params.behind_m]
     before = np.maximum(depths_in(near_walls, corners), 0.0)
 
-    def blocker_at(position: float) -> str | None:
-        motion = motion_at(item, joint, position)
-        if (depths_in(near_walls, motion.apply(corners)) > before + params.wall_touch_m).any():
-            return "a wall"
-        return _blocker(_moved(moving, motion), obstacles, near, objects)
+    def blockers_at(positions: np.ndarray) -> list[str | None]:
+        motions = [motion_at(item, joint, float(position)) for position in positions]
+        walled = [(depths_in(near_walls, m.apply(corners)) > before + params.wall_touch_m).any() for m in motions]
+        found = _blockers([_moved(moving, motion) for motion in motions], obstacles, np.flatnonzero(near), objects)
+        return ["a wall" if wall else name for wall, name in zip(walled, found, strict=True)]
 
-    free = 0.0
-    for position in np.linspace(0.0, joint.upper, params.steps + 1):
-        blocker = blocker_at(position)
-        if blocker is not None:
-            return _shortened(_last_free(free, position, blocker_at), joint), blocker
-        free = float(position)
-    return joint.upper, None
+    positions = np.linspace(0.0, joint.upper, params.steps + 1)
+    blockers = blockers_at(positions)
+    first = next((k for k, blocker in enumerate(blockers) if blocker is not None), None)
+    if first is None:
+        return joint.upper, None
+    free = float(positions[max(first - 1, 0)])
+    return _shortened(_last_free(free, float(positions[first]), blockers_at), joint), blockers[first]
 
 
-def _last_free(free: float, blocked: float, blocker_at: Callable[[float], str | None]) -> float:
+def _last_free(free: float, blocked: float, blockers_at: Callable[[np.ndarray], list[str | None]]) -> float:
     """The furthest free position between a free and a blocked one, to a 64th of the step."""
     for _ in range(6):
         middle = (free + blocked) / 2
-        free, blocked = (middle, blocked) if blocker_at(middle) is None else (free, middle)
+        free, blocked = (middle, blocked) if blockers_at(np.array([middle])) == [None] else (free, middle)
     return free
 
 
@@ -130,14 +130,20 @@ def rotation_about(axis: Vector3, angle_rad: float) -> np.ndarray:
     return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross)
 
 
-def _blocker(moving: Boxes, obstacles: Obstacles, near: np.ndarray, objects: Sequence[SceneObject]) -> str | None:
-    candidates = np.flatnonzero(near)
-    if len(candidates) == 0:
-        return None
-    i, j = (v.ravel() for v in np.meshgrid(np.arange(len(moving.centres)), candidates, indexing="ij"))
-    depth = box_penetration(Boxes(*(v[i] for v in moving)), Boxes(*(v[j] for v in obstacles.boxes)))
-    worst = int(np.argmax(depth))
-    return objects[obstacles.owner[j[worst]]].name if depth[worst] > tuned(Params).touch_m else None
+def _blockers(
+    moved: Sequence[Boxes], obstacles: Obstacles, near: np.ndarray, objects: Sequence[SceneObject]
+) -> list[str | None]:
+    """At each place of what moves: the object that it is deepest in, if it is in any."""
+    moving, still = Boxes(*(np.stack(part) for part in zip(*moved, strict=True))), Boxes(*(v[near] for v in obstacles.boxes))
+    reach = np.linalg.norm(moving.halves, axis=-1)[..., None] + np.linalg.norm(still.halves, axis=-1)
+    apart = np.linalg.norm(moving.centres[:, :, None] - still.centres, axis=-1)
+    place, i, j = np.nonzero(apart < reach)  # the others' spheres do not even meet
+    depth = box_penetration(Boxes(*(v[place, i] for v in moving)), Boxes(*(v[j] for v in still)))
+    names: list[str | None] = [None] * len(moved)
+    for k in np.argsort(depth, kind="stable"):
+        if depth[k] > tuned(Params).touch_m:
+            names[place[k]] = objects[obstacles.owner[near[j[k]]]].name
+    return names
 
 
 def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) -> np.ndarray:
