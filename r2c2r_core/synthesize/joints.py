@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2c2r_core.calibration import FITTED, calibrated
 from r2c2r_core.model.inputs import HingeSide, Overrides
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -26,6 +27,8 @@ class Params:
     certain_off_centre: float = param(
         0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
     )
+    slope: float = param(0.72, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
+    offset: float = param(2.43, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
     seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a door that several frames show open")
     in_pairs: float = param(
         0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"
@@ -83,12 +86,18 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
         side: HingeSide = "left" if x > 0 else "right"
         trust = handle.confidence * min(abs(x) / (params.certain_off_centre * half[0]), 1.0)
         reason = f"the handle is on the {'right' if x > 0 else 'left'}"
-        return Hinge(side=side, source="inferred", reason=reason, confidence=0.5 + 0.5 * float(trust), by_handle=True)
+        return Hinge(side=side, source="inferred", reason=reason, confidence=_worth(float(trust)), by_handle=True)
     wide = item.dimensions_m[0] > 1.15 * item.dimensions_m[2]
     if item.spec.name == "wall_cabinet" and wide and not handle.is_vertical and z < -0.4 * half[1]:
-        reason, trust = "a wide flap with its handle at the lower edge", 0.5 + 0.5 * handle.confidence
-        return Hinge(side="top", source="inferred", reason=reason, confidence=trust, by_handle=True)
+        reason = "a wide flap with its handle at the lower edge"
+        return Hinge(side="top", source="inferred", reason=reason, confidence=_worth(handle.confidence), by_handle=True)
     return None
+
+
+def _worth(trust: float) -> float:
+    """The share of sides that a handle trusted so (0..1) tells right; one that says nothing leaves two sides."""
+    params = tuned(Params)
+    return calibrated(0.5 + 0.5 * trust, params.slope, params.offset)
 
 
 def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hinges: dict[str, Hinge]) -> Hinge:

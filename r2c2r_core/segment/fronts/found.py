@@ -27,6 +27,7 @@ class FoundFront:
     front: Front
     scene: Scene
     swings: bool = True  # a single door; drawers slide, and of a pair each leaf would have to be told apart
+    fit: float = 1.0  # 0..1: how well its size fits its category
     kind: Kind = "front"
     warnings: tuple[str, ...] = ()
 
@@ -39,7 +40,7 @@ class FoundFront:
         if swing is not None:
             opened = swung_corners(self.front, swing)
         mask, share = front_mask(self.front, self.scene, frame, opened)
-        trust = expected_iou(mask, share, frame, corners if opened is None else opened, tuned(Params).border_m)
+        trust = expected_iou(mask, share, frame, corners if opened is None else opened, tuned(Params).border_m, self.fit)
         return View(mask, trust, out_m, swing)
 
     def panel(self) -> FrontPanel | None:

@@ -90,7 +90,14 @@ def _front(prepared: PreparedCapture, category: Category, positives: Points, neg
         return None
     depth = depth_to_wall(front, prepared.scene.capture.room, category) or category.depth.usual
     front = replace(front, depth_m=depth)
-    return FoundFront(replace(front, sides=seen_sides(front, prepared.scene)), prepared.scene, swings=_swings(category))
+    front = replace(front, sides=seen_sides(front, prepared.scene))
+    return FoundFront(front, prepared.scene, swings=_swings(category), fit=_fit(front, category))
+
+
+def _fit(front: Front, category: Category) -> float:
+    """0..1: how well a front's size fits its category."""
+    cell_m, cell = front.run.grid.cell_m, front.cell
+    return category.width.fit(cell_m * cell.width) * category.height.fit(cell_m * cell.height)
 
 
 def _swings(category: Category) -> bool:

@@ -243,7 +243,7 @@ def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
         built(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle)).objects[0].joints[0].confidence or 0.0
         for handle in (Handle(0.25, 0.2), Handle(0.09, 0.2), None)
     )
-    assert at_edge > 0.9 > off_centre > without == 0.5
+    assert 1.0 > at_edge > off_centre > 0.9 > without == 0.5
 
 
 def test_a_handle_tells_the_hinge_even_where_a_neighbour_is_in_the_way() -> None:

@@ -1,0 +1,64 @@
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.calibration import calibrated
+from r2c2r_core.tuning import changed, params_of, tuning
+from tests.core.segment.test_expected_iou import AT_2_M, FRAME, box, expected_iou
+from tests.core.synthesize.kitchen_units import Handle, Unit
+from tests.core.synthesize.test_build_scene import built
+
+FITTED = Path(__file__).parents[2] / "benchmarks" / "calibration.json"
+
+CLAIMS = np.linspace(0.0, 1.0, 201)
+
+
+@pytest.mark.parametrize(("slope", "offset"), [(1.0, 0.0), (0.4, 1.2), (2.5, -3.0)])
+def test_a_surer_claim_stays_surer_and_a_share_stays_a_share(slope: float, offset: float) -> None:
+    worth = np.array([calibrated(claim, slope, offset) for claim in CLAIMS])
+    assert (np.diff(worth) > 0).all()
+    assert (worth[0], worth[-1]) == (0.0, 1.0)
+
+
+def test_a_slope_of_one_and_no_offset_leave_a_claim_as_it_is() -> None:
+    assert calibrated(0.73, 1.0, 0.0) == pytest.approx(0.73)
+
+
+def test_maps_follow_one_another_as_their_log_odds_do() -> None:
+    """Twice the map is another map: whoever applies it a second time changes what it says."""
+    twice = calibrated(calibrated(0.9, 0.5, 0.4), 0.5, 0.4)
+    assert twice == pytest.approx(calibrated(0.9, 0.25, 0.6))
+    assert twice != pytest.approx(calibrated(0.9, 0.5, 0.4), abs=0.01)
+
+
+@pytest.mark.parametrize(("name", "module"), [("mask", "segment.expected_iou"), ("hinge", "synthesize.joints")])
+def test_the_maps_in_force_are_those_that_were_fitted(name: str, module: str) -> None:
+    found, numbers = json.loads(FITTED.read_text())["maps"][name], params_of(module)()
+    assert (numbers.slope, numbers.offset) == (found["slope"], found["offset"])
+    assert numbers.slope > 0
+    assert found["after"]["off"] < found["before"]["off"]
+
+
+MAP, NONE = {"slope": 2.0, "offset": 0.5}, {"slope": 1.0, "offset": 0.0}
+
+
+def test_a_masks_confidence_goes_through_its_map_once() -> None:
+    def claim(numbers: Mapping[str, float]) -> float:
+        with tuning(changed({"segment.expected_iou": numbers})):
+            return expected_iou(box(200, 200, 260, 260), 0.9, FRAME, AT_2_M, 0.008)
+
+    assert claim(MAP) == pytest.approx(calibrated(claim(NONE), **MAP))
+
+
+def test_a_hinges_confidence_goes_through_its_map_once() -> None:
+    def claim(numbers: Mapping[str, float]) -> float:
+        with tuning(changed({"synthesize.joints": numbers})):
+            handle = Handle(0.09, 0.2)
+            found = built(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle)).objects[0].joints[0].confidence
+        assert found is not None
+        return found
+
+    assert claim(MAP) == pytest.approx(calibrated(claim(NONE), **MAP))
