@@ -6,6 +6,7 @@ way is named, it is not the door's defect.
 """
 
 import logging
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -49,7 +50,7 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
     try:
         shipped, strict = compiled(mjcf), compiled(mjcf, strict=True)
         solid, loose = compiled(mjcf, strict=True, keep_free=True), compiled(mjcf, strict=True, keep_free=True, loosen=True)
-    except ValueError as error:
+    except (ET.ParseError, ValueError) as error:
         return Simulation(findings=(finding("mjcf-compile", "scene.xml", str(error).partition("\n")[0]),))
     rest = touches(solid, {})
     findings = [*_rest_findings(rest), *_fixed_overlaps(loose, rest)]
@@ -96,10 +97,14 @@ def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
 
 
 def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:
-    """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go."""
+    """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go.
+
+    Raises ValueError or ET.ParseError where scene.xml is none.
+    """
     import mujoco
 
     mujoco.set_mju_user_warning(_LOG.debug)  # else a scene that diverges leaves MUJOCO_LOG.TXT where the person works
+    ET.fromstring(mjcf.read_text(encoding="utf-8"))  # MuJoCo takes names that are no text, and cannot say them
     spec = mujoco.MjSpec.from_file(str(mjcf))
     for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
         spec.delete(geom)

@@ -27,6 +27,8 @@ from r2c2r_core.geometry.meshes import (
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.tuning import param, tuned
 
+_LEAST_SIZE, _MOST_SIZE = 1e-9, 1e9  # in the file's own unit: volumes and squared distances stay within double precision
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -113,7 +115,10 @@ def _check_sane(label: str, vertices: Points, faces: Faces) -> None:
     if len(faces) < 4:
         raise OverrideError(f"{label}: {len(faces)} triangles, at least 4 expected", hint="export it again as triangles")
     sides = np.ptp(vertices[np.unique(faces)], axis=0)
-    if sides.max() <= 0 or sides.min() < tuned(Params).least_flatness * sides.max():
+    if not _LEAST_SIZE < sides.max() < _MOST_SIZE:
+        found = f"the mesh is {sides.max():.3g} units long, {_LEAST_SIZE:g} to {_MOST_SIZE:g} expected"
+        raise OverrideError(f"{label}: {found}", hint="export it in metres")
+    if sides.min() < tuned(Params).least_flatness * sides.max():
         size = " x ".join(f"{side:.3g}" for side in sides)
         raise OverrideError(f"{label}: the mesh is flat ({size}), a body with a volume expected", hint="give it thickness")
 
@@ -188,6 +193,7 @@ def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
 def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     """The outer boundary on a grid: everything that air from outside cannot reach is solid; sheets get a thickness."""
     params = tuned(Params)
+    not_closed = OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
     from scipy import ndimage
     from skimage.measure import marching_cubes
 
@@ -202,13 +208,16 @@ def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     labels, _ = ndimage.label(distance > params.shell_ratio)
     inside = (labels != labels[0, 0, 0]) & (labels > 0)
     field = np.where(inside, -1.0, distance - params.shell_ratio)
-    points, cubes, _, _ = marching_cubes(ndimage.gaussian_filter(field, 0.6), 0.0)
+    smooth = ndimage.gaussian_filter(field, 0.6)
+    if not smooth.min() < 0.0 < smooth.max():
+        raise not_closed
+    points, cubes, _, _ = marching_cubes(smooth, 0.0)
     closed, cubes = join_vertices(points.astype(np.float64), cubes.astype(np.int64))
     if volume(closed, cubes) < 0:
         cubes = cubes[:, ::-1]
     tight = _tightened(start + closed * cell, cubes, inside, start, cell, (vertices, faces))
     if not _is_solid(tight, cubes):
-        raise OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
+        raise not_closed
     notes.append(
         f"it was not a closed body: remeshed, details finer than {100 / params.remesh_cells:.1f} % of its size are lost"
     )

@@ -122,7 +122,7 @@ def _ups(metadata: dict[str, Any], poses: np.ndarray) -> tuple[Vector3, ...]:
 
     up = np.array([0.0, 1.0, 0.0])
     first = metadata.get("initPose")
-    if isinstance(first, list) and len(first) == 7 and _all_numbers(first) and np.linalg.norm(first[:4]) > 0.5:
+    if isinstance(first, list) and len(first) == 7 and _all_numbers(first) and 0.5 < np.linalg.norm(first[:4]) < 2.0:
         turn = Rotation.from_quat(np.array(first[:4], dtype=np.float64))
         if turn.magnitude() > 1e-4:
             return np.asarray(turn.inv().apply(up)), up, np.asarray(turn.apply(up))

@@ -44,6 +44,14 @@ def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> Non
     assert result.realtime_factor > 1.0
 
 
+def test_a_scene_with_names_that_are_no_text_is_one_finding(tmp_path: Path) -> None:
+    """MuJoCo compiles them; its Python bindings then fail at each name."""
+    scene = write_folder(kitchen(), tmp_path / "b") / "scene.xml"
+    scene.write_bytes(scene.read_bytes().replace(b"bottle_1", b"bottle\xf51"))
+    result = simulate(scene)
+    assert [f.rule for f in result.findings] == ["mjcf-compile"]
+
+
 def test_a_scene_that_diverges_leaves_no_log_where_the_person_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """MuJoCo appends its warnings to MUJOCO_LOG.TXT in the working folder, unless somebody else takes them."""
     monkeypatch.chdir(tmp_path)

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from PIL import Image
 
+from r2c2r_core.errors import OverrideError
 from r2c2r_core.generate import repair
 from r2c2r_core.generate.meshfile import missing_files, parts_of, read_parts
 from r2c2r_core.generate.repair import mended
@@ -108,6 +109,18 @@ def test_faces_given_twice_and_faces_without_area_do_no_harm():
     assert "3 faces given twice" in notes
     extents = oriented_extents(vertices)
     assert extents / extents[0] == pytest.approx([1, 0.6, 0.4], rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [1e-44, 1e200])
+def test_a_size_that_no_arithmetic_carries_is_refused(size):
+    with pytest.raises(OverrideError, match="units long, 1e-09 to 1e\\+09 expected"):
+        repaired(trimesh.Trimesh(np.eye(4, 3) * size, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], process=False))
+
+
+def test_scattered_specks_are_no_body():
+    corners = np.eye(4, 3)[:, None] + 1e-3 * np.random.default_rng(0).random((4, 3, 3))
+    with pytest.raises(OverrideError, match="could not be closed"):
+        repaired(trimesh.Trimesh(corners.reshape(-1, 3), np.arange(12).reshape(4, 3), process=False))
 
 
 def test_a_remeshed_body_keeps_its_proportions():

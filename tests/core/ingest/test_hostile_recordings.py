@@ -24,7 +24,7 @@ from r2c2r_core.ingest.readers.images import image_size
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 
-from .tiny import TinyRoom, jpeg, write_r3d, zip_folder
+from .tiny import TinyRoom, jpeg, write_r3d, write_seven_scenes, zip_folder
 from .tiny_formats import HEVC, write_nerfstudio, write_stray
 
 ROOM = TinyRoom(count=3)
@@ -202,3 +202,11 @@ def test_a_zip_whose_member_names_itself_in_no_encoding_is_one_line(tmp_path: Pa
     path.write_bytes(raw)
     with pytest.raises(CaptureError, match="metadata"):
         open_files(path).read("metadata")
+
+
+@pytest.mark.parametrize("down", ["0 0 0", "nan 0 0", "1e200 1e200 1"])
+def test_a_gravity_without_a_direction_is_refused(down: str, tmp_path: Path) -> None:
+    folder = write_seven_scenes(tmp_path / "scan", ROOM)
+    (folder / "gravity-direction.txt").write_text(down)
+    with pytest.raises(CaptureError, match="three numbers pointing down"), np.errstate(over="ignore"):
+        open_recording(folder)
