@@ -60,6 +60,13 @@ def mended(parts: list[MeshPart], label: str, rng: np.random.Generator) -> Mende
     """
     vertices, faces = join_vertices(*_stacked([(part.vertices, part.faces) for part in parts]))
     _check_sane(label, vertices, faces)
+    try:
+        return _closed_and_coloured(parts, label, vertices, faces, rng)
+    except (ValueError, ArithmeticError, LookupError) as error:  # of the libraries, at shapes that they have not met
+        raise OverrideError(f"{label}: the mesh cannot be mended ({error})", hint="close it in a mesh editor") from error
+
+
+def _closed_and_coloured(parts: list[MeshPart], label: str, vertices: Points, faces: Faces, rng: np.random.Generator) -> Mended:
     notes = ["it has no colours: shown grey"] if all(part.is_plain for part in parts) else []
     faces = _once_each(faces, notes)
     bodies = _bodies(vertices, faces, notes)
@@ -193,7 +200,6 @@ def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
 def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     """The outer boundary on a grid: everything that air from outside cannot reach is solid; sheets get a thickness."""
     params = tuned(Params)
-    not_closed = OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
     from scipy import ndimage
     from skimage.measure import marching_cubes
 
@@ -208,16 +214,13 @@ def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
     labels, _ = ndimage.label(distance > params.shell_ratio)
     inside = (labels != labels[0, 0, 0]) & (labels > 0)
     field = np.where(inside, -1.0, distance - params.shell_ratio)
-    smooth = ndimage.gaussian_filter(field, 0.6)
-    if not smooth.min() < 0.0 < smooth.max():
-        raise not_closed
-    points, cubes, _, _ = marching_cubes(smooth, 0.0)
+    points, cubes, _, _ = marching_cubes(ndimage.gaussian_filter(field, 0.6), 0.0)
     closed, cubes = join_vertices(points.astype(np.float64), cubes.astype(np.int64))
     if volume(closed, cubes) < 0:
         cubes = cubes[:, ::-1]
     tight = _tightened(start + closed * cell, cubes, inside, start, cell, (vertices, faces))
     if not _is_solid(tight, cubes):
-        raise not_closed
+        raise OverrideError(f"{label}: the mesh could not be closed", hint="close it in a mesh editor")
     notes.append(
         f"it was not a closed body: remeshed, details finer than {100 / params.remesh_cells:.1f} % of its size are lost"
     )
