@@ -18,15 +18,22 @@ from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.tuning import param, tuned
 
-_LIMITS = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: the accuracy a placement is asked for
-_CONFIDENCE = 0.975  # one-sided, of two standard deviations
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """When a placement is called uncertain."""
 
+    loose_deg: float = param(
+        1.5, "deg", "of turn, from which on a placement is not held", source="what is asked of a placement"
+    )
+    loose_m: float = param(0.015, "m", "of shift, from which on a placement is not held", source="what is asked of a placement")
+    loose_scale: float = param(0.02, "share", "of scale, from which on it is not held", source="what is asked of a placement")
+    confidence: float = param(
+        0.975, "share", "of readings that lie below: Student's t at it widens", source="two σ, one side", lt=1
+    )
     sigmas: float = param(2.0, "σ", "at which a motion is stated")
+    alike: float = param(0.003, "score", "between two poses that cannot be told apart")
+    clear: float = param(0.05, "score", "between two poses of which one is clearly better")
     full_frames: int = param(9, "count", "frames as whose independent readings the weights of points and outlines count", gt=0)
     known_frames: int = param(3, "count", "frames' worth of what other objects tell of how much frames differ", gt=0)
 
@@ -79,7 +86,7 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)
-    widened = float(stdtrit(len(steps) - 1 + params.known_frames, _CONFIDENCE) / ndtri(_CONFIDENCE))
+    widened = float(stdtrit(len(steps) - 1 + params.known_frames, params.confidence) / ndtri(params.confidence))
     return np.asarray(noise + widened**2 * (len(steps) - 1) / len(steps) * apart.T @ apart)
 
 
@@ -87,17 +94,17 @@ def ties(best: Judgement, rival: Judgement) -> bool:
     """Whether the two cannot be told apart: the scores are close, or close and not consistently ordered over views."""
     gain = np.array([a.total - b.total for a, b in zip(best.views, rival.views, strict=True)])
     mean = best.score - rival.score
-    if mean > 0.05:
-        return False
-    if mean < 0.003:
-        return True
+    params = tuned(Params)
+    if not params.alike < mean < params.clear:
+        return mean <= params.alike
     spread = float(gain.std(ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-    return bool(mean < 2.0 * spread)
+    return bool(mean < params.sigmas * spread)
 
 
 def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
     """What the scan does not hold as well as a placement should be, a line each; a front tells where the wall is."""
     params = tuned(Params)
+    limits = np.array([params.loose_deg, params.loose_m, params.loose_scale])
     figures = np.array([spread.turn_deg, spread.shift_m, spread.scale])
     texts = (
         (_turn_in_words(spread.turn_axis_world), f"{params.sigmas * spread.turn_deg:.1f} degrees"),
@@ -106,7 +113,7 @@ def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
     )
     return tuple(
         f"{what} is hardly held by what the scan shows: it may be off by {how_much}"
-        for (what, how_much), loose in zip(texts, params.sigmas * figures > _LIMITS, strict=True)
+        for (what, how_much), loose in zip(texts, params.sigmas * figures > limits, strict=True)
         if loose
     )
 

@@ -14,6 +14,38 @@ from r2c2r_core.arrays import Matrix3, Vector3
 from r2c2r_core.geometry.registration import umeyama_batch
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z, rotation_between
 from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which poses are tried, and how they settle."""
+
+    least_points: int = param(30, "count", "observed points that tell a box", ge=1)
+    cut: float = param(0.01, "share", "of the observed points left out at either end of an axis: depth has outliers", lt=0.5)
+    mesh_cut: float = param(0.005, "share", "of the mesh's points left out at either end of an axis", lt=0.5)
+    plan_deg: float = param(3.0, "deg", "between the yaws of which the tightest box is taken", gt=0)
+    turn_deg: float = param(15.0, "deg", "between the yaws at which a thing is tried", source="settling turns by more", gt=0)
+    alike_deg: float = param(5.0, "deg", "between two measured boxes that are one")
+    alike_log: float = param(0.1, "log", "between the sides of two measured boxes that are one")
+    boxes: int = param(3, "count", "measured boxes that are tried", ge=1)
+    proportion: float = param(1.4, "ratio", "of the scales that a front's width and height may ask for")
+    step_log: float = param(0.06, "log", "between scales that are both tried")
+    overlong: float = param(1.35, "ratio", "of a seen side to the mesh's, at most")
+    facing: float = param(0.45, "cosine", "with the direction to the cameras, from which a side is seen")
+    fits: float = param(0.06, "share", "of a side by which the mesh's may differ and still lie on both ends")
+    narrow: float = param(300.0, "ratio", "condition of the masks' rays, from which on they leave the distance open")
+    agreed_log: float = param(0.1, "log", "median deviation of the views' scales, at most")
+    samples: tuple[int, int, int] = param((160, 250, 200), "count", "points that settle; of the mesh's outline; of its misfit")
+    steps: int = param(5, "count", "closest-point steps", ge=3)
+    coarse: tuple[int, int] = param((2, 6), "count", "steps after which only so many times those that are kept go on")
+    gates: tuple[float, float, float] = param(
+        (0.12, 0.7, 0.02), "share", "of the size: where evidence counts a quarter; what of that a step keeps; and at least"
+    )
+    far: float = param(0.1, "share", "of the size, from which on a point is simply missed")
+    resized: tuple[float, float] = param((0.8, 1.25), "ratio", "least and most that settling may scale")
+    same_deg: float = param(7.0, "deg", "between settled poses that will end alike")
+    same_log: float = param(0.04, "log", "between the scales of settled poses that will end alike")
 
 
 class Hypothesis(NamedTuple):
@@ -44,7 +76,7 @@ def box_hypotheses(shape: Shape, observation: Observation, track: MaskTrack, roo
     """All turns of the mesh's box onto the measured boxes, with the scales their sides suggest.
 
     Gravity fixes the world's up, not the mesh's: a mesh comes in an arbitrary frame, so each of its box directions may
-    be up. Furniture shares its front's axes (24 turns); a free-standing thing may face anywhere (15 degree steps).
+    be up. Furniture shares its front's axes (24 turns); a free-standing thing may face anywhere.
     """
     boxes = measured_extents(observation, track, room_yaw_rad)
     found: list[Hypothesis] = []
@@ -88,7 +120,7 @@ def measured_extents(observation: Observation, track: MaskTrack, room_yaw_rad: f
         boxes.append(_extents(observation, rotation, centre - half, centre + half, np.ones(3, dtype=bool)))
     if track.kind != "front" or not boxes:
         for rotation in (_plan_axes(observation), rotation_about_z(room_yaw_rad)):
-            if len(observation.points_world) >= 30:
+            if len(observation.points_world) >= tuned(Params).least_points:
                 low, high = _span(observation, rotation)
                 boxes.append(_extents(observation, rotation, low, high, np.ones(3, dtype=bool)))
     return _distinct(boxes)
@@ -101,36 +133,37 @@ def settle(
 
     With `outlines` the boxes around the masks count too: they know the size where depth is missing.
     """
-    points = observation.points_world
-    if len(points) < 30 or not hypotheses:
+    params, points = tuned(Params), observation.points_world
+    if len(points) < params.least_points or not hypotheses:
         return hypotheses[:keep]
-    sample = points[np.linspace(0, len(points) - 1, min(160, len(points))).astype(np.int64)]
+    sample = points[np.linspace(0, len(points) - 1, min(params.samples[0], len(points))).astype(np.int64)]
     which = np.arange(len(hypotheses))
     scales = np.array([h.pose.scale for h in hypotheses])
     rotations = np.stack([h.pose.rotation for h in hypotheses])
     shifts = np.stack([h.pose.translation for h in hypotheses])
-    first_scales, gate = scales.copy(), 0.12 * observation.size_m
-    for step in range(6):
+    widest, shrunk, finest = params.gates
+    first_scales, gate = scales.copy(), widest * observation.size_m
+    for step in range(params.steps + 1):
         local = ((sample - shifts[:, None]) @ rotations) / scales[:, None, None]
         raw, nearest = shape.tree.query(local.reshape(-1, 3))
         distance = raw.reshape(local.shape[:2]) * scales[:, None]
-        cost = np.minimum(distance / (0.1 * observation.size_m), 1.0).mean(axis=1)
-        if step == 5:
+        cost = np.minimum(distance / (params.far * observation.size_m), 1.0).mean(axis=1)
+        if step == params.steps:
             break
         matched = shape.points[nearest].reshape(local.shape)
-        if step == 2:  # the far ones of hundreds need no finish
-            few = np.sort(np.argsort(cost, kind="stable")[: 6 * keep])
+        if step == params.coarse[0]:  # the far ones of hundreds need no finish
+            few = np.sort(np.argsort(cost, kind="stable")[: params.coarse[1] * keep])
             which, scales, rotations, shifts, first_scales, distance, matched = (
                 values[few] for values in (which, scales, rotations, shifts, first_scales, distance, matched)
             )
         weight = 1.0 / (1.0 + (distance / gate) ** 2) ** 2
         target = np.broadcast_to(sample[None], matched.shape)
         scales, rotations, shifts = umeyama_batch(matched, target, weight)
-        bounded = np.clip(scales, 0.8 * first_scales, 1.25 * first_scales)
+        bounded = np.clip(scales, params.resized[0] * first_scales, params.resized[1] * first_scales)
         centre = np.einsum("kn,knj->kj", weight / weight.sum(axis=1, keepdims=True), matched)
         turned = np.einsum("kij,kj->ki", rotations, centre)
         shifts = shifts + (scales - bounded)[:, None] * turned
-        scales, gate = bounded, max(0.7 * gate, 0.02 * observation.size_m)
+        scales, gate = bounded, max(shrunk * gate, finest * observation.size_m)
     if outlines:
         cost = cost + _outline_misfit(shape, scales, rotations, shifts, observation.views)
     order = np.argsort(cost, kind="stable")
@@ -147,6 +180,7 @@ def settle(
 
 def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple[View, ...]) -> list[Hypothesis]:
     """The turns at the size and place that the masks' boxes alone suggest, where the views agree on them."""
+    params = tuned(Params)
     boxes = np.array([mask_box(v) for v in views])
     eyes = np.array([v.world_from_camera.translation for v in views])
     middle = np.column_stack([(boxes[:, 0] + boxes[:, 2]) / 2, (boxes[:, 1] + boxes[:, 3]) / 2, np.ones(len(views))])
@@ -154,18 +188,18 @@ def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     across = np.eye(3)[None] - rays[:, :, None] * rays[:, None, :]
     normal = across.sum(axis=0)
-    if np.linalg.cond(normal) > 300.0:  # all views from one side: the distance stays open
+    if np.linalg.cond(normal) > params.narrow:  # all views from one side: the distance stays open
         return []
     centre = np.linalg.solve(normal, (across @ eyes[:, :, None]).sum(axis=0)[:, 0])
     distance = np.linalg.norm(eyes - centre, axis=1)
-    sample = shape.points[:: max(len(shape.points) // 250, 1)]
+    sample = shape.points[:: max(len(shape.points) // params.samples[1], 1)]
     found = []
     for rotation, up in turns:
         turned = sample @ rotation.T
         seen = np.stack([turned @ v.world_from_camera.rotation[:, :2] for v in views])  # (views, n, 2)
         spread = np.ptp(seen, axis=1)
         ratio = np.log((boxes[:, 2:] - boxes[:, :2]) * distance[:, None] / np.maximum(spread, 1e-9))
-        if np.median(np.abs(ratio - np.median(ratio))) < 0.1:
+        if np.median(np.abs(ratio - np.median(ratio))) < params.agreed_log:
             scale = float(np.exp(np.median(ratio)))
             pivot = (turned.min(axis=0) + turned.max(axis=0)) / 2
             found.append(Hypothesis(Similarity3(scale, rotation, centre - scale * pivot), up, "box"))
@@ -176,7 +210,7 @@ def _outline_misfit(
     shape: Shape, scales: np.ndarray, rotations: np.ndarray, shifts: np.ndarray, views: tuple[View, ...]
 ) -> np.ndarray:
     """1 less the mean overlap of the placed samples' box with the mask's box, per hypothesis."""
-    sample = shape.points[:: max(len(shape.points) // 200, 1)]
+    sample = shape.points[:: max(len(shape.points) // tuned(Params).samples[2], 1)]
     world = scales[:, None, None] * (sample @ rotations.transpose(0, 2, 1)) + shifts[:, None]
     overlap = np.zeros(len(scales))
     for view in views:
@@ -193,9 +227,10 @@ def _outline_misfit(
 
 def _same(scales: np.ndarray, rotations: np.ndarray, a: int, b: int) -> bool:
     """Whether two settled hypotheses will end in the same place."""
+    params = tuned(Params)
     turn = np.trace(rotations[a].T @ rotations[b])
-    close = turn > 1.0 + 2.0 * np.cos(np.radians(7))
-    return bool(close and abs(np.log(scales[a] / scales[b])) < 0.04)
+    close = turn > 1.0 + 2.0 * np.cos(np.radians(params.same_deg))
+    return bool(close and abs(np.log(scales[a] / scales[b])) < params.same_log)
 
 
 def _turns(shape: Shape, box: Extents, *, free_yaw: bool) -> list[tuple[Matrix3, Vector3]]:
@@ -206,24 +241,26 @@ def _turns(shape: Shape, box: Extents, *, free_yaw: bool) -> list[tuple[Matrix3,
             for frame in shape.frames[:2]
             for turn in signed_permutations()
         ]
-    turns = []
+    turns, step_deg = [], tuned(Params).turn_deg
     for up in shape.ups:
         upright = rotation_between(up, np.array([0.0, 0.0, 1.0]))
         sides = shape.frames[0] - np.outer(up, up @ shape.frames[0])
         side = upright @ sides[:, int(np.argmax(np.linalg.norm(sides, axis=0)))]
         first = float(np.arctan2(box.world_from_axes[1, 0], box.world_from_axes[0, 0]) - np.arctan2(side[1], side[0]))
-        turns += [(rotation_about_z(first + np.radians(15) * k) @ upright, up) for k in range(24)]
+        yaws = first + np.radians(np.arange(0.0, 360.0, step_deg))
+        turns += [(rotation_about_z(float(yaw)) @ upright, up) for yaw in yaws]
     return turns
 
 
 def _scaled(shape: Shape, rotation: Matrix3, box: Extents, track: MaskTrack) -> list[Similarity3]:
     """The turned mesh at the scales its visible sides suggest, standing where the box stands."""
+    params = tuned(Params)
     turned = shape.points[::3] @ rotation.T @ box.world_from_axes
-    low, high = np.quantile(turned, 0.005, axis=0), np.quantile(turned, 0.995, axis=0)
+    low, high = np.quantile(turned, params.mesh_cut, axis=0), np.quantile(turned, 1 - params.mesh_cut, axis=0)
     ratio = box.size / np.maximum(high - low, 1e-9)
     if not box.known[1]:
         pair = ratio[[0, 2]]
-        if pair.max() / pair.min() > 1.4:
+        if pair.max() / pair.min() > params.proportion:
             return []
         scales = [float(np.sqrt(pair.prod()))]
     else:
@@ -232,10 +269,10 @@ def _scaled(shape: Shape, rotation: Matrix3, box: Extents, track: MaskTrack) -> 
 
 
 def _distinct_scales(scales: list[float], ratio: np.ndarray) -> list[float]:
-    """Scales that differ by 6 % and leave no visible side far longer than the mesh's."""
-    kept: list[float] = []
+    """Scales that clearly differ and leave no visible side far longer than the mesh's."""
+    params, kept = tuned(Params), list[float]()
     for scale in scales:
-        if ratio.max() / scale < 1.35 and all(abs(np.log(scale / k)) > 0.06 for k in kept):
+        if ratio.max() / scale < params.overlong and all(abs(np.log(scale / k)) > params.step_log for k in kept):
             kept.append(scale)
     return kept
 
@@ -244,8 +281,9 @@ def _stand(
     shape: Shape, rotation: Matrix3, scale: float, low: Vector3, high: Vector3, box: Extents, track: MaskTrack
 ) -> Similarity3:
     """Put the side that faces the cameras where the box has it; the middle where neither side does."""
-    facing = np.where(np.abs(box.towards) > 0.45, np.sign(box.towards), 0.0)
-    facing[box.known & (np.abs(scale * (high - low) - box.size) < 0.06 * box.size)] = 0.0
+    params = tuned(Params)
+    facing = np.where(np.abs(box.towards) > params.facing, np.sign(box.towards), 0.0)
+    facing[box.known & (np.abs(scale * (high - low) - box.size) < params.fits * box.size)] = 0.0
     mesh_anchor = scale * ((low + high) / 2 + facing * (high - low) / 2)
     box_anchor = (box.low + box.high) / 2 + facing * box.size / 2
     pose = Similarity3(scale, rotation, box.world_from_axes @ (box_anchor - mesh_anchor))
@@ -263,16 +301,16 @@ def _extents(observation: Observation, rotation: Matrix3, low: Vector3, high: Ve
 
 
 def _span(observation: Observation, rotation: Matrix3) -> tuple[Vector3, Vector3]:
-    """Low and high of the visible points along the axes, without the outermost percent."""
-    points = observation.points_world @ rotation
+    """Low and high of the visible points along the axes, without the outermost."""
+    cut, points = tuned(Params).cut, observation.points_world @ rotation
     if not len(points):
         return np.full(3, np.inf), np.full(3, -np.inf)
-    return np.quantile(points, 0.01, axis=0), np.quantile(points, 0.99, axis=0)
+    return np.quantile(points, cut, axis=0), np.quantile(points, 1 - cut, axis=0)
 
 
 def _plan_axes(observation: Observation) -> Matrix3:
     """Axes of the tightest upright box around the visible points."""
-    angles = np.radians(np.arange(0, 90, 3))
+    angles = np.radians(np.arange(0.0, 90.0, tuned(Params).plan_deg))
     areas = []
     for angle in angles:
         low, high = _span(observation, rotation_about_z(float(angle)))
@@ -281,18 +319,19 @@ def _plan_axes(observation: Observation) -> Matrix3:
 
 
 def _distinct(boxes: list[Extents]) -> list[Extents]:
-    """Boxes whose yaw or size differ: 5 degrees (modulo a quarter turn) or 10 % of a side."""
+    """The first boxes whose yaw (modulo a quarter turn) or size differ."""
     kept: list[Extents] = []
     for box in boxes:
         if all(_differs(box, k) for k in kept):
             kept.append(box)
-    return kept[:3]
+    return kept[: tuned(Params).boxes]
 
 
 def _differs(a: Extents, b: Extents) -> bool:
+    params = tuned(Params)
     relative = np.abs(a.world_from_axes.T @ b.world_from_axes)[:2, :2]
-    turned = relative.max(axis=1).min() < np.cos(np.radians(5))
+    turned = relative.max(axis=1).min() < np.cos(np.radians(params.alike_deg))
     same_order = relative[0, 0] > relative[0, 1]
     size = b.size if same_order else b.size[[1, 0, 2]]
-    resized = (np.abs(np.log(np.maximum(a.size, 1e-3) / np.maximum(size, 1e-3))) > 0.1).any()
+    resized = (np.abs(np.log(np.maximum(a.size, 1e-3) / np.maximum(size, 1e-3))) > params.alike_log).any()
     return bool(turned or resized)

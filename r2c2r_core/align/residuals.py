@@ -20,9 +20,39 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.camera import ray_slopes
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import FrontPanel, MaskTrack
-from r2c2r_core.tuning import tuned
+from r2c2r_core.tuning import param, tuned
 
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How much each kind of evidence counts."""
+
+    points: float = param(800.0, "count", "independent readings in all observed points: depth errors are correlated")
+    outline: float = param(200.0, "count", "independent readings in all silhouette pixels, at most")
+    keypoints: float = param(150.0, "count", "independent readings in all keypoints, at most")
+    upright: float = param(100.0, "count", "readings that the vertical counts as, of one degree each")
+    support: float = param(40.0, "count", "readings that the height of what a thing stands on counts as")
+    panel: tuple[float, float] = param((60.0, 6.0), "count", "readings of the panel's edges, at full confidence and at least")
+    finest: tuple[float, float] = param((0.012, 0.006), "m", "a settled pose's gate, for a size of 1 m, and at least")
+    away: float = param(-0.1, "cosine", "of a normal with the direction to the camera: a surface beyond faces away", ge=-1)
+    noise: float = param(3.0, "σ", "of depth along a keypoint's ray")
+    keypoint_px: float = param(1.5, "px", "a keypoint's own error", gt=0)
+    keypoint_m: float = param(0.001, "m", "a keypoint's error on the mesh", gt=0)
+    outline_m: float = param(0.002, "m", "an outline's error, at least", gt=0)
+    support_m: tuple[float, float] = param((0.008, 0.03), "m", "error of a support's height, and where it is another support")
+    edge_m: float = param(0.005, "m", "error of a panel's edge", gt=0)
+    edge_cut: float = param(0.01, "share", "of a face's points left out at either end: a spike is no edge", lt=0.5)
+    face_m: float = param(0.012, "m", "before and behind the front plane: the mesh's face")
+    face_cos: float = param(0.85, "cosine", "of a face's normal with the front's")
+    face_points: int = param(50, "count", "of a face that has edges", ge=1)
+    square_deg: float = param(8.0, "deg", "between the front and the mesh's nearest box axis: farther off is another axis")
+    axis_deg: float = param(3.0, "deg", "between up and a box axis that is known to be up")
+    base_deg: float = param(1.0, "deg", "between up and the base that it is square to")
+    held: tuple[float, float] = param(
+        (0.3, 0.01), "share", "of the vertical's weight, on a base and on none", source="leaves 0.2 degrees and one"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,12 +85,14 @@ def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anch
 
 
 def _up_weight(track: MaskTrack, shape: Shape, up_mesh: Vector3) -> float:
-    """How firmly a direction of the mesh is held upright: 0.3 leaves it 0.2 degrees, 0.01 one."""
-    axis = float(np.abs(shape.frames[0].T @ up_mesh).max()) > np.cos(np.radians(3))
-    base = any(float(b @ up_mesh) > np.cos(np.radians(1)) for b in shape.bases)
+    """How firmly a direction of the mesh is held upright."""
+    params = tuned(Params)
+    axis = float(np.abs(shape.frames[0].T @ up_mesh).max()) > np.cos(np.radians(params.axis_deg))
+    base = any(float(b @ up_mesh) > np.cos(np.radians(params.base_deg)) for b in shape.bases)
+    on_base, loosely = params.held
     if track.kind != "thing":
-        return 1.0 if axis else 0.01
-    return 0.3 if axis or base else 0.01  # the mean normal of a flat side is a degree off
+        return 1.0 if axis else loosely
+    return on_base if axis or base else loosely  # the mean normal of a flat side is a degree off
 
 
 def all_rows(
@@ -78,12 +110,13 @@ def all_rows(
 
 def finest_gate(observation: Observation) -> float:
     """Half the distance (m) at which evidence stops counting once a pose has settled."""
-    return max(0.012 * observation.size_m, 0.006)
+    per_metre, least = tuned(Params).finest
+    return max(per_metre * observation.size_m, least)
 
 
 def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot: Vector3, gate: float) -> Rows:
     """Each observed point to the tangent plane of the nearest mesh point that faces the cameras."""
-    observed = observation.points_world
+    params, observed = tuned(Params), observation.points_world
     if not len(observed):
         return _no_rows()
     _, nearest = shape.tree.query(pose.inverse.apply(observed))
@@ -93,9 +126,8 @@ def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot:
     apart = np.linalg.norm(placed - observed, axis=1)
     weight = 1.0 / (1.0 + (apart / gate) ** 2) ** 2 / observation.noise_m**2
     if shape.oriented:
-        weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < -0.1] = 0.0
-    # Depth errors are correlated: thousands of points carry the information of some hundreds.
-    weight *= 800.0 / len(observed)
+        weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < params.away] = 0.0
+    weight *= params.points / len(observed)
     return Rows(_jacobian(placed - pivot, normals), residual, weight, observation.frame_index)
 
 
@@ -111,7 +143,7 @@ def outline_rows(
         return _no_rows()
     total = sum(len(p.residual) for p in parts)
     joined = Rows(*(np.concatenate([getattr(p, name) for p in parts]) for name in Rows._fields))
-    return joined._replace(weight=joined.weight * min(200.0 / total, 1.0))
+    return joined._replace(weight=joined.weight * min(tuned(Params).outline / total, 1.0))
 
 
 def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, gate: float) -> Rows:
@@ -127,9 +159,10 @@ def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, g
     apart = placed - np.concatenate([m.points_world for m in matched])
     along = np.einsum("nj,nj->n", apart, rays)
     across = np.linalg.norm(apart - along[:, None] * rays, axis=1)
-    near = np.abs(along) < 3.0 * np.concatenate([m.noise_m for m in matched]) + gate
-    weight = near / (1.0 + (across / gate) ** 2) ** 2 / (1.5 * pixel_m + 0.001) ** 2
-    weight *= min(1.0, 150.0 / max(int(np.count_nonzero(near & (across < gate))), 1))
+    params = tuned(Params)
+    near = np.abs(along) < params.noise * np.concatenate([m.noise_m for m in matched]) + gate
+    weight = near / (1.0 + (across / gate) ** 2) ** 2 / (params.keypoint_px * pixel_m + params.keypoint_m) ** 2
+    weight *= min(1.0, params.keypoints / max(int(np.count_nonzero(near & (across < gate))), 1))
     helper = np.where(np.abs(rays[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     first = np.cross(rays, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -144,10 +177,10 @@ def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, g
 
 def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector3) -> Rows:
     """Uprightness, the measured panel's edges and direction, and the height of what the thing stands on."""
-    rows: list[tuple[np.ndarray, float, float]] = []
+    params, rows = tuned(Params), list[tuple[np.ndarray, float, float]]()
     if anchors.up_mesh is not None:
         up = pose.rotation @ anchors.up_mesh
-        weight = 100.0 * anchors.up_weight / np.radians(1.0) ** 2
+        weight = params.upright * anchors.up_weight / np.radians(1.0) ** 2
         rows += [(_turn_row(up, axis), float(up @ axis), weight) for axis in np.eye(3)[:2]]
     if anchors.front is not None:
         rows += _panel_rows(pose, shape, anchors.front, pivot)
@@ -155,9 +188,10 @@ def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector
         placed = pose.apply(shape.vertices)
         lowest = placed[int(np.argmin(placed[:, 2]))]
         gap = float(lowest[2] - anchors.support_z_m)
-        if abs(gap) < 0.03:
+        sigma_m, other_m = params.support_m
+        if abs(gap) < other_m:
             up_axis = np.array([[0.0, 0.0, 1.0]])
-            rows.append((_jacobian((lowest - pivot)[None], up_axis)[0], gap, 40.0 / 0.008**2))
+            rows.append((_jacobian((lowest - pivot)[None], up_axis)[0], gap, params.support / sigma_m**2))
     if not rows:
         return _no_rows()
     jacobian, residual, weight = (np.array(column) for column in zip(*rows, strict=True))
@@ -186,7 +220,7 @@ def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: V
     x, y = ray_slopes(columns, rows, view.camera)
     points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
     direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
-    weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, 0.002) ** 2
+    weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, tuned(Params).outline_m) ** 2
     jacobian = _jacobian(points - pivot, view.world_from_camera.turn(direction))
     return Rows(jacobian, residual, weight, np.full(len(residual), view.frame_index))
 
@@ -204,26 +238,31 @@ def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
 
 def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vector3) -> list[tuple[np.ndarray, float, float]]:
     """The mesh's front face to the measured rectangle: four edges, and the facing direction."""
+    params = tuned(Params)
     to_front = front.world_from_front.inverse
     axes = front.world_from_front.rotation
     local = to_front.apply(pose.apply(shape.points))
     depth = face_depth(pose, shape, front)
-    facing = to_front.turn(shape.normals @ pose.rotation.T)[:, 1] < -0.85
-    face = local[facing & (np.abs(local[:, 1] - depth) < 0.012)]
-    if len(face) < 50:
+    facing = to_front.turn(shape.normals @ pose.rotation.T)[:, 1] < -params.face_cos
+    face = local[facing & (np.abs(local[:, 1] - depth) < params.face_m)]
+    if len(face) < params.face_points:
         return []
-    trust = 60.0 * max(front.confidence, 0.1)
+    trust = max(params.panel[0] * front.confidence, params.panel[1])
     rows = []
     for axis, size in ((0, front.width_m), (2, front.height_m)):
-        inner_low, inner_high = np.quantile(face[:, axis], [0.01, 0.99])
-        overhang = 0.01 / 0.98 * (inner_high - inner_low)  # what the quantiles cut from an evenly sampled face
+        inner_low, inner_high = np.quantile(face[:, axis], [params.edge_cut, 1 - params.edge_cut])
+        overhang = (
+            params.edge_cut / (1 - 2 * params.edge_cut) * (inner_high - inner_low)
+        )  # what the quantiles cut from an evenly sampled face
         for edge, wanted in ((inner_low - overhang, -size / 2), (inner_high + overhang, size / 2)):
             middle = np.median(face, axis=0)
             middle[axis] = edge
             point = front.world_from_front.apply(middle[None])[0]
-            rows.append((_jacobian((point - pivot)[None], axes[:, axis][None])[0], float(edge - wanted), trust / 0.005**2))
+            rows.append(
+                (_jacobian((point - pivot)[None], axes[:, axis][None])[0], float(edge - wanted), trust / params.edge_m**2)
+            )
     outward = pose.rotation @ _nearest_axis(shape, pose.rotation.T @ -axes[:, 1])
-    if outward @ -axes[:, 1] > np.cos(np.radians(8)):
+    if outward @ -axes[:, 1] > np.cos(np.radians(params.square_deg)):
         rows += [(_turn_row(outward, axes[:, k]), float(outward @ axes[:, k]), trust / np.radians(1.0) ** 2) for k in (0, 2)]
     return rows
 

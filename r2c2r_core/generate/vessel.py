@@ -20,8 +20,6 @@ from r2c2r_core.geometry.meshes import unite
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.tuning import param, tuned
 
-_REACHES_M = np.arange(0.008, 0.06, 0.004)  # beyond the body: where a handle is looked for
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -31,6 +29,7 @@ class Params:
     wall_share: float = param(0.2, "share", "of the radius that a wall may take")
     floor: float = param(1.5, "ratio", "of the floor's thickness to the wall's")
     azimuths: int = param(36, "count", "directions in which a handle is looked for", ge=8)
+    reaches_m: tuple[float, float, float] = param((0.008, 0.06, 0.004), "m", "from, to and step: beyond the body, of a handle")
     spread: int = param(4, "count", "azimuths to either side of the clearest that are averaged")
     beside: float = param(1.08, "ratio", "to the radius: a place that a frame sees past the body")
     least_views: int = param(3, "count", "that may show a handle", ge=1)
@@ -67,13 +66,13 @@ def find_handle(revolution: Revolution, views: Sequence[View], world_from_local:
     """The direction in which most frames that look past the body show mask beside it; None where there is none."""
     params = tuned(Params)
     shares = np.stack([_shown(revolution, azimuth, views, world_from_local) for azimuth in _azimuths()])
-    near = shares[:, : len(_REACHES_M) // 3].mean(axis=1)
+    near = shares[:, : len(_reaches_m()) // 3].mean(axis=1)
     if not np.isfinite(near).any():
         return None
     best = int(np.nanargmax(near))
     if near[best] < params.shown or np.nanmedian(near) > 0.5 * near[best]:  # a mask wide all round is a mask too wide
         return None
-    reach = float(_REACHES_M[shares[best] >= params.shown].max(initial=_REACHES_M[0]))
+    reach = float(_reaches_m()[shares[best] >= params.shown].max(initial=_reaches_m()[0]))
     beside = (best + np.arange(-params.spread, params.spread + 1)) % params.azimuths
     middle = np.nan_to_num(near[beside]) @ np.exp(1j * _azimuths()[beside])
     return VesselHandle(float(np.angle(middle)), reach)
@@ -91,20 +90,20 @@ def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
     heights = bottom + np.array([0.45, 0.6, 0.75]) * (top - bottom)
     radius = float(np.interp(heights[1], revolution.heights_m, revolution.radii_m))
-    places = [np.append(revolution.centre + (radius + r) * out, z) for r in _REACHES_M for z in heights]
+    places = [np.append(revolution.centre + (radius + r) * out, z) for r in _reaches_m() for z in heights]
     body = np.array([[*revolution.centre, z] for z in heights])
     held = []
     for view in views:
         eye = world_from_local.inverse.apply(view.eye_world[None])[0]
         towards = (revolution.centre - eye[:2]) / max(float(np.linalg.norm(revolution.centre - eye[:2])), 1e-9)
-        if abs(out @ [towards[1], -towards[0]]) * (radius + _REACHES_M[2]) < params.beside * radius:
+        if abs(out @ [towards[1], -towards[0]]) * (radius + _reaches_m()[2]) < params.beside * radius:
             continue
         camera_from_local = view.world_from_camera.inverse @ world_from_local
         pixels = project(camera_from_local.apply(np.array(places)), view.rgb_camera)
         pixels = pixels + _pose_error(view, project(camera_from_local.apply(body), view.rgb_camera))
         mask, inside = sample_nearest(view.mask, pixels)
-        held.append((mask & inside).reshape(len(_REACHES_M), -1).any(axis=1))
-    return np.mean(held, axis=0) if len(held) >= params.least_views else np.full(len(_REACHES_M), np.nan)
+        held.append((mask & inside).reshape(len(_reaches_m()), -1).any(axis=1))
+    return np.mean(held, axis=0) if len(held) >= params.least_views else np.full(len(_reaches_m()), np.nan)
 
 
 def _pose_error(view: View, body_px: np.ndarray) -> np.ndarray:
@@ -134,3 +133,7 @@ def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
     )  # its axis along the tangent
     turned = upright @ rotation_about_z(handle.azimuth_rad).T
     return turned + np.append(revolution.centre, middle), faces
+
+
+def _reaches_m() -> np.ndarray:
+    return np.arange(*tuned(Params).reaches_m)
