@@ -159,7 +159,7 @@ def require_tools(request: Request) -> None:
 def doubts_about(request: Request, work: Workspace, *, progress: Progress = SILENT) -> Doubts:
     """What the doctor holds against the recording, to be said before anything is computed; reads it if nobody has."""
     require_tools(request)
-    with work.locked():
+    with work.locked(), tuning(changed(request.config.numbers)):
         run = Ledger(work, progress, "ingest")
         capture = read_room(request, run)
         source = Kept(request.source, recording_key(request.source))

@@ -1,21 +1,29 @@
 """How far poses are off: views are aligned to each other, and what it takes to do so is the poses' disagreement."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2c2r_core.ingest.doctor.pairs import Disagreement, Pairs, Views, compare, overlaps, spread, tolerance_m
+from r2c2r_core.tuning import param, tuned
 
-_ROUNDS = 5
-_APART = 0.25  # of the recording lies between two visits
-_DAMPING = 0.02  # directions that the surface does not tell stay where they are
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When the poses place one surface twice."""
+
+    rounds: int = param(5, "count", "steps of aligning one view to another", ge=1)
+    apart: float = param(0.25, "share", "of the recording between two visits")
+    overlap: float = param(0.3, "share", "of a view that another must see again")
+    damping: float = param(0.02, "ratio", "to the mean weight: directions that the surface does not tell stay where they are")
+    least_points: int = param(80, "count", "that both views see")
 
 
 def revisits(views: Views, most: int) -> Pairs:
     """Pairs that see the same surface from alike places at very different times, those most alike first."""
     every, overlap = overlaps(views)
-    later = every[:, 1] - every[:, 0] >= max(_APART * len(views.position), 2)
-    return spread(every, np.where(later & (overlap > 0.3), overlap, 0.0), most)
+    later = every[:, 1] - every[:, 0] >= max(tuned(Params).apart * len(views.position), 2)
+    return spread(every, np.where(later & (overlap > tuned(Params).overlap), overlap, 0.0), most)
 
 
 def misplaced_m(views: Views, pairs: Pairs) -> np.ndarray:
@@ -31,17 +39,17 @@ def _misplaced(views: Views, pair: np.ndarray) -> float:
     first = int(pair[0])
     given = views.rotation[first].copy(), views.translation[first].copy()
     compared = compare(views, pair[None])
-    if compared.comparable.sum() < 80:
+    if compared.comparable.sum() < tuned(Params).least_points:
         return float("nan")
     middle = np.median(_points(views, first)[compared.comparable[0]], axis=0)
     surface = _surface(views, int(pair[1]))
-    for _ in range(_ROUNDS):
+    for _ in range(tuned(Params).rounds):
         step = _step(views, pair, compared, surface)
         views.rotation[first] = step[0] @ views.rotation[first]
         views.translation[first] = step[0] @ views.translation[first] + step[1]
         compared = compare(views, pair[None])
     before, after = middle @ given[0].T + given[1], middle @ views.rotation[first].T + views.translation[first]
-    agreed = compared.comparable.sum() >= 80
+    agreed = compared.comparable.sum() >= tuned(Params).least_points
     views.rotation[first], views.translation[first] = given  # the next pair starts from the given poses
     return float(np.linalg.norm(after - before)) if agreed else float("nan")
 
@@ -65,7 +73,7 @@ def _step(
     centre = p.mean(axis=0) if len(p) else np.zeros(3)
     jacobian = np.hstack([np.cross(p - centre, n), n])
     normal_matrix = (jacobian * weight[:, None]).T @ jacobian
-    damped = normal_matrix + _DAMPING * (weight.sum() + 1e-9) * np.eye(6)
+    damped = normal_matrix + tuned(Params).damping * (weight.sum() + 1e-9) * np.eye(6)
     solved = np.linalg.solve(damped, (jacobian * weight[:, None]).T @ apart)
     turn = Rotation.from_rotvec(solved[:3]).as_matrix()
     return turn, centre + solved[3:] - turn @ centre

@@ -1,5 +1,7 @@
 """The capture doctor: is this recording good enough, and if not, why not."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from r2c2r_core.ingest.doctor.hypotheses import Poses, find_convention, find_scale
@@ -9,33 +11,39 @@ from r2c2r_core.ingest.doctor.pairs import far_pairs, neighbours, stack_views
 from r2c2r_core.ingest.doctor.registration import measure_registration
 from r2c2r_core.ingest.doctor.report import CaptureReport
 from r2c2r_core.ingest.doctor.unit import likely_unit
-from r2c2r_core.ingest.doctor.verdict import PLAUSIBLE_M, judge, worst
+from r2c2r_core.ingest.doctor.verdict import judge, plausible, worst
 from r2c2r_core.ingest.readers.protocol import Recording
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.tuning import param, tuned
 
-_VIEWS = 60  # frames that are looked at
-_FAR_PAIRS = 30
-_REGISTERED = 30  # frames on which depth is laid over colour
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How much of a recording is looked at."""
+
+    views: int = param(60, "count", "frames that are looked at", ge=2)
+    far_pairs: int = param(30, "count", "pairs with a wide baseline", ge=4)
+    registered: int = param(30, "count", "frames on which depth is laid over colour", ge=1)
 
 
 def examine(capture: Capture, recording: Recording | None = None) -> CaptureReport:
     """Look a recording over, by sixty of its frames; `recording` adds confidence and frames that thinning left out."""
     capture = capture.as_recorded  # refined poses would hide what is wrong with the recording
     rng = np.random.default_rng(0)
-    count = len(capture.frames)
-    positions = np.unique(np.linspace(0, count - 1, min(_VIEWS, count)).round().astype(np.int64))
+    params, count = tuned(Params), len(capture.frames)
+    positions = np.unique(np.linspace(0, count - 1, min(params.views, count)).round().astype(np.int64))
     views = stack_views(capture.frames, capture.images, list(positions), rng)
     near = neighbours(views)
     as_recorded = views.posed(*_recorded_poses(capture, positions))
     shifted = [(places, _recorded_poses(capture, positions + places)) for places in (1, -1)]
     convention, mended = find_convention(as_recorded, near, shifted)
-    scale = find_scale(mended, far_pairs(mended, _FAR_PAIRS))
-    spread = positions[:: -(-len(positions) // _REGISTERED)]
+    scale = find_scale(mended, far_pairs(mended, params.far_pairs))
+    spread = positions[:: -(-len(positions) // params.registered)]
     registration = measure_registration([capture.frames[p] for p in spread], capture.images, rng)
     grey = grey_views(capture, views)
     figures = measure(capture, views, near, grey, recording)
     recorded_m = figures.recorded_depth_m
-    odd = recording is not None and recorded_m is not None and not PLAUSIBLE_M[0] < recorded_m < PLAUSIBLE_M[1]
+    odd = recording is not None and recorded_m is not None and not plausible(recorded_m)
     unit = likely_unit(capture, recording, recorded_m, rng) if odd and recording and recorded_m else None
     remarks = judge(figures, convention, scale, registration, unit)
     return CaptureReport(

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, rotation_about_z
 from r2c2r_core.ingest.doctor.pairs import Centres, Pairs, Rotations, Views, compare
+from r2c2r_core.tuning import param, tuned
 
 Cause = Literal[
     "poses_inverted",
@@ -22,9 +23,22 @@ Cause = Literal[
 ]
 Poses = tuple[Rotations, Centres]
 
-_LEAST_GAIN = 0.1  # of the points must come to agree before a convention is called wrong
-_LEAST_OFF = 0.04  # a scale or a focal length nearer than this to the given one is not called wrong
 _SCALES = np.geomspace(0.8, 1.25, 23)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When another reading of a recording is believed."""
+
+    gain: float = param(0.1, "share", "of the points that must come to agree before a convention is called wrong")
+    gain_ratio: float = param(
+        1.25, "ratio", "of the agreement under it to the given one", source="frames that barely move agree under any"
+    )
+    least_log: float = param(0.04, "log", "off the given scale or focal length, nearer than which it is not called wrong")
+    least_pairs: int = param(4, "count", "with a wide baseline, that tell a scale", ge=1)
+    cost: float = param(0.85, "ratio", "of the disagreement under another scale to the given one, at most")
+    better: float = param(0.7, "share", "of the pairs it must help", source="wrong calibration hurts nearly all, chance some")
+    alike: float = param(1.05, "ratio", "of the disagreements of two scales that cannot be told apart")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +78,8 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
     assert best is not None
     agreement, cause, text, changed = best
     before = float(given.agreement.mean())
-    # Frames that barely move agree under any convention: only a clear gain counts
-    if agreement < before + _LEAST_GAIN or agreement < 1.25 * before:
+    params = tuned(Params)
+    if agreement < before + params.gain or agreement < params.gain_ratio * before:
         return None, views
     finding = Finding(
         cause=cause,
@@ -84,20 +98,20 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
 
     Needs pairs with a wide baseline: without parallax, depth of any scale agrees with itself.
     """
-    if len(pairs) < 4:
+    params = tuned(Params)
+    if len(pairs) < params.least_pairs:
         return None
     given = compare(views, pairs)
     tries = [*_unit_tries(views, pairs), *_fine_tries(views, pairs)]
     best = min(tries, key=lambda t: t.cost.mean())
     better = best.cost < given.cost
-    # Wrong calibration hurts nearly every pair, chance only some of them
-    if best.cost.mean() > 0.85 * given.cost.mean() or better.mean() < 0.7:
+    if best.cost.mean() > params.cost * given.cost.mean() or better.mean() < params.better:
         return None
-    if best.factor is not None and abs(np.log(best.factor)) < _LEAST_OFF:
+    if best.factor is not None and abs(np.log(best.factor)) < params.least_log:
         return None
     so = compare(views, pairs, **best.change)
     # A short path hardly tells a scale from a focal length: then both are named
-    alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < 1.05 * best.cost.mean()]
+    alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < params.alike * best.cost.mean()]
     return Finding(
         cause=best.cause,
         text=" or ".join((best.text, *alike)),

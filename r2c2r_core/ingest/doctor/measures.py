@@ -1,6 +1,7 @@
 """The figures of a recording: what can be counted, before anything is judged."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -14,9 +15,18 @@ from r2c2r_core.ingest.doctor.recorded import Recorded, measure_recorded, measur
 from r2c2r_core.ingest.doctor.report import CaptureFigures, Moment
 from r2c2r_core.ingest.readers.protocol import Recording
 from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.tuning import param, tuned
 
-_LEVEL_M2 = 0.15  # a level surface smaller than this is a thing's top
-_CEILING_M = 1.9
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What of a recording is counted."""
+
+    level_m2: float = param(0.15, "m²", "of a level surface: a smaller one is a thing's top")
+    furniture_m: tuple[float, float] = param((0.25, 1.9), "m", "least and most height of a level surface of furniture")
+    jump_m: float = param(0.2, "m", "of a step that may be a jump")
+    pace: tuple[float, float] = param((6.0, 2.5), "ratio", "of a jump to the usual pace, and to that of the steps beside it")
+    blurred: float = param(1 / 3, "ratio", "of a blurred frame's sharpness to the usual one")
 
 
 def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording: Recording | None) -> CaptureFigures:
@@ -54,7 +64,7 @@ def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording
         recorded_depth_m=recorded.median_m,
         confidence_shares=recorded.confidence,
         median_depth_m=float(np.median(views.depth_m[depth_known])) if depth_known.any() else 0.0,
-        blurred_share=float((sharpness < np.median(sharpness) / 3).mean()),
+        blurred_share=float((sharpness < np.median(sharpness) * tuned(Params).blurred).mean()),
         overexposed_share=light.white,
         underexposed_share=light.black,
         flicker_share=light.flicker,
@@ -125,25 +135,30 @@ def _heights(capture: Capture) -> _Heights:
     area = np.linalg.norm(cross, axis=1) / 2
     level = np.abs(cross[:, 2]) > 2 * 0.95 * area
     z, up = (a[:, 2] + b[:, 2] + c[:, 2]) / 3, cross[:, 2] > 0
-    furniture = level & up & (z > 0.25) & (z < _CEILING_M)
-    counts = np.histogram(z[furniture], bins=np.arange(0.25, _CEILING_M, 0.02), weights=area[furniture])[0]
+    low, ceiling = tuned(Params).furniture_m
+    furniture = level & up & (z > low) & (z < ceiling)
+    counts = np.histogram(z[furniture], bins=np.arange(low, ceiling, 0.02), weights=area[furniture])[0]
     smooth = np.convolve(counts, np.ones(3), mode="same")
-    peaks = np.flatnonzero((smooth[1:-1] > smooth[:-2]) & (smooth[1:-1] >= smooth[2:]) & (smooth[1:-1] > _LEVEL_M2)) + 1
-    around = [furniture & (np.abs(z - (0.26 + 0.02 * k)) < 0.04) for k in peaks]
+    peaks = (
+        np.flatnonzero((smooth[1:-1] > smooth[:-2]) & (smooth[1:-1] >= smooth[2:]) & (smooth[1:-1] > tuned(Params).level_m2))
+        + 1
+    )
+    around = [furniture & (np.abs(z - (low + 0.01 + 0.02 * k)) < 0.04) for k in peaks]
     heights = sorted({round(float(np.average(z[near], weights=area[near])), 2) for near in around})
-    above = level & ~up & (z > _CEILING_M)
-    ceiling = float(np.average(z[above], weights=area[above])) if area[above].sum() > 0.5 else None
-    return _Heights(tuple(heights), ceiling)
+    above = level & ~up & (z > ceiling)
+    height = float(np.average(z[above], weights=area[above])) if area[above].sum() > 0.5 else None
+    return _Heights(tuple(heights), height)
 
 
 def _jumps(frames: Sequence[Frame], steps: np.ndarray) -> np.ndarray:
     """Steps much longer than the pace of the recording and of the steps beside them allows."""
+    usual, nearby = tuned(Params).pace
     if len(steps) < 3:
         return np.zeros(len(steps), dtype=bool)
     gaps = np.diff([f.index for f in frames]).astype(np.float64)
     pace = steps / gaps
     beside = np.maximum(np.r_[pace[1], pace[:-1]], np.r_[pace[1:], pace[-2]])
-    return np.asarray((steps > 0.2) & (pace > 6.0 * np.median(pace)) & (pace > 2.5 * beside))
+    return np.asarray((steps > tuned(Params).jump_m) & (pace > usual * np.median(pace)) & (pace > nearby * beside))
 
 
 def _extent(vertices: np.ndarray) -> tuple[float, float, float]:

@@ -12,14 +12,30 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.tuning import param, tuned
 
-_LEAST_WIDTH = 160  # px; depth images are thinned to no less than this
-_POINTS = 700  # of each view
 _NEAR_M = 0.05
 
 Rotations = Float[np.ndarray, "views 3 3"]
 Centres = Float[np.ndarray, "views 3"]
 Pairs = Integer[np.ndarray, "pairs 2"]  # positions of the view whose points are taken and of the view that judges them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How two views are compared."""
+
+    width_px: int = param(160, "px", "of a depth image, thinned to no less", ge=16)
+    points: int = param(700, "count", "of each view", ge=30)
+    noise: tuple[float, float] = param((0.01, 0.01), "m", "by which good depth may differ: at 0 m, and more for each metre")
+    hidden: tuple[float, float] = param((0.1, 0.1), "m", "beyond which one of two views sees something else, likewise")
+    cut: float = param(3.0, "ratio", "of a disagreement to what is allowed, at which it counts no more")
+    least_points: int = param(30, "count", "that both views see")
+    moved_m: float = param(0.15, "m", "from a view, after which its neighbour is taken")
+    turned_deg: float = param(8.0, "deg", "from a view, after which its neighbour is taken")
+    later: int = param(6, "count", "views after it, of which the last is taken where none has moved on", ge=1)
+    overlap: float = param(0.2, "share", "of a view that a far one must see")
+    parallax: float = param(0.1, "ratio", "of a baseline to the distance, at least")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,7 +79,8 @@ class Disagreement(NamedTuple):
     @property
     def comparable(self) -> np.ndarray:
         """Points both see: what lies far off is hidden from one of the two."""
-        return self.seen & (np.abs(self.apart_m) < 0.1 + 0.1 * self.expected_m)
+        least, more = tuned(Params).hidden
+        return self.seen & (np.abs(self.apart_m) < least + more * self.expected_m)
 
     @property
     def overlap(self) -> np.ndarray:
@@ -72,25 +89,28 @@ class Disagreement(NamedTuple):
 
     @property
     def error_m(self) -> np.ndarray:
-        """Median disagreement (pairs,) over comparable points; NaN where there are fewer than 30."""
+        """Median disagreement (pairs,) over comparable points; NaN where they are too few."""
         comparable = self.comparable
         errors = np.full(len(comparable), np.nan)
-        for k in np.flatnonzero(comparable.sum(axis=1) >= 30):
+        for k in np.flatnonzero(comparable.sum(axis=1) >= tuned(Params).least_points):
             errors[k] = np.median(np.abs(self.apart_m[k, comparable[k]]))
         return errors
 
     @property
     def cost(self) -> np.ndarray:
-        """Mean disagreement (pairs,) in tolerances, cut off at 3, over points both see; 3 where there are fewer than 30."""
+        """Mean disagreement (pairs,) in tolerances, cut off, over points both see; as much where they are too few."""
         comparable = self.comparable
         counts = comparable.sum(axis=1)
-        cut = np.minimum(np.abs(self.apart_m) / tolerance_m(self.expected_m), 3.0)
-        return np.where(counts >= 30, np.where(comparable, cut, 0.0).sum(axis=1) / np.maximum(counts, 1), 3.0)
+        params = tuned(Params)
+        cut = np.minimum(np.abs(self.apart_m) / tolerance_m(self.expected_m), params.cut)
+        mean = np.where(comparable, cut, 0.0).sum(axis=1) / np.maximum(counts, 1)
+        return np.where(counts >= params.least_points, mean, params.cut)
 
 
 def tolerance_m(depth_m: np.ndarray) -> np.ndarray:
     """By how much two good depth images may differ: 2 cm at 1 m, 4 cm at 3 m."""
-    return np.asarray(0.01 + 0.01 * depth_m)
+    least, more = tuned(Params).noise
+    return np.asarray(least + more * depth_m)
 
 
 def stack_views(frames: Sequence[Frame], images: FrameImages, positions: Sequence[int], rng: np.random.Generator) -> Views:
@@ -146,16 +166,16 @@ def compare(
 
 
 def neighbours(views: Views) -> Pairs:
-    """For each view a later one that has moved on a little: turned by 8 deg or moved by 15 cm, or else the sixth.
+    """For each view a later one that has moved on a little: turned or moved enough, or else the last of a few.
 
     Chosen by the order of the frames and by angles between them, which survive inverted poses, flipped camera axes and
     reordered quaternions: the pairs overlap even where the poses are nonsense.
     """
-    pairs = []
+    params, pairs = tuned(Params), []
     for k in range(len(views.position) - 1):
-        for later in range(k + 1, min(k + 7, len(views.position))):
+        for later in range(k + 1, min(k + 1 + params.later, len(views.position))):
             moved = float(np.linalg.norm(views.translation[later] - views.translation[k]))
-            if moved > 0.15 or angle_deg(views.rotation[k], views.rotation[later]) > 8.0:
+            if moved > params.moved_m or angle_deg(views.rotation[k], views.rotation[later]) > params.turned_deg:
                 break
         pairs.append((k, later))
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -174,7 +194,11 @@ def far_pairs(views: Views, most: int) -> Pairs:
     apart = np.linalg.norm(views.translation[every[:, 0]] - views.translation[every[:, 1]], axis=1)
     parallax = apart / np.maximum(distance[every[:, 0]], 0.3)
     soon = 1.0 / (1.0 + ((every[:, 1] - every[:, 0]) / (0.15 * len(views.position))) ** 2)
-    wanted = np.where((overlap > 0.2) & (parallax > 0.1), np.minimum(parallax, 0.8) * np.sqrt(overlap) * soon, 0.0)
+    wanted = np.where(
+        (overlap > tuned(Params).overlap) & (parallax > tuned(Params).parallax),
+        np.minimum(parallax, 0.8) * np.sqrt(overlap) * soon,
+        0.0,
+    )
     return spread(every, wanted, most)
 
 
@@ -213,16 +237,16 @@ def _thinned(
     frame: Frame, images: FrameImages, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(depth, focal lengths, principal point, pixels of some known points, their depth) at a fraction of the resolution."""
-    camera = frame.depth_camera
-    step = max(1, camera.width // _LEAST_WIDTH)
+    params, camera = tuned(Params), frame.depth_camera
+    step = max(1, camera.width // params.width_px)
     start = step // 2  # thinned pixel k stands for the full one at start + k * step, whose centre lies half a pixel further
     depth = np.asarray(images.depth(frame.index).metres[start::step, start::step])
     off_centre = (start + 0.5) / step - 0.5
     focal = np.array([camera.fx, camera.fy]) / step
     centre = np.array([camera.cx, camera.cy]) / step - off_centre
     row, column = np.nonzero(depth > 0)
-    taken = rng.permutation(len(row))[:_POINTS]
-    uv, z = np.zeros((_POINTS, 2)), np.zeros(_POINTS)
+    taken = rng.permutation(len(row))[: params.points]
+    uv, z = np.zeros((params.points, 2)), np.zeros(params.points)
     uv[: len(taken)] = np.stack([column[taken], row[taken]], axis=1) + 0.5
     z[: len(taken)] = depth[row[taken], column[taken]]
     return depth, focal, centre, uv, z

@@ -15,15 +15,23 @@ import numpy as np
 from r2c2r_core.arrays import DepthMetres, Image
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.model.capture import Frame, FrameImages
+from r2c2r_core.tuning import param, tuned
 
 WIDTH = 640  # px across the colour image's longer side, at which distances are given
-_FAR_PX = 6.0  # an edge farther away than this says nothing
-_POINTS = 500  # a frame
-_LEAST_POINTS, _LEAST_FRAMES = 60, 5
-_LIMIT_PX = 2.0  # the gap between two fronts is about as wide
-_LEAST_GAIN = 0.15  # of the edge distance; good recordings gain up to 0.12 by chance
-_FITS_PX = 3.0  # edges laid at random are 3.5 px and more from the next one
-_NEAREST_M, _FARTHEST_M = 0.3, 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When depth does not lie on colour."""
+
+    far_px: float = param(6.0, "px", "of 640: an edge farther away says nothing", gt=0)
+    points: int = param(500, "count", "a frame, at most", ge=1)
+    least: tuple[int, int] = param((60, 5), "count", "points of a frame, and frames, that tell")
+    limit_px: float = param(2.0, "px", "of 640, that are as good as none", source="the gap between two fronts is about as wide")
+    gain: float = param(0.15, "share", "of the edge distance that must go", source="good recordings gain up to 0.12 by chance")
+    fits_px: float = param(3.0, "px", "of 640, of a fit", source="edges laid at random are 3.5 px and more from the next one")
+    near_m: tuple[float, float] = param((0.3, 3.0), "m", "least and most depth of an edge that is looked at")
+    jump: tuple[float, float] = param((0.1, 0.03), "m", "of an edge: at 0 m, and more for each metre")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,8 +50,9 @@ class Registration:
     @property
     def wrong(self) -> bool:
         """Whether depth clearly lies elsewhere than the calibration says, and the better one truly fits."""
-        gain = self.edge_px - self.edge_best_px
-        return self.off_px > self.limit_px and gain > _LEAST_GAIN * self.edge_px and self.edge_best_px < _FITS_PX
+        params, gain = tuned(Params), self.edge_px - self.edge_best_px
+        clear = gain > params.gain * self.edge_px and self.edge_best_px < params.fits_px
+        return self.off_px > self.limit_px and clear
 
 
 class _Edges(NamedTuple):
@@ -51,20 +60,20 @@ class _Edges(NamedTuple):
 
     ray: np.ndarray  # (n, 2) x/z, y/z
     z: np.ndarray  # (n,)
-    distance_px: np.ndarray  # (h, w), at most _FAR_PX
+    distance_px: np.ndarray  # (h, w), at most `far_px`
     camera: Intrinsics  # colour, of the scaled image
 
 
 def measure_registration(frames: Sequence[Frame], images: FrameImages, rng: np.random.Generator) -> Registration | None:
     """How depth lies on colour over these frames; None when too few depth edges are seen."""
     edges = [e for f in frames if (e := _edges(f, images.rgb(f.index), images.depth(f.index).metres, rng)) is not None]
-    if len(edges) < _LEAST_FRAMES:
+    if len(edges) < tuned(Params).least[1]:
         return None
     stack = _stacked(edges)
     best = _minimise(stack, _FULL)
     given, reached = (float(_distances(stack, p[None]).mean()) for p in (_GIVEN, best))
     off_px = float(np.linalg.norm(_projected(stack, best[None]) - _projected(stack, _GIVEN[None]), axis=-1).mean())
-    limit_px = max(_LIMIT_PX, WIDTH / max(frames[0].depth_camera.width, frames[0].depth_camera.height))
+    limit_px = max(tuned(Params).limit_px, WIDTH / max(frames[0].depth_camera.width, frames[0].depth_camera.height))
     focal = _minimise(stack, _FOCAL) if off_px > limit_px else best
     return Registration(
         edge_px=given,
@@ -118,7 +127,7 @@ def _distances(stack: _Stack, parameters: np.ndarray) -> np.ndarray:
     u, v = uv[..., 0], uv[..., 1]
     inside = (u >= 0) & (v >= 0) & (u < columns) & (v < rows)
     column, row = np.where(inside, u, 0).astype(np.int64), np.where(inside, v, 0).astype(np.int64)
-    return np.where(inside, stack.distance_px[stack.frame, row, column], _FAR_PX)
+    return np.where(inside, stack.distance_px[stack.frame, row, column], tuned(Params).far_px)
 
 
 def _minimise(stack: _Stack, step: np.ndarray) -> np.ndarray:
@@ -154,9 +163,9 @@ def _starts(step: np.ndarray) -> np.ndarray:
 
 def _edges(frame: Frame, rgb: Image, depth_m: DepthMetres, rng: np.random.Generator) -> _Edges | None:
     ray, z = _depth_edges(depth_m, frame.depth_camera)
-    if len(z) < _LEAST_POINTS:
+    if len(z) < tuned(Params).least[0]:
         return None
-    taken = rng.permutation(len(z))[:_POINTS]
+    taken = rng.permutation(len(z))[: tuned(Params).points]
     scale = WIDTH / max(rgb.shape[:2])
     camera = frame.rgb_camera.resized(round(rgb.shape[1] * scale), round(rgb.shape[0] * scale))
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
@@ -168,6 +177,7 @@ def _depth_edges(depth_m: DepthMetres, camera: Intrinsics) -> tuple[np.ndarray, 
 
     Unknown pixels between the two sides are bridged, up to three: where sensors see mixed depth, ingest has removed it.
     """
+    (least, more), (nearest, farthest) = tuned(Params).jump, tuned(Params).near_m
     rays, depths = [], []
     for axis in (0, 1):
         for apart in (1, 2, 3, 4):
@@ -176,7 +186,7 @@ def _depth_edges(depth_m: DepthMetres, camera: Intrinsics) -> tuple[np.ndarray, 
             for k in range(1, apart):
                 known &= np.take(depth_m, np.arange(k, depth_m.shape[axis] - apart + k), axis=axis) == 0
             near = np.minimum(here, there)
-            jump = known & (np.abs(here - there) > 0.1 + 0.03 * near) & (near > _NEAREST_M) & (near < _FARTHEST_M)
+            jump = known & (np.abs(here - there) > least + more * near) & (near > nearest) & (near < farthest)
             row, column = np.nonzero(jump)
             border = np.stack([column + 0.5, row + 0.5], axis=1)
             border[:, 1 - axis] += apart / 2
@@ -186,10 +196,10 @@ def _depth_edges(depth_m: DepthMetres, camera: Intrinsics) -> tuple[np.ndarray, 
 
 
 def _edge_distance(rgb: Image) -> np.ndarray:
-    """Distance (h, w) to the nearest edge of brightness or hue, px, at most _FAR_PX."""
+    """Distance (h, w) to the nearest edge of brightness or hue, px, at most `far_px`."""
     lab = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), (0, 0), 1.2)
     edge = np.zeros(rgb.shape[:2], dtype=bool)
     for channel, (low, high) in enumerate(((30, 80), (25, 60), (25, 60))):
         edge |= cv2.Canny(np.ascontiguousarray(lab[..., channel]), low, high) > 0
     distance = cv2.distanceTransform((~edge).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.minimum(distance, np.float32(_FAR_PX))
+    return np.minimum(distance, np.float32(tuned(Params).far_px))

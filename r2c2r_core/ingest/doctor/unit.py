@@ -1,5 +1,6 @@
 """Depth in another unit than its format's: which one, by what the frames agree on."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.doctor.pairs import compare, far_pairs, neighbours, stack_views
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.model.capture import Capture, Depth
+from r2c2r_core.tuning import param, tuned
 
 _UNITS = {  # factor to metres: what was read as something else
     0.001: "millimetres read as metres",
@@ -23,10 +25,17 @@ _UNITS = {  # factor to metres: what was read as something else
     100.0: "centimetres read as 1/10000 m",
     1000.0: "metres read as millimetres",
 }
-_NEAREST_M, _FARTHEST_M = 0.4, 5.0  # median depth of what is filmed with a depth camera
-_USUAL_M = 1.5
-_CLEAR = 0.8  # of the second best's cost: then the frames have told, and not the usual distance
-_VIEWS, _PAIRS = 24, 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which unit is believed."""
+
+    near_m: tuple[float, float] = param((0.4, 5.0), "m", "least and most median depth of what is filmed with a depth camera")
+    usual_m: float = param(1.5, "m", "median depth of a room", gt=0)
+    clear: float = param(0.8, "ratio", "of the best unit's disagreement to the next's: then the frames have told")
+    views: int = param(24, "count", "frames that are compared", ge=2)
+    pairs: int = param(16, "count", "of them with a wide baseline", ge=1)
 
 
 class Unit(NamedTuple):
@@ -39,14 +48,16 @@ class Unit(NamedTuple):
 
 def likely_unit(capture: Capture, recording: Recording, median_m: float, rng: np.random.Generator) -> Unit | None:
     """The unit under which things are as far as they are in rooms, and under which most views agree; None where none fits."""
-    fitting = [f for f in _UNITS if _NEAREST_M < f * median_m < _FARTHEST_M]
+    params = tuned(Params)
+    nearest, farthest = params.near_m
+    fitting = [f for f in _UNITS if nearest < f * median_m < farthest]
     if not fitting:
         return None
     costs = {factor: cost for factor in fitting if (cost := _disagreement(capture, recording, factor, rng)) is not None}
     ranked = sorted(costs, key=lambda factor: costs[factor])
-    if ranked and (len(ranked) == 1 or costs[ranked[0]] < _CLEAR * costs[ranked[1]]):
+    if ranked and (len(ranked) == 1 or costs[ranked[0]] < params.clear * costs[ranked[1]]):
         return Unit(ranked[0], _UNITS[ranked[0]], measured=len(ranked) > 1)
-    usual = min(fitting, key=lambda f: abs(np.log(f * median_m / _USUAL_M)))
+    usual = min(fitting, key=lambda f: abs(np.log(f * median_m / params.usual_m)))
     return Unit(usual, _UNITS[usual], measured=False)
 
 
@@ -54,14 +65,18 @@ def _disagreement(capture: Capture, recording: Recording, factor: float, rng: np
     """Mean disagreement of views, in what sensors are allowed, if depth were so much larger; None where none overlap."""
     raw = {frame.index: frame for frame in recording.frames}
     positions = [p for p, frame in enumerate(capture.frames) if frame.index in raw]
-    positions = positions[:: -(-len(positions) // _VIEWS)] if positions else []
+    positions = positions[:: -(-len(positions) // tuned(Params).views)] if positions else []
     try:
         views = stack_views(capture.frames, _Rescaled(recording, raw, factor), positions, rng) if positions else None
     except (UnreadableFrame, CaptureError):
         return None
     if views is None:
         return None
-    pairs = np.concatenate([neighbours(views), far_pairs(views, _PAIRS)]) if len(positions) > 1 else np.zeros((0, 2), np.int64)
+    pairs = (
+        np.concatenate([neighbours(views), far_pairs(views, tuned(Params).pairs)])
+        if len(positions) > 1
+        else np.zeros((0, 2), np.int64)
+    )
     return float(compare(views, pairs).cost.mean()) if len(pairs) else None
 
 

@@ -1,22 +1,77 @@
 """From figures to a verdict: what matters, worst first, and what to do about it."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
 from r2c2r_core.ingest.doctor.hypotheses import Finding
 from r2c2r_core.ingest.doctor.registration import Registration
 from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Verdict
 from r2c2r_core.ingest.doctor.unit import Unit
-
-PLAUSIBLE_M = (0.1, 10.0)  # of a recording's median depth; else its unit is another than its format's
-_LEAST_DEPTH = 0.1  # of the median frame
-_MASKS_SUFFER_PX = 4.0  # of 640: a handle's width at 2 m; below, sizes and masks stay within their tolerances
+from r2c2r_core.tuning import param, tuned
 
 _FIRST = ("gravity_off",)  # heights, the floor and everything that stands follow from it
-_GRAVITY_OFF_DEG = 1.5  # a phone's is within half a degree, fitted planes within one
-_SMALL_TILT_DEG = 3.0  # a worktop of 60 cm is then 3 cm higher at its back; corrected, nothing is left of it
-_WORKTOP_M = 0.90  # 0.85 to 0.95 m
-_USUAL_M = (0.68, 0.98)  # tables (0.70 to 0.78 m) and worktops, and 2 to 3 cm of what a scan is off
-_FURNITURE_M = (0.5, 1.4)  # above seats, below shelves
 _REGISTER = "read it with --register-depth, which moves the depth there by this fit"
-_SCALE_OF_DRIFT = 0.075  # drift of 3 cm over 2.5 m of a real iPhone walk reads as 5 %
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """From which figure on a recording is remarked upon."""
+
+    plausible_m: tuple[float, float] = param((0.1, 10.0), "m", "of a median depth; else its unit is not its format's")
+    depth: tuple[float, float] = param((0.1, 0.35), "share", "of the median frame with depth: unusable, with care below")
+    unsure: float = param(0.5, "share", "of the depth with low confidence")
+    gravity_deg: float = param(1.5, "deg", "off the planes", source="phones: half a degree, fitted planes: one")
+    tilt_deg: float = param(3.0, "deg", "corrected without care", source="a worktop of 60 cm is then 3 cm higher at its back")
+    masks_px: float = param(4.0, "px", "of 640, off colour: masks suffer", source="a handle's width at 2 m")
+    lost: float = param(0.05, "share", "of the frames that may be lost")
+    frames: tuple[int, int] = param((5, 20), "count", "of frames: unusable, with care below")
+    overlap: float = param(0.03, "share", "of neighbours' overlap that checks anything")
+    noise_mm: tuple[float, float] = param((8.0, 3.0), "score", "mm by which good frames disagree: at 0 m, and more per m²")
+    wrong: float = param(3.0, "ratio", "of the disagreement to the noise's, from which on it is unusable")
+    drift_mm: tuple[float, float] = param((45.0, 150.0), "score", "mm of drift: with care, unusable above")
+    drift_scale: float = param(0.075, "ratio", "off one that may be drift", source="3 cm over 2.5 m of a walk read as 5 %")
+    blurred: float = param(0.2, "share", "of the frames")
+    white: float = param(0.2, "share", "of the median picture")
+    black: float = param(0.3, "share", "of the median picture")
+    flicker: float = param(0.25, "share", "of the steps between frames")
+    path_m: float = param(0.15, "m", "that the camera moves at least")
+    sides: float = param(0.15, "share", "of the surface seen from three sides")
+    held_m: tuple[float, float] = param((0.7, 2.2), "m", "least and most height of a camera over the floor")
+    worktop_m: float = param(0.9, "m", "usual height of a worktop", source="0.85 to 0.95 m")
+    usual_m: tuple[float, float] = param((0.68, 0.98), "m", "of tables and worktops, and what a scan is off")
+    furniture_m: tuple[float, float] = param((0.5, 1.4), "m", "above seats, below shelves")
+
+
+class _Share(NamedTuple):
+    """A figure that counts something bad, and what is said from a limit on (a field of Params)."""
+
+    figure: str
+    limit: str
+    cause: str
+    text: str
+    advice: str
+
+
+_FRAMES = (
+    _Share("unreadable_share", "lost", "frames_unreadable", "{} of the frames are damaged", "copy the recording again"),
+    _Share("without_pose_share", "lost", "poses_lost", "{} of the frames have no usable pose", "film again, more slowly"),
+    _Share("missing_share", "lost", "dropped_frames", "{} of the frames were dropped", "close other apps and film again"),
+)
+_PICTURES = (
+    _Share("blurred_share", "blurred", "blur", "{} of the frames are blurred", "move more slowly, in more light"),
+    _Share(
+        "overexposed_share", "white", "overexposed", "{} of the median picture is white", "film away from windows and lamps"
+    ),
+    _Share("underexposed_share", "black", "underexposed", "{} of the median picture is black", "switch the light on"),
+    _Share(
+        "flicker_share",
+        "flicker",
+        "flicker",
+        "the brightness changes in {} of the steps between frames",
+        "lock the exposure while filming",
+    ),
+)
 
 
 def judge(
@@ -27,8 +82,9 @@ def judge(
     unit: Unit | None = None,
 ) -> tuple[Remark, ...]:
     """Remarks, worst first; among equals, the cause before its symptoms. A gravity that is off comes before all of them."""
+    params = tuned(Params)
     depth, recording = _depth(figures, unit), _recording(figures)
-    if figures.depth_coverage < _LEAST_DEPTH:  # all else follows from that
+    if figures.depth_coverage < params.depth[0]:  # all else follows from that
         return (*depth, *recording)
     found = (
         *depth,
@@ -36,10 +92,16 @@ def judge(
         *_conventions(figures, convention, scale, registration),
         *recording,
         *_tracking(figures, explained=convention is not None or scale is not None),
-        *_pictures(figures),
+        *_shares(figures, _PICTURES),
         *_room(figures),
     )
     return tuple(sorted(found, key=lambda r: (r.cause not in _FIRST, -VERDICTS.index(r.verdict))))
+
+
+def plausible(median_m: float) -> bool:
+    """Whether a recording's median depth may be in metres."""
+    least, most = tuned(Params).plausible_m
+    return least < median_m < most
 
 
 def worst(remarks: tuple[Remark, ...]) -> Verdict:
@@ -48,11 +110,11 @@ def worst(remarks: tuple[Remark, ...]) -> Verdict:
 
 
 def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
-    shares = figures.confidence_shares
-    low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > 0.5 else None
-    if figures.depth_coverage < _LEAST_DEPTH:
+    params, shares = tuned(Params), figures.confidence_shares
+    low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > params.unsure else None
+    if figures.depth_coverage < params.depth[0]:
         recorded = figures.recorded_depth_m
-        if recorded is not None and not PLAUSIBLE_M[0] < recorded < PLAUSIBLE_M[1]:
+        if recorded is not None and not plausible(recorded):
             text = f"the recorded depth is {recorded:.4g} m in the median: another unit than the format's"
             return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
         if low:
@@ -64,7 +126,7 @@ def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
             ]
         text = f"usable depth covers {figures.depth_coverage:.0%} of the median frame"
         return [_remark("unusable", "depth_coverage", text, "check the unit of the depth; stay 0.5 to 3 m away")]
-    if figures.depth_coverage < 0.35:
+    if figures.depth_coverage < params.depth[1]:
         text = f"usable depth covers only {figures.depth_coverage:.0%} of the median frame" + (f": {low}" if low else "")
         return [
             _remark("usable with care", "confidence" if low else "depth_coverage", text, "stay 0.5 to 3 m away, in good light")
@@ -74,11 +136,11 @@ def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
 
 def _gravity(figures: CaptureFigures) -> list[Remark]:
     off = figures.up_file_off_deg
-    if off is None or off <= _GRAVITY_OFF_DEG:
+    if off is None or off <= tuned(Params).gravity_deg:
         return []
     if figures.up_corrected:
         text = f"the recording's gravity is {off:.1f} deg off its level and upright planes; the planes' is taken"
-        verdict: Verdict = "good" if off <= _SMALL_TILT_DEG else "usable with care"
+        verdict: Verdict = "good" if off <= tuned(Params).tilt_deg else "usable with care"
         return [_remark(verdict, "gravity_off", text, "nothing is to be done if the scan stands upright; else set up by hand")]
     text = f"the recording's gravity is {off:.1f} deg off its level and upright planes, which are too few to be believed"
     return [_remark("usable with care", "gravity_off", text, "film more of the floor and the walls, or set up by hand")]
@@ -118,47 +180,50 @@ def _unregistered(found: Registration) -> Remark:
         return _remark("unusable", "colour_focal_length", text + gain, f"correct the colour calibration, or {_REGISTER}")
     text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
     fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
-    verdict: Verdict = "unusable" if found.off_px > _MASKS_SUFFER_PX else "usable with care"
+    verdict: Verdict = "unusable" if found.off_px > tuned(Params).masks_px else "usable with care"
     return _remark(verdict, "unregistered", text + fit, f"export registered depth, or {_REGISTER}")
 
 
 def _recording(figures: CaptureFigures) -> list[Remark]:
-    remarks = []
-    gap = f", the longest gap is {figures.longest_gap_s:.1f} s" if figures.longest_gap_s else ""
-    for share, cause, text, advice in (
-        (figures.unreadable_share, "frames_unreadable", "{} of the frames are damaged", "copy the recording again"),
-        (figures.without_pose_share, "poses_lost", "{} of the frames have no usable pose", "film again, more slowly"),
-        (figures.missing_share, "dropped_frames", "{} of the frames were dropped" + gap, "close other apps and film again"),
-    ):
-        if share > 0.05:
-            remarks.append(_remark("usable with care", cause, text.format(f"{share:.0%}"), advice))
-    if figures.frames < 5:
-        remarks.append(_remark("unusable", "few_frames", f"only {figures.frames} frames", "film for at least ten seconds"))
-    elif figures.frames < 20:
-        remarks.append(
-            _remark("usable with care", "few_frames", f"only {figures.frames} frames", "more views give better masks")
-        )
+    params, remarks = tuned(Params), _shares(figures, _FRAMES)
+    if figures.longest_gap_s and remarks and remarks[-1].cause == "dropped_frames":
+        text = f"{remarks[-1].text}, the longest gap is {figures.longest_gap_s:.1f} s"
+        remarks[-1] = replace(remarks[-1], text=text)
+    few = f"only {figures.frames} frames"
+    if figures.frames < params.frames[0]:
+        remarks.append(_remark("unusable", "few_frames", few, "film for at least ten seconds"))
+    elif figures.frames < params.frames[1]:
+        remarks.append(_remark("usable with care", "few_frames", few, "more views give better masks"))
     return remarks
 
 
+def _shares(figures: CaptureFigures, checks: Sequence[_Share]) -> list[Remark]:
+    found = [(check, getattr(figures, check.figure)) for check in checks]
+    return [
+        _remark("usable with care", check.cause, check.text.format(f"{share:.0%}"), check.advice)
+        for check, share in found
+        if share > getattr(tuned(Params), check.limit)
+    ]
+
+
 def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
-    remarks = []
+    params, remarks = tuned(Params), []
     if figures.pose_jumps and not explained:
         text = f"tracking jumped {figures.pose_jumps} times, by up to {figures.largest_jump_m:.2f} m"
         remarks.append(_remark("usable with care", "pose_jumps", text, "things may appear twice; film again, more slowly"))
     error = figures.pair_error_mm
-    if error is None or figures.pair_overlap < 0.03:
+    if error is None or figures.pair_overlap < params.overlap:
         advice = "film more slowly, so that frames overlap"
         text = "neighbouring frames hardly overlap: poses and depth could not be checked"
         return [*remarks, _remark("usable with care", "no_overlap", text, advice)]
     limit = _noise_mm(figures)
     if error > limit and not explained:
         text = f"neighbouring frames disagree by {error:.0f} mm, {limit:.0f} mm were expected"
-        verdict: Verdict = "unusable" if error > 3 * limit else "usable with care"
+        verdict: Verdict = "unusable" if error > params.wrong * limit else "usable with care"
         remarks.append(_remark(verdict, "disagreement", text, "poses, calibration or depth are wrong in a way not known here"))
-    if figures.drift_mm is not None and figures.drift_mm > 45 and not explained:
+    if figures.drift_mm is not None and figures.drift_mm > params.drift_mm[0] and not explained:
         text = f"the poses drift: what is filmed again lies {figures.drift_mm:.0f} mm from where it was"
-        verdict = "unusable" if figures.drift_mm > 150 else "usable with care"
+        verdict = "unusable" if figures.drift_mm > params.drift_mm[1] else "usable with care"
         refined = "they were refined as far as the scan allows; " if figures.poses_source == "refined" else ""
         remarks.append(_remark(verdict, "drift", text, f"{refined}film more slowly, turn less at once, and avoid blank walls"))
     return remarks
@@ -168,37 +233,21 @@ def _may_be_drift(scale: Finding, figures: CaptureFigures) -> bool:
     """Whether a phone's drift of some centimetres looks like this scale: a small one, in disagreement below sensor noise."""
     if scale.factor is None or scale.error_given_mm is None:
         return False
-    return abs(scale.factor - 1.0) < _SCALE_OF_DRIFT and scale.error_given_mm < _noise_mm(figures)
+    return abs(scale.factor - 1.0) < tuned(Params).drift_scale and scale.error_given_mm < _noise_mm(figures)
 
 
 def _noise_mm(figures: CaptureFigures) -> float:
     """By how much good frames disagree: sensor noise grows with the square of the distance."""
-    return 8.0 + 3.0 * figures.median_depth_m**2
-
-
-def _pictures(figures: CaptureFigures) -> list[Remark]:
-    remarks = []
-    if figures.blurred_share > 0.2:
-        text = f"{figures.blurred_share:.0%} of the frames are blurred"
-        remarks.append(_remark("usable with care", "blur", text, "move more slowly, in more light"))
-    if figures.overexposed_share > 0.2:
-        text = f"{figures.overexposed_share:.0%} of the median picture is white"
-        remarks.append(_remark("usable with care", "overexposed", text, "film away from windows and lamps"))
-    if figures.underexposed_share > 0.3:
-        text = f"{figures.underexposed_share:.0%} of the median picture is black"
-        remarks.append(_remark("usable with care", "underexposed", text, "switch the light on"))
-    if figures.flicker_share > 0.25:
-        text = f"the brightness changes in {figures.flicker_share:.0%} of the steps between frames"
-        remarks.append(_remark("usable with care", "flicker", text, "lock the exposure while filming"))
-    return remarks
+    least, more = tuned(Params).noise_mm
+    return least + more * figures.median_depth_m**2
 
 
 def _room(figures: CaptureFigures) -> list[Remark]:
-    remarks = []
-    if figures.path_m < 0.15:
+    params, remarks = tuned(Params), []
+    if figures.path_m < params.path_m:
         text = f"the camera moved only {figures.path_m:.2f} m"
         remarks.append(_remark("usable with care", "short_path", text, "walk around the objects"))
-    elif figures.seen_from_three < 0.15:
+    elif figures.seen_from_three < params.sides:
         text = f"only {figures.seen_from_three:.0%} of the surface is seen from three sides"
         remarks.append(_remark("usable with care", "one_sided", text, "walk around the objects"))
     if figures.up_source == "assumed":
@@ -214,7 +263,7 @@ def _room(figures: CaptureFigures) -> list[Remark]:
         )
     remarks += _scale_by_furniture(figures)
     height = figures.camera_height_m
-    if height is not None and not 0.7 < height < 2.2:
+    if height is not None and not params.held_m[0] < height < params.held_m[1]:
         text = f"the camera was held {height:.2f} m above what was taken for the floor"
         remarks.append(
             _remark("usable with care", "camera_height", text, "check the floor's height and the scale of the poses")
@@ -224,11 +273,12 @@ def _room(figures: CaptureFigures) -> list[Remark]:
 
 def _scale_by_furniture(figures: CaptureFigures) -> list[Remark]:
     """A hint where the level surfaces stand as no worktop and no table does; it changes nothing."""
-    heights = [z for z in figures.level_heights_m if _FURNITURE_M[0] < z < _FURNITURE_M[1]]
-    if not heights or any(_USUAL_M[0] <= z <= _USUAL_M[1] for z in heights):
+    params = tuned(Params)
+    heights = [z for z in figures.level_heights_m if params.furniture_m[0] < z < params.furniture_m[1]]
+    if not heights or any(params.usual_m[0] <= z <= params.usual_m[1] for z in heights):
         return []
-    nearest = min(heights, key=lambda z: abs(z - _WORKTOP_M))
-    off = nearest / _WORKTOP_M - 1.0
+    nearest = min(heights, key=lambda z: abs(z - params.worktop_m))
+    off = nearest / params.worktop_m - 1.0
     text = f"the level surface nearest to a worktop's height stands at {nearest:.2f} m; tables and worktops at 0.70 to 0.95 m"
     size = f"if it is one, all lengths are about {abs(off):.0%} too {'large' if off > 0 else 'small'}"
     return [_remark("good", "furniture_height", text, f"{size}: measure something that you know")]
