@@ -31,7 +31,7 @@ class Elevation(Shape):
 
 
 class Elevations(Shape):
-    """All of them, the one with the most panels first; none while the live segmenter has not drawn them."""
+    """All of them, the largest first and walls last; none while the live segmenter has not drawn them."""
 
     drawn: bool
     items: list[Elevation]

@@ -17,7 +17,7 @@ from app.security import Person
 from app.services import projects
 from app.services.context import Context
 
-OF_A_PROJECT = ("annotate", "run", "review", "download")
+OF_A_PROJECT = ("annotate", "elevation", "run", "review", "download")
 SHOWN_WIDTH = 960  # of a frame, as static/js/annotate/frames.js asks for it
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
 

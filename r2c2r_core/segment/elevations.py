@@ -7,24 +7,42 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from r2c2r_core.kitchen.walls import distances_behind
+from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.elevation import Elevation, Lines
 from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 
 _LEAST_SIDE_M = 0.3  # of a plane that is shown: a single front is as large
+_WALL_M = 0.04  # of a plane from a wall's, to be the wall
+_SEEN_SHARE = 0.5  # of a panel that has depth
 _CLEAR_Z = 6.0  # of a line that is drawn as the clearest
 
 
 def elevations(prepared: PreparedCapture) -> Iterator[Elevation]:
-    """Those of planes large enough, the one with the most panels first."""
+    """Those of planes large enough, the largest first; walls come last and show no panels, for tiles are no fronts."""
+    walls = prepared.scene.capture.room.walls
     large = [plane for plane in prepared.planes if min(plane.width_m, plane.height_m) >= _LEAST_SIDE_M]
     runs = [run for plane in large if (run := prepared.run_of(plane)) is not None]
-    for run in sorted(runs, key=lambda run: (-len(run.cells), -run.region.area_m2)):
-        yield _elevation(run, prepared)
+    on_wall = {id(run): _is_wall(run, walls) for run in runs}
+    for run in sorted(runs, key=lambda run: (on_wall[id(run)], -run.region.area_m2)):
+        yield _elevation(run, prepared, () if on_wall[id(run)] else tuple(cell for cell in run.cells if _is_seen(cell, run)))
 
 
-def _elevation(run: Run, prepared: PreparedCapture) -> Elevation:
+def _is_wall(run: Run, walls: tuple[Wall, ...]) -> bool:
+    behind = distances_behind(walls, run.region.world_from_plane.translation, run.grid.outward)
+    return any(abs(distance) < _WALL_M for distance in behind)
+
+
+def _is_seen(cell: Cell, run: Run) -> bool:
+    """Whether the scan has depth on most of it."""
+    inside = run.seen[round(cell.top) : round(cell.bottom), round(cell.left) : round(cell.right)]
+    return inside.size > 0 and bool(inside.mean() > _SEEN_SHARE)
+
+
+def _elevation(run: Run, prepared: PreparedCapture, cells: tuple[Cell, ...]) -> Elevation:
     grid, capture_from_world = run.grid, prepared.scene.capture.world_from_capture.inverse
     corners_world = grid.points_at(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     corners = capture_from_world.apply(corners_world)
@@ -37,7 +55,7 @@ def _elevation(run: Run, prepared: PreparedCapture) -> Elevation:
         top_m=float(corners_world[0, 2]),
         upright=_lines(run.vertical),
         level=_lines(run.horizontal),
-        cells=tuple((cell.left, cell.top, cell.right, cell.bottom) for cell in run.cells),
+        cells=tuple((cell.left, cell.top, cell.right, cell.bottom) for cell in cells),
     )
 
 

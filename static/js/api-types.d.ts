@@ -254,7 +254,7 @@ export interface ElevationLines {
   clarity: string;
 }
 
-/** All of them, the one with the most panels first; none while the live segmenter has not drawn them. */
+/** All of them, the largest first and walls last; none while the live segmenter has not drawn them. */
 export interface Elevations {
   drawn: boolean;
   items: Elevation[];

@@ -1,7 +1,7 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, FrameMask, LiveStatus, Job, JobEvent,
+ *   SystemInfo, FolderListing, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
  *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
  *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
@@ -218,6 +218,10 @@ export const getLanes = (id) => get(`${of(id)}/lanes`);
 /** @param {string} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<FrameMask[]>} */
 export const getMasks = (id, frame, signal) => get(`${of(id)}/masks/${frame}`, signal);
 
+/** @param {string} id @returns {Promise<Elevations>} */
+export const getElevations = (id) => get(`${of(id)}/elevations`);
+/** @param {string} id @returns {Promise<FoundFront[]>} */
+export const getFoundFronts = (id) => get(`${of(id)}/elevations/fronts`);
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Proposals>} */
 export const getProposals = (id, signal) => get(`${of(id)}/proposals`, signal);
 /** @param {string} id @returns {Promise<Proposals>} */

@@ -34,7 +34,22 @@ export const changeObject = (project, seen, wanted) => ({
   json: { ...wanted, version: seen.version },
   seen: { name: seen.name, category: seen.category },
 });
-/** @param {string} project @param {number} object @returns {Change<SceneObject>} */
+/**
+ * A drawn front, or what it is called. `version`, of an object that is stored, is what it will be once changes before it are.
+ * @param {string} project
+ * @param {Ref} object
+ * @param {Partial<ObjectPatch>} wanted
+ * @param {number | undefined} version
+ * @param {Record<string, unknown>} seen
+ * @returns {Change<SceneObject>}
+ */
+export const changeFront = (project, object, wanted, version, seen) => ({
+  method: "PATCH",
+  path: on(project, object),
+  json: { ...wanted, ...(version === undefined ? {} : { version }) },
+  seen,
+});
+/** @param {string} project @param {Ref} object @returns {Change<SceneObject>} */
 export const deleteObject = (project, object) => ({ method: "DELETE", path: on(project, object), json: {} });
 /** @param {string} project @param {Ref} object @param {PointIn} point @param {boolean} infer @returns {Change<SceneObject>} */
 export const addPoint = (project, object, point, infer = true) => ({

@@ -6,6 +6,7 @@ import { disagreements } from "./lib/merge.js";
 
 /** @typedef {import("./changes.js").Change} Change */
 /** @typedef {import("./api-types").CandidateGroup} CandidateGroup */
+/** @typedef {import("./api-types").PromptsFileFrontOutput} PromptsFileFrontOutput */
 /** @typedef {Record<string, unknown>} Fields */
 /** @typedef {{ version: number, name?: string, override?: Fields, group?: CandidateGroup }} Stored what a 409 brings */
 
@@ -13,6 +14,7 @@ import { disagreements } from "./lib/merge.js";
 const LABELS = {
   name: "Name",
   category: "Category",
+  front: "Drawn front",
   hinge: "Hinge",
   joint_lower: "Opens from",
   joint_upper: "Opens to",
@@ -80,6 +82,13 @@ function inWords(field, value) {
   }
   if (field === "dimensions_m" && Array.isArray(value))
     return `${value.map((side) => (100 * side).toFixed(1)).join(" × ")} cm`;
+  if (field === "front") return sizeInWords(/** @type {PromptsFileFrontOutput} */ (value));
   if (typeof value === "number" && field.startsWith("joint_")) return `${value.toFixed(3)} (radians or metres)`;
   return String(value);
+}
+
+/** @param {PromptsFileFrontOutput} front */
+function sizeInWords({ corners_m: [a = [], b = [], , d = []] }) {
+  const [wide, high] = [b, d].map((end) => Math.hypot(...end.map((value, k) => value - (a[k] ?? 0))));
+  return `${Math.round(1000 * (wide ?? 0))} × ${Math.round(1000 * (high ?? 0))} mm`;
 }

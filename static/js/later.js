@@ -7,6 +7,8 @@ const ELEMENTS = {
   "r2c2r-backend": async () => (await import("./elements/backend-choice.js")).BackendChoice,
   "r2c2r-comments": async () => (await import("./elements/comment-list.js")).CommentList,
   "r2c2r-download": async () => (await import("./pages/download.js")).DownloadPage,
+  "r2c2r-elevation": async () => (await import("./pages/elevation.js")).ElevationPage,
+  "r2c2r-elevation-canvas": async () => (await import("./elements/elevation-canvas.js")).ElevationCanvas,
   "r2c2r-film-strip": async () => (await import("./elements/film-strip.js")).FilmStrip,
   "r2c2r-folder-dialog": async () => (await import("./elements/folder-dialog.js")).FolderDialog,
   "r2c2r-frame-canvas": async () => (await import("./elements/frame-canvas.js")).FrameCanvas,
@@ -29,6 +31,7 @@ const ELEMENTS = {
 /** What a page is made of beside itself. @type {Record<string, string[]>} */
 const PARTS = {
   annotate: ["film-strip", "frame-canvas", "object-list", "proposal-list", "mosaic", "object-cloud", "comments"],
+  elevation: ["elevation-canvas"],
   people: ["audit-record"],
   overview: ["backend", "job", "members", "viewer"],
   projects: ["folder-dialog", "unknown-list"],

@@ -2,7 +2,7 @@
 
 /** @typedef {{ page: string, project: string | null, query: URLSearchParams }} Route */
 
-const PAGES = ["annotate", "run", "review", "download"];
+const PAGES = ["annotate", "elevation", "run", "review", "download"];
 
 /**
  * @param {URL | Location} address

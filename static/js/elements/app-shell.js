@@ -27,6 +27,7 @@ import { WhoIsIn } from "./who.js";
 const TABS = [
   ["overview", "Overview"],
   ["annotate", "Annotate"],
+  ["elevation", "Elevation"],
   ["run", "Run"],
   ["review", "Review"],
   ["download", "Download"],

@@ -4,11 +4,13 @@ import { h, icon } from "../dom.js";
 import { plainKeys, setPlainKeys } from "../keyboard.js";
 import { KEYMAP, printed } from "../lib/keymap.js";
 
-const TITLES = { annotate: "Annotate", review: "Review", all: "Everywhere" };
+const TITLES = { annotate: "Annotate", elevation: "Elevation", review: "Review", all: "Everywhere" };
 const MOUSE =
   "Left click adds to the object, right click or Shift+click takes away. Click a marker to remove it, drag it to move it. " +
   "Drag a box around a thing to say where it ends. Wheel zooms, middle drag or Alt-drag pans; two fingers do both, and " +
-  "Take away makes a tap do what the right button does. Hold Ctrl to place several clicks before the mask is computed.";
+  "Take away makes a tap do what the right button does. Hold Ctrl to place several clicks before the mask is computed. " +
+  "In Elevation a drag draws a front, or moves an edge or the chosen front; edges snap to lines and to other fronts, with Alt they " +
+  "stay where they are put. Space-drag pans.";
 
 export class HelpOverlay extends HTMLElement {
   #dialog = h("dialog", { class: "help", "aria-label": "Keyboard and mouse" });

@@ -1,6 +1,6 @@
 /** One table of keys: the pages act on it, the `?` overlay prints it, a test looks for clashes. */
 
-/** @typedef {{ keys: string[], action: string, text: string, page: "annotate" | "review" | "all" }} Binding */
+/** @typedef {{ keys: string[], action: string, text: string, page: "annotate" | "elevation" | "review" | "all" }} Binding */
 
 /** @type {Binding[]} */
 export const KEYMAP = [
@@ -64,6 +64,48 @@ export const KEYMAP = [
     text: "Confirm all proposals from the chosen confidence up",
     page: "annotate",
   },
+  { keys: ["b"], action: "front-here", text: "A new front at the pointer, else in the middle", page: "elevation" },
+  { keys: ["s"], action: "seam", text: "Split the front by an upright seam at the pointer", page: "elevation" },
+  { keys: ["Shift+s"], action: "level-seam", text: "Split it by a level seam at the pointer", page: "elevation" },
+  { keys: ["m"], action: "merge", text: "Merge the chosen fronts; Shift-click chooses several", page: "elevation" },
+  { keys: ["Delete", "Backspace"], action: "delete-front", text: "Delete the chosen fronts", page: "elevation" },
+  { keys: ["w"], action: "width", text: "Type the front's width in millimetres", page: "elevation" },
+  { keys: ["h"], action: "height", text: "Type its height in millimetres", page: "elevation" },
+  { keys: ["k"], action: "handle", text: "Its handle is at the pointer", page: "elevation" },
+  { keys: ["Shift+k"], action: "no-handle", text: "It has no handle", page: "elevation" },
+  {
+    keys: ["j"],
+    action: "hinge",
+    text: "It turns on the side nearest to the pointer; again: inferred",
+    page: "elevation",
+  },
+  {
+    keys: ["1", "2", "3", "4", "5", "6", "7"],
+    action: "front-category",
+    text: "What it is: the kinds of the list, in their order",
+    page: "elevation",
+  },
+  {
+    keys: ["Left", "Right", "Up", "Down"].flatMap((way) => [`Arrow${way}`, `Shift+Arrow${way}`]),
+    action: "nudge-front",
+    text: "Move the front, or its chosen edge, by 1 mm; with Shift by 10 mm",
+    page: "elevation",
+  },
+  {
+    keys: ["e"],
+    action: "next-edge",
+    text: "Choose the next edge for the arrows, or the whole front",
+    page: "elevation",
+  },
+  { keys: ["n"], action: "next-front", text: "Next front", page: "elevation" },
+  { keys: ["p"], action: "previous-front", text: "Previous front", page: "elevation" },
+  { keys: ["a"], action: "adopt-cut", text: "Take the panels that were cut and have no front yet", page: "elevation" },
+  { keys: ["]"], action: "next-plane", text: "Next plane of the scan", page: "elevation" },
+  { keys: ["["], action: "previous-plane", text: "Previous plane", page: "elevation" },
+  { keys: ["0"], action: "fit-plane", text: "Fit the plane to the window", page: "elevation" },
+  { keys: ["="], action: "zoom-in", text: "Larger", page: "elevation" },
+  { keys: ["-"], action: "zoom-out", text: "Smaller", page: "elevation" },
+  { keys: ["Escape"], action: "leave-front", text: "Leave the tool, then the choice", page: "elevation" },
   { keys: ["y"], action: "accept", text: "Accept this candidate", page: "review" },
   { keys: ["x"], action: "reject", text: "Reject this candidate", page: "review" },
   { keys: ["g"], action: "more", text: "Make more candidates of this object", page: "review" },
@@ -139,7 +181,7 @@ export function printed(keys) {
 export function clashes() {
   /** @type {string[]} */
   const found = [];
-  for (const page of ["annotate", "review"]) {
+  for (const page of ["annotate", "elevation", "review"]) {
     /** @type {Map<string, string>} */
     const taken = new Map();
     for (const binding of KEYMAP.filter((b) => b.page === page || b.page === "all")) {

@@ -1,0 +1,441 @@
+/**
+ * A plane of the scan with the fronts on it. Emits "draw" Rect, "pick" {key, side, also}, "move-edge" {key, side, at},
+ * "move-front" {key, dx, dy}, "use-tool" {x, y}, all in metres from the plane's top left corner.
+ * Zoom with the wheel or two fingers, pan with the middle button, Space-drag or two fingers; Alt leaves edges where they are put.
+ */
+
+import { h, LiveElement } from "../dom.js";
+import {
+  between,
+  heightOf,
+  middleOf,
+  moved,
+  nearestEdge,
+  holds,
+  SMALLEST_M,
+  widthOf,
+  withEdge,
+} from "../lib/elevation.js";
+import { Gestures } from "../lib/gestures.js";
+import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
+
+/** @typedef {import("../lib/elevation.js").Rect} Rect */
+/** @typedef {import("../lib/elevation.js").Side} Side */
+/** @typedef {import("../lib/elevation.js").Box} Box */
+/** @typedef {import("../lib/gestures.js").At} At */
+/**
+ * @typedef {{
+ *   key: string, rect: Rect, name: string, paint: string, chosen: boolean, drawn: boolean,
+ *   handle: Box | null, hinge: Side | null, overlaps: boolean,
+ * }} Shown
+ */
+/** @typedef {{ key: string, side: Side | null }} Held an edge, or all of a front */
+/** @typedef {(side: Side, at: number, rect: Rect, key: string | null, reach: number) => number} Snap */
+
+const STILL_PX = 3;
+const STILL_TOUCH_PX = 10;
+const EDGE_PX = 7; // from an edge that is still on it
+const SNAP_PX = 9;
+
+export class ElevationCanvas extends LiveElement {
+  #canvas = h("canvas", { tabIndex: 0, role: "img", "aria-label": "Elevation" });
+  /** @type {HTMLImageElement | null} */
+  #image = null;
+  #size = { width: 1, height: 1 };
+  #cell = 1;
+  /** @type {import("../lib/view.js").View} */
+  #view = { scale: 1, x: 0, y: 0 };
+  #fitted = true;
+  /** @type {Shown[]} */
+  #fronts = [];
+  /** @type {Rect[]} */
+  #cut = [];
+  /** @type {Gestures<Held>} */
+  #gestures = new Gestures();
+  /** What is being drawn or carried, as it would be stored. @type {{ key: string | null, rect: Rect } | null} */
+  #preview = null;
+  #from = { x: 0, y: 0 };
+  #space = false;
+  /** Where the pointer is, in metres; null outside. @type {{ x: number, y: number } | null} */
+  pointer = null;
+  /** The edge that arrow keys move; null: the whole front. @type {Side | null} */
+  edge = null;
+  /** Whether a click does what a tool does. */
+  tooled = false;
+  /** @type {Snap} */
+  snap = (_side, at) => at;
+
+  connected() {
+    this.replaceChildren(this.#canvas);
+    const { signal } = this;
+    const canvas = this.#canvas;
+    canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
+    canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
+    canvas.addEventListener("pointerup", (event) => this.#up(event), { signal });
+    canvas.addEventListener("pointercancel", (event) => this.#drop(event), { signal });
+    canvas.addEventListener("pointerleave", () => (this.pointer = null), { signal });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+    canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
+    const space = (/** @type {boolean} */ on) => (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === " ") this.#space = on;
+    };
+    document.addEventListener("keydown", space(true), { signal });
+    document.addEventListener("keyup", space(false), { signal });
+    const observer = new ResizeObserver(() => this.#resize());
+    observer.observe(this);
+    signal.addEventListener("abort", () => observer.disconnect());
+  }
+
+  /**
+   * @param {HTMLImageElement} image
+   * @param {number} cell metres a pixel
+   * @param {string} label
+   */
+  setPlane(image, cell, label) {
+    this.#image = image;
+    this.#cell = cell;
+    this.#size = { width: image.naturalWidth * cell, height: image.naturalHeight * cell };
+    this.#canvas.setAttribute("aria-label", label);
+    this.fit();
+  }
+
+  /** @param {Shown[]} fronts @param {Rect[]} cut panels that no front is on */
+  setFronts(fronts, cut) {
+    this.#fronts = fronts;
+    this.#cut = cut;
+    this.draw();
+  }
+
+  /** Nothing is being drawn any more. */
+  stop() {
+    this.#preview = null;
+    this.draw();
+  }
+
+  get busy() {
+    return this.#preview !== null;
+  }
+
+  fit() {
+    const room = { width: Math.max(this.clientWidth - 32, 1), height: Math.max(this.clientHeight - 32, 1) };
+    const { scale, x, y } = fit(this.#size, room);
+    this.#view = { scale, x: x + 16, y: y + 16 };
+    this.#fitted = true;
+    this.draw();
+  }
+
+  /** @param {number} factor */
+  zoomBy(factor) {
+    this.#see(zoom(this.#view, factor, { x: this.clientWidth / 2, y: this.clientHeight / 2 }, this.#least));
+  }
+
+  /** What the middle of the window shows, in metres. */
+  get middle() {
+    return toImage(this.#view, { x: this.clientWidth / 2, y: this.clientHeight / 2 });
+  }
+
+  draw() {
+    const context = this.#canvas.getContext("2d");
+    if (!context) return;
+    const ratio = devicePixelRatio;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, this.clientWidth, this.clientHeight);
+    const { scale, x, y } = this.#view;
+    context.imageSmoothingEnabled = this.#cell * scale < 3;
+    if (this.#image) context.drawImage(this.#image, x, y, this.#size.width * scale, this.#size.height * scale);
+    for (const rect of this.#cut) this.#outline(context, rect, "#ffffff", 1, [3, 5]);
+    for (const front of this.#fronts.toSorted((a, b) => Number(a.chosen) - Number(b.chosen)))
+      this.#drawFront(context, front);
+    if (this.#preview?.key === null) this.#drawSized(context, this.#preview.rect, "#ffffff", "");
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Shown} front */
+  #drawFront(context, front) {
+    const rect = this.#preview?.key === front.key ? this.#preview.rect : front.rect;
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    if (front.chosen) {
+      context.fillStyle = `${front.paint}33`;
+      context.fillRect(left, top, right - left, bottom - top);
+    }
+    this.#outline(context, rect, "#0d0f12", front.chosen ? 5 : 4, []);
+    this.#outline(
+      context,
+      rect,
+      front.overlaps ? "#ff5f52" : front.paint,
+      front.chosen ? 3 : 2,
+      front.drawn ? [] : [8, 4],
+    );
+    if (front.handle) this.#drawHandle(context, rect, front.handle, front.paint);
+    if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
+    if (front.chosen && this.edge) this.#drawEdge(context, rect, this.edge);
+    this.#drawLabel(context, rect, front.name);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Rect} rect
+   * @param {string} colour
+   * @param {number} width
+   * @param {number[]} dashes
+   */
+  #outline(context, rect, colour, width, dashes) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    context.lineWidth = width;
+    context.strokeStyle = colour;
+    context.setLineDash(dashes);
+    context.strokeRect(left, top, right - left, bottom - top);
+    context.setLineDash([]);
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Box} box @param {string} colour */
+  #drawHandle(context, rect, box, colour) {
+    const { x, y } = middleOf(rect);
+    const at = { left: x + box.left_m, right: x + box.right_m, top: y - box.top_m, bottom: y - box.bottom_m };
+    const { left, top, right, bottom } = this.#onScreen(at);
+    context.fillStyle = colour;
+    context.fillRect(left, top, right - left, bottom - top);
+    this.#outline(context, at, "#0d0f12", 1, []);
+  }
+
+  /** The opening's triangle, as on drawings: its point is at the hinge. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
+  #drawHinge(context, rect, side, colour) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    const [x, y] = [(left + right) / 2, (top + bottom) / 2];
+    /** @type {Record<Side, [number, number][]>} */
+    const lines = {
+      left: [
+        [right, top],
+        [left, y],
+        [right, bottom],
+      ],
+      right: [
+        [left, top],
+        [right, y],
+        [left, bottom],
+      ],
+      top: [
+        [left, bottom],
+        [x, top],
+        [right, bottom],
+      ],
+      bottom: [
+        [left, top],
+        [x, bottom],
+        [right, top],
+      ],
+    };
+    context.beginPath();
+    for (const [px, py] of lines[side]) context.lineTo(px, py);
+    context.lineWidth = 1.5;
+    context.strokeStyle = colour;
+    context.setLineDash([6, 5]);
+    context.stroke();
+    context.setLineDash([]);
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
+  #drawEdge(context, rect, side) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    const ends = {
+      left: [left, top, left, bottom],
+      right: [right, top, right, bottom],
+      top: [left, top, right, top],
+      bottom: [left, bottom, right, bottom],
+    };
+    const [x1 = 0, y1 = 0, x2 = 0, y2 = 0] = ends[side];
+    context.beginPath();
+    context.moveTo(x1, y1);
+    context.lineTo(x2, y2);
+    context.lineWidth = 6;
+    context.strokeStyle = "#ffffff";
+    context.stroke();
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {string} colour @param {string} name */
+  #drawSized(context, rect, colour, name) {
+    this.#outline(context, rect, "#0d0f12", 4, []);
+    this.#outline(context, rect, colour, 2, []);
+    this.#drawLabel(context, rect, name);
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {string} name */
+  #drawLabel(context, rect, name) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    const lines = [name, `${Math.round(1000 * widthOf(rect))} × ${Math.round(1000 * heightOf(rect))}`].filter(Boolean);
+    context.font = "12px system-ui, sans-serif";
+    const fits = (/** @type {string} */ line) => context.measureText(line).width + 12 < right - left;
+    const shown = bottom - top > 36 && lines.every(fits) ? lines : lines.slice(-1).filter(fits);
+    for (const [k, line] of shown.entries()) {
+      const width = context.measureText(line).width + 8;
+      if (bottom - top < 17 * (k + 1) + 4) break;
+      context.fillStyle = "rgb(10 12 16 / 78%)";
+      context.fillRect(left + 4, top + 4 + 17 * k, width, 16);
+      context.fillStyle = "#f2f5fa";
+      context.fillText(line, left + 8, top + 16 + 17 * k);
+    }
+  }
+
+  /** @param {PointerEvent} event */
+  #down(event) {
+    this.#canvas.focus({ preventScroll: true });
+    this.#canvas.setPointerCapture(event.pointerId);
+    const at = this.#at(event);
+    const pan = event.button === 1 || this.#space;
+    this.#from = toImage(this.#view, at);
+    const held = pan || this.tooled || event.shiftKey ? null : this.#heldAt(at, event.pointerType === "touch" ? 2 : 1);
+    this.#gestures.press(event.pointerId, at, { pan, held });
+    if (event.button === 1) event.preventDefault();
+  }
+
+  /** @param {PointerEvent} event */
+  #move(event) {
+    const at = this.#at(event);
+    this.pointer = toImage(this.#view, at);
+    const motion = this.#gestures.move(event.pointerId, at, event.pointerType === "touch" ? STILL_TOUCH_PX : STILL_PX);
+    if (!motion) return this.#point(at);
+    if (motion.kind === "pan") {
+      const { scale, x, y } = this.#view;
+      this.#see({ scale, x: x + motion.by.x, y: y + motion.by.y });
+    } else if (motion.kind === "pinch") this.#see(pinch(this.#view, motion.before, motion.after, this.#least));
+    else
+      this.#preview =
+        motion.kind === "carry"
+          ? this.#carried(motion.held, motion.at, event.altKey)
+          : this.#drawn(motion.to, event.altKey);
+    this.draw();
+  }
+
+  /** @param {PointerEvent} event */
+  #up(event) {
+    const meant = this.#gestures.release(event.pointerId, this.#at(event));
+    const preview = this.#preview;
+    this.stop();
+    if (meant?.kind === "drop" && preview?.key) this.emit("move", { key: preview.key, rect: preview.rect });
+    else if (meant?.kind === "box" && preview && !this.tooled && isLarge(preview.rect)) this.emit("draw", preview.rect);
+    else if (meant?.kind === "pick") this.emit("pick", { key: meant.held.key, side: meant.held.side, also: false });
+    else if (meant?.kind === "click") this.#click(toImage(this.#view, meant.at), event);
+  }
+
+  /** @param {{ x: number, y: number }} at @param {PointerEvent} event */
+  #click(at, event) {
+    if (this.tooled) return this.emit("use-tool", at);
+    const front = this.#frontAt(at);
+    this.emit("pick", { key: front?.key ?? null, side: null, also: event.shiftKey });
+  }
+
+  /** @param {PointerEvent} event */
+  #drop(event) {
+    this.#gestures.forget(event.pointerId);
+    this.stop();
+  }
+
+  /** @param {WheelEvent} event */
+  #wheel(event) {
+    event.preventDefault();
+    this.#see(zoom(this.#view, Math.exp(-event.deltaY / 400), this.#at(event), this.#least));
+  }
+
+  /** @param {import("../lib/view.js").View} view */
+  #see(view) {
+    this.#view = view;
+    this.#fitted = false;
+    this.draw();
+  }
+
+  /** The cursor says what a press would take hold of. @param {At} at */
+  #point(at) {
+    const held = this.tooled ? null : this.#heldAt(at, 1);
+    const level = held?.side === "top" || held?.side === "bottom";
+    this.#canvas.style.cursor = !held ? "crosshair" : held.side === null ? "move" : level ? "ns-resize" : "ew-resize";
+  }
+
+  /** @param {Held} held @param {At} at @param {boolean} free */
+  #carried({ key, side }, at, free) {
+    const front = this.#fronts.find((one) => one.key === key);
+    if (!front) return null;
+    const to = toImage(this.#view, at);
+    const { rect } = front;
+    if (side === null)
+      return { key, rect: this.#placed(moved(rect, to.x - this.#from.x, to.y - this.#from.y), key, free) };
+    const put = side === "left" || side === "right" ? to.x : to.y;
+    return { key, rect: withEdge(rect, side, free ? put : this.snap(side, put, rect, key, this.#reach)) };
+  }
+
+  /** A front that is moved as a whole: the edge with the least way to go snaps. @param {Rect} rect @param {string} key @param {boolean} free */
+  #placed(rect, key, free) {
+    if (free) return rect;
+    const ways = (/** @type {Side[]} */ sides) =>
+      sides
+        .map((side) => this.snap(side, rect[side], rect, key, this.#reach) - rect[side])
+        .reduce((best, way) => (way !== 0 && (best === 0 || Math.abs(way) < Math.abs(best)) ? way : best), 0);
+    return moved(rect, ways(["left", "right"]), ways(["top", "bottom"]));
+  }
+
+  /** @param {At} at @param {boolean} free */
+  #drawn(at, free) {
+    const rect = between(this.#from, toImage(this.#view, at));
+    if (free) return { key: null, rect };
+    const put = (/** @type {Side} */ side) => this.snap(side, rect[side], rect, null, this.#reach);
+    const snapped = { left: put("left"), right: put("right"), top: put("top"), bottom: put("bottom") };
+    return { key: null, rect: isLarge(snapped) ? snapped : rect };
+  }
+
+  /** What a press takes hold of: an edge, of a chosen front first, or a chosen front. @param {At} at @param {number} fingers @returns {Held | null} */
+  #heldAt(at, fingers) {
+    const position = toImage(this.#view, at);
+    const reach = (fingers * EDGE_PX) / this.#view.scale;
+    const near = this.#fronts
+      .map(({ key, rect, chosen }) => ({ key, chosen, ...nearestEdge(rect, position) }))
+      .filter(({ off }) => off <= reach)
+      .toSorted((a, b) => Number(b.chosen) - Number(a.chosen) || a.off - b.off)[0];
+    if (near) return { key: near.key, side: near.side };
+    const inside = this.#fronts.find(({ rect, chosen }) => chosen && holds(rect, position));
+    return inside ? { key: inside.key, side: null } : null;
+  }
+
+  /** The smallest front there. @param {{ x: number, y: number }} at */
+  #frontAt(at) {
+    const there = this.#fronts.filter(({ rect }) => holds(rect, at));
+    return there.toSorted((a, b) => widthOf(a.rect) * heightOf(a.rect) - widthOf(b.rect) * heightOf(b.rect))[0] ?? null;
+  }
+
+  get #reach() {
+    return SNAP_PX / this.#view.scale;
+  }
+
+  /** How near a tool's click snaps, in metres. */
+  get reach() {
+    return this.#reach;
+  }
+
+  /** @param {Rect} rect */
+  #onScreen(rect) {
+    const from = toScreen(this.#view, { x: rect.left, y: rect.top });
+    const to = toScreen(this.#view, { x: rect.right, y: rect.bottom });
+    return { left: from.x, top: from.y, right: to.x, bottom: to.y };
+  }
+
+  /** @param {MouseEvent} event */
+  #at({ clientX, clientY }) {
+    const box = this.#canvas.getBoundingClientRect();
+    return { x: clientX - box.left, y: clientY - box.top };
+  }
+
+  get #least() {
+    return (
+      0.5 * fit(this.#size, { width: Math.max(this.clientWidth, 1), height: Math.max(this.clientHeight, 1) }).scale
+    );
+  }
+
+  #resize() {
+    this.#canvas.width = Math.round(this.clientWidth * devicePixelRatio);
+    this.#canvas.height = Math.round(this.clientHeight * devicePixelRatio);
+    if (this.#fitted) this.fit();
+    else this.draw();
+  }
+}
+
+/** @param {Rect} rect */
+function isLarge(rect) {
+  return widthOf(rect) >= SMALLEST_M && heightOf(rect) >= SMALLEST_M;
+}

@@ -1,0 +1,140 @@
+/**
+ * The chosen front in numbers and words, and the fronts of the plane. Says "choose" key, "size" {side, metres}, "category",
+ * "name", "hinge", "handle" with what is wanted, and "adopt".
+ */
+
+import { h, renew } from "../dom.js";
+import { heightOf, widthOf } from "../lib/elevation.js";
+
+/** @typedef {import("../api-types").Category} Category */
+/** @typedef {import("../elevation/fronts.js").Front} Front */
+/** @typedef {Front & { rect: import("../lib/elevation.js").Rect }} Placed */
+/** @typedef {{ leading: Placed | null, chosen: Set<string>, cut: number, paint: (front: Front) => string }} How `cut`: panels without a front */
+
+/** Those that a digit chooses. */
+const QUICK = ["cabinet", "drawer", "wall_cabinet", "double-door cabinet", "dishwasher", "oven", "refrigerator"];
+
+export class FrontPane extends EventTarget {
+  #list = h("ul", { class: "front-list" });
+  #name = h("input", { type: "text", spellcheck: false });
+  #width = h("input", { type: "number", min: "20", max: "10000", step: "1" });
+  #height = h("input", { type: "number", min: "20", max: "10000", step: "1" });
+  #category = h("select");
+  #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
+  #handle = h("select", {}, ...options({ "": "looked for", none: "none", drawn: "drawn" }));
+  #adopt = h("button", { type: "button", onClick: () => this.#say("adopt") });
+  #fields = h(
+    "fieldset",
+    { class: "front-fields", disabled: true },
+    h("legend", {}, "Front"),
+    label("Name", this.#name),
+    label("Kind", this.#category),
+    label("Width mm", this.#width),
+    label("Height mm", this.#height),
+    label("Handle", this.#handle),
+    label("Hinge", this.#hinge),
+  );
+  element = h("aside", { class: "fronts", "aria-label": "Fronts" }, this.#fields, this.#adopt, this.#list);
+  /** @type {Placed | null} */
+  #shown = null;
+
+  constructor() {
+    super();
+    const number = (/** @type {HTMLInputElement} */ input, /** @type {"width" | "height"} */ side) => {
+      input.addEventListener("change", () => this.#size(input, side));
+      input.addEventListener("keydown", ({ key }) => ["Enter", "Escape"].includes(key) && input.blur());
+    };
+    number(this.#width, "width");
+    number(this.#height, "height");
+    this.#name.addEventListener("change", () => this.#say("name", this.#name.value.trim()));
+    this.#name.addEventListener("keydown", ({ key }) => key === "Enter" && this.#name.blur());
+    this.#category.addEventListener("change", () => this.#say("category", this.#category.value));
+    this.#hinge.addEventListener("change", () => this.#say("hinge", this.#hinge.value || null));
+    this.#handle.addEventListener(
+      "change",
+      () => this.#handle.value !== "drawn" && this.#say("handle", this.#handle.value || null),
+    );
+  }
+
+  /** @param {Category[]} categories */
+  setCategories(categories) {
+    const others = categories.map(({ name }) => name).filter((name) => !QUICK.includes(name));
+    this.#category.replaceChildren(
+      ...QUICK.map((name, k) => h("option", { value: name }, `${k + 1}  ${name}`)),
+      ...others.map((name) => h("option", { value: name }, name)),
+    );
+  }
+
+  /** @param {number} digit */
+  pickCategory(digit) {
+    const name = QUICK[digit - 1];
+    if (name && this.#shown) this.#say("category", name);
+  }
+
+  /** Let the number be typed. @param {"width" | "height"} side */
+  type(side) {
+    const input = side === "width" ? this.#width : this.#height;
+    input.focus();
+    input.select();
+  }
+
+  /** @param {Placed[]} fronts @param {How} how */
+  show(fronts, { leading, chosen, cut, paint }) {
+    this.#shown = leading;
+    this.#fields.disabled = leading === null;
+    const set = (/** @type {HTMLInputElement | HTMLSelectElement} */ field, /** @type {string} */ value) => {
+      if (document.activeElement !== field) field.value = value;
+    };
+    if (leading && ![...this.#category.options].some(({ value }) => value === leading.category))
+      this.#category.append(h("option", { value: leading.category }, leading.category));
+    set(this.#name, leading?.name ?? "");
+    set(this.#category, leading?.category ?? "");
+    set(this.#width, leading ? String(Math.round(1000 * widthOf(leading.rect))) : "");
+    set(this.#height, leading ? String(Math.round(1000 * heightOf(leading.rect))) : "");
+    set(this.#hinge, leading?.hinge ?? "");
+    set(this.#handle, leading?.handle === "none" ? "none" : leading?.handle && leading.drawn ? "drawn" : "");
+    this.#adopt.hidden = cut === 0;
+    this.#adopt.textContent = cut === 1 ? "Take the cut panel (A)" : `Take ${cut} cut panels (A)`;
+    const rows = fronts.toSorted((a, b) => a.rect.left - b.rect.left || a.rect.top - b.rect.top);
+    renew(this.#list, ...rows.map((front) => this.#row(front, chosen.has(front.key), paint(front))));
+  }
+
+  /** @param {Placed} front @param {boolean} chosen @param {string} paint */
+  #row(front, chosen, paint) {
+    const size = `${Math.round(1000 * widthOf(front.rect))} × ${Math.round(1000 * heightOf(front.rect))}`;
+    const button = h(
+      "button",
+      {
+        type: "button",
+        "aria-pressed": String(chosen),
+        "data-at": `front:${front.key}`,
+        onClick: () => this.#say("choose", front.key),
+      },
+      h("span", { class: "swatch" }),
+      h("span", { class: "what" }, front.name),
+      h("span", { class: "muted" }, front.drawn ? size : `${size} found`),
+    );
+    button.style.setProperty("--object", paint);
+    return h("li", {}, button);
+  }
+
+  /** @param {HTMLInputElement} input @param {"width" | "height"} side */
+  #size(input, side) {
+    if (input.checkValidity() && input.value) this.#say("size", { side, metres: Number(input.value) / 1000 });
+  }
+
+  /** @param {string} type @param {unknown} [detail] */
+  #say(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}
+
+/** @param {string} text @param {HTMLElement} field */
+function label(text, field) {
+  return h("label", {}, h("span", { class: "muted" }, text), field);
+}
+
+/** @param {Record<string, string>} texts by value */
+function options(texts) {
+  return Object.entries(texts).map(([value, text]) => h("option", { value }, text));
+}

@@ -1,0 +1,242 @@
+/** Fronts on a plane of the scan: rectangles in metres from its top left corner, x to the right and y down; no DOM. */
+
+/** @typedef {import("../api-types").Elevation} Elevation */
+/** @typedef {import("../api-types").ElevationLines} ElevationLines */
+/** @typedef {{ left: number, top: number, right: number, bottom: number }} Rect */
+/** @typedef {"left" | "right" | "top" | "bottom"} Side */
+/** @typedef {{ positions: Float32Array, cell: number }} Profile how clearly a line shows at each position, 0 to 1 */
+/** @typedef {{ left_m: number, bottom_m: number, right_m: number, top_m: number }} Box from a front's centre, z up */
+
+/** @type {Side[]} */
+export const SIDES = ["left", "top", "right", "bottom"];
+export const SMALLEST_M = 0.02;
+const OFF_PLANE_M = 0.03; // of a front that is still on the plane
+const CLEAR = 0.2; // of a line that is worth snapping to
+const DOOR_M = 0.4; // in height, from which a front is a door rather than a drawer
+const HANDLE_M = { long: 0.16, thick: 0.02 };
+
+/** @param {number[]} a @param {number[]} b */
+const dot = (a, b) => a.reduce((sum, value, k) => sum + value * (b[k] ?? 0), 0);
+/** @param {number[]} a @param {number[]} b */
+const minus = (a, b) => a.map((value, k) => value - (b[k] ?? 0));
+
+/** @param {Elevation} elevation */
+export const sizeOf = ({ columns, rows, cell_m }) => ({ width: columns * cell_m, height: rows * cell_m });
+/** @param {Rect} rect */
+export const widthOf = ({ left, right }) => right - left;
+/** @param {Rect} rect */
+export const heightOf = ({ top, bottom }) => bottom - top;
+/** @param {Rect} rect */
+export const middleOf = (rect) => ({ x: (rect.left + rect.right) / 2, y: (rect.top + rect.bottom) / 2 });
+
+/**
+ * Where a front lies on a plane; null when it is on another one.
+ * @param {Elevation} elevation
+ * @param {number[][]} corners as in prompts.json
+ * @returns {Rect | null}
+ */
+export function rectOf(elevation, corners) {
+  const { origin_m, right, down } = elevation;
+  const at = corners.map((corner) => minus(corner, origin_m));
+  const x = at.map((point) => dot(point, right));
+  const y = at.map((point) => dot(point, down));
+  const off = at.map((point, k) => Math.sqrt(Math.max(dot(point, point) - (x[k] ?? 0) ** 2 - (y[k] ?? 0) ** 2, 0)));
+  const size = sizeOf(elevation);
+  const rect = { left: Math.min(...x), right: Math.max(...x), top: Math.min(...y), bottom: Math.max(...y) };
+  const { x: u, y: v } = middleOf(rect);
+  const facing = (x[1] ?? 0) > (x[0] ?? 0) && (y[3] ?? 0) > (y[0] ?? 0); // the back of an island is another plane
+  const inside = u > 0 && v > 0 && u < size.width && v < size.height;
+  return facing && inside && Math.max(...off) < OFF_PLANE_M ? rect : null;
+}
+
+/**
+ * @param {Elevation} elevation
+ * @param {Rect} rect
+ * @returns {number[][]} as in prompts.json
+ */
+export function cornersOf({ origin_m, right, down }, rect) {
+  const at = (/** @type {number} */ x, /** @type {number} */ y) =>
+    origin_m.map((value, k) => round(value + x * (right[k] ?? 0) + y * (down[k] ?? 0)));
+  return [at(rect.left, rect.top), at(rect.right, rect.top), at(rect.right, rect.bottom), at(rect.left, rect.bottom)];
+}
+
+/** To a tenth of a millimetre is finer than any scan; a hundredth keeps rectangles square. @param {number} metres */
+const round = (metres) => Math.round(metres * 1e5) / 1e5;
+
+/**
+ * How clearly lines show between two ends of the other direction.
+ * @param {{ block: number, blocks: number, positions: number, bytes: Uint8Array }} lines
+ * @param {number} cell metres a cell
+ * @param {number} from metres
+ * @param {number} to
+ * @returns {Profile}
+ */
+export function profileOf({ block, blocks, positions, bytes }, cell, from, to) {
+  const first = Math.min(Math.max(Math.floor(from / cell / block), 0), blocks - 1);
+  const last = Math.max(Math.min(Math.ceil(to / cell / block), blocks), first + 1);
+  const found = new Float32Array(positions);
+  for (let k = first; k < last; k++)
+    for (let i = 0; i < positions; i++) found[i] = (found[i] ?? 0) + (bytes[k * positions + i] ?? 0);
+  return { positions: found.map((sum) => sum / (255 * (last - first))), cell };
+}
+
+/** @param {ElevationLines} lines */
+export function decoded(lines) {
+  const text = atob(lines.clarity);
+  return { ...lines, bytes: Uint8Array.from(text, (letter) => letter.charCodeAt(0)) };
+}
+
+/**
+ * Where an edge goes that a person let go near `at`: onto another front's edge, else onto the clearest line within reach.
+ * @param {number} at metres
+ * @param {number} reach metres
+ * @param {number[]} edges of other fronts
+ * @param {Profile | null} profile
+ */
+export function snapped(at, reach, edges, profile) {
+  const line = profile ? clearestLine(at, reach, profile) : null;
+  const edge = edges.reduce(
+    (best, one) => (Math.abs(one - at) < Math.abs(best - at) ? one : best),
+    Number.POSITIVE_INFINITY,
+  );
+  if (Math.abs(edge - at) <= reach && (line === null || Math.abs(edge - at) <= Math.abs(line - at) + reach / 4))
+    return edge;
+  return line ?? at;
+}
+
+/**
+ * @param {number} at
+ * @param {number} reach
+ * @param {Profile} profile
+ */
+function clearestLine(at, reach, { positions, cell }) {
+  let best = -1;
+  const low = Math.max(Math.floor((at - reach) / cell), 1);
+  const high = Math.min(Math.ceil((at + reach) / cell), positions.length - 2);
+  for (let i = low; i <= high; i++) {
+    const here = positions[i] ?? 0;
+    const peak = here >= (positions[i - 1] ?? 0) && here >= (positions[i + 1] ?? 0);
+    if (here >= CLEAR && peak && here > (positions[best] ?? 0)) best = i;
+  }
+  return best < 0 ? null : (best + 0.5) * cell;
+}
+
+/**
+ * @param {Rect} rect
+ * @param {Side} side
+ * @param {number} at
+ * @returns {Rect} no smaller than a front can be
+ */
+export function withEdge(rect, side, at) {
+  const least = side === "left" || side === "top";
+  const other = { left: rect.right, right: rect.left, top: rect.bottom, bottom: rect.top }[side];
+  return { ...rect, [side]: least ? Math.min(at, other - SMALLEST_M) : Math.max(at, other + SMALLEST_M) };
+}
+
+/**
+ * @param {Rect} rect
+ * @param {number} dx
+ * @param {number} dy
+ * @returns {Rect}
+ */
+export function moved(rect, dx, dy) {
+  return { left: rect.left + dx, right: rect.right + dx, top: rect.top + dy, bottom: rect.bottom + dy };
+}
+
+/**
+ * Two by a seam; null where it would leave a part too small.
+ * @param {Rect} rect
+ * @param {"upright" | "level"} way
+ * @param {number} at
+ * @returns {[Rect, Rect] | null}
+ */
+export function split(rect, way, at) {
+  const [low, high] = way === "upright" ? [rect.left, rect.right] : [rect.top, rect.bottom];
+  if (at < low + SMALLEST_M || at > high - SMALLEST_M) return null;
+  return way === "upright"
+    ? [
+        { ...rect, right: at },
+        { ...rect, left: at },
+      ]
+    : [
+        { ...rect, bottom: at },
+        { ...rect, top: at },
+      ];
+}
+
+/** @param {Rect[]} rects @returns {Rect} around all of them */
+export function around(rects) {
+  return {
+    left: Math.min(...rects.map((one) => one.left)),
+    right: Math.max(...rects.map((one) => one.right)),
+    top: Math.min(...rects.map((one) => one.top)),
+    bottom: Math.max(...rects.map((one) => one.bottom)),
+  };
+}
+
+/** @param {{ x: number, y: number }} a @param {{ x: number, y: number }} b @returns {Rect} */
+export function between(a, b) {
+  return { left: Math.min(a.x, b.x), right: Math.max(a.x, b.x), top: Math.min(a.y, b.y), bottom: Math.max(a.y, b.y) };
+}
+
+/** @param {Rect} rect @param {{ x: number, y: number }} at */
+export function holds(rect, { x, y }) {
+  return x >= rect.left && x <= rect.right && y >= rect.top && y <= rect.bottom;
+}
+
+/** Whether two share more than a seam. @param {Rect} a @param {Rect} b */
+export function overlap(a, b) {
+  const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+  const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+  return across > SMALLEST_M && down > SMALLEST_M;
+}
+
+/**
+ * The edge near a position, and how far it is.
+ * @param {Rect} rect
+ * @param {{ x: number, y: number }} at
+ * @returns {{ side: Side, off: number }}
+ */
+export function nearestEdge(rect, { x, y }) {
+  const beside = Math.max(rect.left - x, x - rect.right, 0);
+  const above = Math.max(rect.top - y, y - rect.bottom, 0);
+  const off = {
+    left: Math.hypot(x - rect.left, above),
+    right: Math.hypot(x - rect.right, above),
+    top: Math.hypot(y - rect.top, beside),
+    bottom: Math.hypot(y - rect.bottom, beside),
+  };
+  const side = SIDES.reduce((best, one) => (off[one] < off[best] ? one : best), "left");
+  return { side, off: off[side] };
+}
+
+/**
+ * A bar handle at a position of a front: lying near its upper or lower edge and on drawers, else standing.
+ * @param {Rect} rect
+ * @param {{ x: number, y: number }} at
+ * @returns {Box}
+ */
+export function handleAt(rect, at) {
+  const { x, y } = middleOf(rect);
+  const upright = heightOf(rect) > DOOR_M && ["left", "right"].includes(nearestEdge(rect, at).side);
+  const [wide, high] = upright ? [HANDLE_M.thick, HANDLE_M.long] : [HANDLE_M.long, HANDLE_M.thick];
+  const [halfWidth, halfHeight] = [Math.min(wide, widthOf(rect)) / 2, Math.min(high, heightOf(rect)) / 2];
+  const right = Math.min(Math.max(at.x - x, halfWidth - widthOf(rect) / 2), widthOf(rect) / 2 - halfWidth);
+  const up = Math.min(Math.max(y - at.y, halfHeight - heightOf(rect) / 2), heightOf(rect) / 2 - halfHeight);
+  return {
+    left_m: round(right - halfWidth),
+    right_m: round(right + halfWidth),
+    bottom_m: round(up - halfHeight),
+    top_m: round(up + halfHeight),
+  };
+}
+
+/**
+ * What a front of that shape and height most likely is.
+ * @param {Rect} rect
+ * @param {number} top height of the plane's upper end above the floor, metres
+ */
+export function likelyCategory(rect, top) {
+  if (top - rect.bottom > 1.2) return "wall_cabinet";
+  return heightOf(rect) < DOOR_M && widthOf(rect) >= heightOf(rect) ? "drawer" : "cabinet";
+}

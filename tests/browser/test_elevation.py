@@ -1,0 +1,127 @@
+"""Fronts drawn, split, typed, merged and taken back on a plane of the scan, by mouse and by keyboard, and kept."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.test_together import sample
+from tests.browser.together import Server, signed_in
+
+MARGIN_PX = 16  # around the plane where it is fitted
+SIZE_M = (2.4, 0.9)  # of the plane that the stand-in draws, with seams every 60 cm
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path) as running:
+        yield running
+
+
+def at(page: Page, x: float, y: float) -> tuple[float, float]:
+    """Where a position of the plane, metres from its top left corner, is on the screen."""
+    box = page.locator("r2c2r-elevation-canvas canvas").bounding_box()
+    assert box is not None
+    room = box["width"] - 2 * MARGIN_PX, box["height"] - 2 * MARGIN_PX
+    scale = min(room[0] / SIZE_M[0], room[1] / SIZE_M[1])
+    left = box["x"] + MARGIN_PX + (room[0] - SIZE_M[0] * scale) / 2
+    top = box["y"] + MARGIN_PX + (room[1] - SIZE_M[1] * scale) / 2
+    return left + x * scale, top + y * scale
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*at(page, *start))
+    page.mouse.down()
+    page.mouse.move(*at(page, *end), steps=6)
+    page.mouse.up()
+
+
+def fronts(page: Page) -> Locator:
+    return page.locator(".front-list button")
+
+
+def stored(page: Page) -> list[dict[str, Any]]:
+    """What prompts.json says, once all is saved."""
+    expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
+    project = page.url.split("/p/")[1].split("/")[0]
+    file: dict[str, Any] = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
+    return [entry for entry in file["objects"] if "front" in entry]
+
+
+def test_fronts_are_drawn_split_typed_merged_and_taken_back(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Elevation").click()
+    expect(page.locator(".planes li")).to_have_count(1)
+    expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
+    page.get_by_role("button", name="Plane 1, 2.40 × 0.90 m").click()
+
+    drag(page, (0.59, 0.1), (1.79, 0.8))  # both ends snap to seams half a centimetre off
+    expect(fronts(page)).to_have_count(1)
+    expect(fronts(page).first).to_contain_text("1200 × 700")
+    page.mouse.move(*at(page, 1.19, 0.4))
+    page.keyboard.press("s")
+    expect(fronts(page)).to_have_count(2)
+    expect(fronts(page).nth(1)).to_contain_text("600 × 700")
+    page.mouse.move(*at(page, 1.5, 0.3))
+    page.keyboard.press("Shift+S")
+    expect(fronts(page)).to_have_count(3)
+    picture(page, "elevation")
+
+    page.keyboard.press("w")
+    page.get_by_label("Width mm").fill("450")
+    page.keyboard.press("Enter")
+    expect(fronts(page).filter(has_text="450 × ")).to_have_count(1)
+    page.keyboard.press("e")  # the left edge
+    page.keyboard.press("Shift+ArrowRight")
+    expect(fronts(page).filter(has_text="440 × ")).to_have_count(1)
+    page.keyboard.press("Control+z")
+    expect(fronts(page).filter(has_text="450 × ")).to_have_count(1)
+    page.keyboard.press("Control+z")
+    expect(fronts(page).filter(has_text="600 × ")).to_have_count(3)
+
+    page.mouse.click(*at(page, 0.8, 0.4))
+    page.mouse.move(*at(page, 0.63, 0.5))
+    page.keyboard.press("j")
+    page.mouse.move(*at(page, 1.15, 0.2))
+    page.keyboard.press("k")
+    expect(page.get_by_role("combobox", name="Hinge")).to_have_value("left")
+    expect(page.get_by_role("combobox", name="Handle")).to_have_value("drawn")
+    door = next(entry for entry in stored(page) if entry["front"]["hinge"] == "left")
+    assert door["front"]["handle"]["top_m"] > door["front"]["handle"]["bottom_m"]
+
+    page.mouse.click(*at(page, 1.5, 0.2))
+    page.keyboard.down("Shift")
+    page.mouse.click(*at(page, 1.5, 0.6))
+    page.keyboard.up("Shift")
+    page.keyboard.press("m")
+    expect(fronts(page)).to_have_count(2)
+    page.keyboard.press("Control+z")  # one gesture: both are there again
+    expect(fronts(page)).to_have_count(3)
+    page.keyboard.press("Control+Shift+z")
+    expect(fronts(page)).to_have_count(2)
+    page.keyboard.press("Delete")
+    expect(fronts(page)).to_have_count(1)
+    stored(page)
+    page.reload()
+    expect(fronts(page)).to_have_count(1)
+    expect(fronts(page).first).to_contain_text("600 × 700")
+    context.close()
+
+
+def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 420, "height": 800})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Elevation").click()
+    expect(page.locator(".planes li")).to_have_count(1)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    for name in ("Keyboard and mouse help", "Dark or light"):
+        box = page.get_by_role("button", name=name).bounding_box()
+        assert box is not None
+        assert box["x"] + box["width"] <= 420
+    context.close()

@@ -1,0 +1,106 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  around,
+  cornersOf,
+  decoded,
+  handleAt,
+  likelyCategory,
+  nearestEdge,
+  overlap,
+  profileOf,
+  rectOf,
+  SMALLEST_M,
+  snapped,
+  split,
+  withEdge,
+} from "../../static/js/lib/elevation.js";
+
+// A plane of 2.4 x 0.9 m, turned by 30 degrees, in a world whose y points up
+const [c, s] = [Math.cos(0.5), Math.sin(0.5)];
+const PLANE = /** @type {any} */ ({
+  cell_m: 0.01,
+  columns: 240,
+  rows: 90,
+  origin_m: [1, 0.9, 2],
+  right: [c, 0, s],
+  down: [0, -1, 0],
+  top_m: 0.9,
+});
+const RECT = { left: 0.2, top: 0.1, right: 0.8, bottom: 0.82 };
+
+test("a rectangle goes to the recording's world and comes back", () => {
+  const corners = cornersOf(PLANE, RECT);
+  assert.deepEqual(corners[0]?.[1], 0.8);
+  const back = rectOf(PLANE, corners);
+  for (const side of /** @type {const} */ (["left", "top", "right", "bottom"]))
+    assert.ok(Math.abs((back?.[side] ?? 9) - RECT[side]) < 1e-4);
+});
+
+test("a front off the plane, beside it or on its back is on another one", () => {
+  const off = (/** @type {number} */ by) => cornersOf(PLANE, RECT).map(([x = 0, y = 0, z = 0]) => [x - s * by, y, z + c * by]);
+  assert.ok(rectOf(PLANE, off(0.02)));
+  assert.equal(rectOf(PLANE, off(0.05)), null);
+  assert.equal(rectOf(PLANE, cornersOf(PLANE, { ...RECT, left: 3, right: 3.5 })), null);
+  const [a, b, d, e] = cornersOf(PLANE, RECT);
+  assert.equal(rectOf(PLANE, /** @type {number[][]} */ ([b, a, e, d])), null);
+});
+
+/** Seams at 60 and 120 cm, the second in the lower half only. */
+function lines() {
+  const clarity = new Uint8Array(9 * 240);
+  for (let block = 0; block < 9; block++) {
+    clarity[block * 240 + 60] = 255;
+    if (block > 4) clarity[block * 240 + 120] = 255;
+  }
+  return decoded({ block: 10, blocks: 9, positions: 240, clarity: btoa(String.fromCharCode(...clarity)) });
+}
+
+test("an edge snaps to the line that its own height shows, within reach", () => {
+  const low = profileOf(lines(), 0.01, 0.5, 0.9);
+  const high = profileOf(lines(), 0.01, 0, 0.4);
+  assert.equal(snapped(0.615, 0.02, [], low), 0.605);
+  assert.equal(snapped(0.64, 0.02, [], low), 0.64);
+  assert.equal(snapped(1.21, 0.02, [], low), 1.205);
+  assert.equal(snapped(1.21, 0.02, [], high), 1.21);
+});
+
+test("another front's edge draws as a line does, the nearer one more", () => {
+  const profile = profileOf(lines(), 0.01, 0, 0.9);
+  assert.equal(snapped(0.612, 0.02, [0.6], null), 0.6);
+  assert.equal(snapped(0.606, 0.02, [0.62], profile), 0.605);
+  assert.equal(snapped(0.618, 0.02, [0.62], profile), 0.62);
+});
+
+test("a seam leaves two parts that meet, or none where one would be too small", () => {
+  assert.deepEqual(split(RECT, "upright", 0.5), [
+    { ...RECT, right: 0.5 },
+    { ...RECT, left: 0.5 },
+  ]);
+  assert.deepEqual(split(RECT, "level", 0.4)?.[1], { ...RECT, top: 0.4 });
+  assert.equal(split(RECT, "upright", 0.21), null);
+  assert.deepEqual(around(split(RECT, "level", 0.4) ?? []), RECT);
+});
+
+test("an edge stops before the front is gone, and seams are no overlap", () => {
+  assert.equal(withEdge(RECT, "left", 2).left, 0.78);
+  assert.equal(withEdge(RECT, "bottom", 0).bottom, RECT.top + SMALLEST_M);
+  assert.equal(overlap(RECT, { ...RECT, left: 0.8, right: 1.4 }), false);
+  assert.equal(overlap(RECT, { ...RECT, left: 0.7, right: 1.4 }), true);
+  assert.deepEqual(nearestEdge(RECT, { x: 0.79, y: 0.4 }).side, "right");
+});
+
+test("a handle stays on its front, upright beside a door's side and lying on a drawer", () => {
+  const door = handleAt(RECT, { x: 0.79, y: 0.2 });
+  assert.ok(door.top_m - door.bottom_m > door.right_m - door.left_m);
+  assert.ok(door.right_m <= 0.3 + 1e-9);
+  const drawer = handleAt({ left: 0, right: 0.6, top: 0, bottom: 0.15 }, { x: 0.3, y: 0.05 });
+  assert.ok(drawer.right_m - drawer.left_m > drawer.top_m - drawer.bottom_m);
+});
+
+test("what a front is follows from its shape and height", () => {
+  assert.equal(likelyCategory(RECT, 0.9), "cabinet");
+  assert.equal(likelyCategory({ ...RECT, bottom: 0.3 }, 0.9), "drawer");
+  assert.equal(likelyCategory(RECT, 2.2), "wall_cabinet");
+});
