@@ -1,4 +1,4 @@
-"""Depth on the faces of a box: patches of the fused surface, each with its face, and free space that depth saw through."""
+"""Depth on the faces of a box: patches of the fused surface, each with its face."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,10 +7,8 @@ import numpy as np
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.segment.appliances.edges import BACK, BOTTOM, FRONT, LEFT, RIGHT, TOP
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.viewpoints import best_views
 from r2c2r_core.tuning import param, tuned
 
 
@@ -30,15 +28,6 @@ class Params:
     least_share: float = param(0.07, "share", "of a face that depth must have seen to measure anything by it")
     gap_m: float = param(0.06, "m", "a hole this long in a side is where it ends")
     least_reach_m: float = param(0.15, "m", "sides that end before this are dark, and depth has holes in them")
-    open_views: int = param(16, "count", "frames asked whether they look through the front's rectangle", ge=1)
-    open_step_m: float = param(0.03, "m", "between the points asked about")
-    open_behind_m: float = param(0.08, "m", "depth this far behind the front went past it")
-    open_share: float = param(
-        0.85,
-        "share",
-        "of the frames that measured there: glass lies in a frame that returns light, a gap beside an appliance has none",
-    )
-    open_known: int = param(3, "count", "frames that must have measured there", ge=1)
 
 
 class Patches(NamedTuple):
@@ -85,20 +74,6 @@ def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patch
         np.repeat(list(found), count).astype(int),
         max(ends, default=None),
     )
-
-
-def open_points(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Points:
-    """Points (n, 3) of the front's rectangle, in its frame, that the frames measure past: nothing is there."""
-    params = tuned(Params)
-    x, z = (np.arange(box[a] + params.open_step_m / 2, box[b], params.open_step_m) for a, b in ((LEFT, RIGHT), (BOTTOM, TOP)))
-    grid = np.stack([axis.ravel() for axis in np.meshgrid(x, [box[FRONT]], z, indexing="ij")], axis=1)
-    world = world_from_front.apply(grid)
-    known, past = np.zeros(len(world)), np.zeros(len(world))
-    for frame in best_views(scene, world.mean(axis=0), params.open_views):
-        at, seen, _ = look_up(world, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-        known += (seen > 0) & ~scene.noise.occluded(seen, at, params.open_behind_m)
-        past += scene.noise.seen_through(seen, at, params.open_behind_m)
-    return grid[(known >= params.open_known) & (past > params.open_share * known)]
 
 
 def _surface_in(

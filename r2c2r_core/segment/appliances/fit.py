@@ -30,7 +30,7 @@ from r2c2r_core.segment.appliances.edges import (
     photo_of,
     shares,
 )
-from r2c2r_core.segment.appliances.faces import Patches, open_points, patches_on
+from r2c2r_core.segment.appliances.faces import Patches, patches_on
 from r2c2r_core.segment.fronts.front import Front, front_middle
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.scene import Scene
@@ -63,7 +63,6 @@ class Params:
     support_m: float = param(0.004, "m", "the same of the height of what it stands on")
     wall_m: float = param(0.010, "m", "the same of the wall behind")
     reach_m: float = param(0.04, "m", "the same of where its sides end in depth, which smears across the gap to the wall")
-    open_m: float = param(0.010, "m", "the same of the border of what the frames look through")
     distance_m: float = param(1.5, "m", "of the cameras, at which the depth noise of the fused surface is taken")
     kernel: float = param(2.0, "σ", "scale of the Cauchy kernel")
     spreads_m: tuple[float, ...] = param(
@@ -99,7 +98,6 @@ class Evidence(NamedTuple):
     start: np.ndarray
     kind: Category
     patches: Patches
-    open_points: np.ndarray
     wall_m: float | None
     support_m: float | None
     sigma_m: float  # of a depth patch
@@ -136,7 +134,6 @@ def fit_box(front: Front, scene: Scene, kind: Category, wall_m: float | None, *,
         start,
         kind,
         patches_on(deep, scene, world_from_front),
-        open_points(start, scene, world_from_front),
         wall_m,
         None if support is None else support - float(middle[2]),
         float(scene.noise.sigma(tuned(Params).distance_m)),
@@ -239,8 +236,6 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
     turned = rotation_about_z(float(box[YAW]))
     patches = evidence.patches
     off = (patches.points @ turned)[np.arange(len(patches.axis)), patches.axis] - box[patches.face]
-    x, _, z = (evidence.open_points @ turned).T
-    inside = np.maximum(np.minimum(np.minimum(x - left, right - x), top - z), 0.0)
     parts = edge_parts(box)
     matched = [(displacements(parts, edge.view) - edge.target_px) * edge.weight for edge in edges]
     return np.concatenate(
@@ -249,7 +244,6 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
             [float(size.deviation(max(value, 0.02))) for value, size in sizes],
             limits,
             off / evidence.sigma_m,
-            inside / params.open_m,
             *matched,
         ]
     )

@@ -1,18 +1,16 @@
 """What depth says of a box: the patches on its faces, where a side ends, and what the frames look through."""
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
 
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.model.capture import SceneSurface
-from r2c2r_core.segment.appliances import faces
 from r2c2r_core.segment.appliances.edges import FRONT, RIGHT, TOP
-from r2c2r_core.segment.appliances.faces import open_points, patches_on
+from r2c2r_core.segment.appliances.faces import patches_on
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.surface import parts_of
 from tests.core.segment.appliances.drawn import TRUE
@@ -80,21 +78,3 @@ def test_a_dark_side_with_holes_says_nothing_of_where_it_ends() -> None:
 
 def test_a_face_of_which_depth_saw_next_to_nothing_is_left_out() -> None:
     assert not len(patches_on(DEEP, scene_of(sheet(0, 0.25, (0.1, 0.13), (0.0, 0.03), 1)), HERE).points)
-
-
-def test_open_is_what_the_frames_measure_past(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The right third of the rectangle is a gap; the sensor meets the front in the rest."""
-    down = np.column_stack([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    frames = [
-        SimpleNamespace(index=k, world_from_camera=Rigid3(down, np.array([0.02 * k, -1.0, 0.0])), depth_camera=CAMERA)
-        for k in range(4)
-    ]
-
-    def depth(index: int) -> np.ndarray:
-        x = (np.arange(CAMERA.width) + 0.5 - CAMERA.cx) / CAMERA.fx + 0.02 * index
-        return np.tile(np.where(x > 0.1, 1.5, 1.0), (CAMERA.height, 1)).astype(np.float32)
-
-    monkeypatch.setattr(faces, "best_views", lambda scene, point, count: frames)
-    found = open_points(TRUE, cast(Any, SimpleNamespace(depth=depth, noise=DepthNoise())), HERE)
-    assert found[:, 0].min() == pytest.approx(0.1, abs=0.03)
-    assert found[:, 0].max() > 0.22

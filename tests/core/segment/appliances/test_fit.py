@@ -22,9 +22,8 @@ def solved(
     photos: list[Photo],
     world_from_front: Rigid3 | None = None,
     patches: Patches = NOTHING,
-    open_points: Points = np.zeros((0, 3)),
 ) -> Solution:
-    evidence = Evidence(start, KIND, patches, open_points, WALL_Y, None, 0.0085)
+    evidence = Evidence(start, KIND, patches, WALL_Y, None, 0.0085)
     return solve(evidence, photos, world_from_front or Rigid3(np.eye(3), np.zeros(3)))
 
 
@@ -82,16 +81,6 @@ def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(
     found = solved(TRUE, [], patches=patches)
     assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # drawn a little to the plane that was found
     assert found.box[RIGHT] == pytest.approx(0.25, abs=0.004)
-
-
-def test_a_gap_that_the_frames_look_through_is_cut_off() -> None:
-    """A wall beside the box has a line that the rectangle took for its edge, 4 cm too far; glass in its middle is no gap."""
-    start = TRUE.copy()
-    start[RIGHT] = RIGHT_M + 0.04
-    gap = grid((RIGHT_M, RIGHT_M + 0.04), (-0.15, 0.15))
-    window = grid((-0.05, 0.05), (-0.05, 0.05))
-    assert solved(start, [], open_points=gap).box[RIGHT] == pytest.approx(RIGHT_M, abs=0.01)
-    np.testing.assert_allclose(solved(TRUE, [], open_points=window).box[[LEFT, RIGHT]], [LEFT_M, RIGHT_M], atol=0.005)
 
 
 def test_the_covariance_is_of_centre_yaw_and_sizes() -> None:
