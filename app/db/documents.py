@@ -4,7 +4,7 @@ from typing import Any
 
 from sqlmodel import Session
 
-from app.db.keys import overrides_entry
+from app.db.keys import drawn_of, overrides_entry
 from app.db.queries import Click, clicks_by_object, live_objects, overrides_by_object
 from app.db.tables import SceneObject
 
@@ -20,13 +20,12 @@ def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
 def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
     """One object of prompts.json."""
     points = [{"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in clicks]
-    drawn = {} if item.front is None else {"front": item.front}
-    return {"name": item.name, "category": item.category, "points": points, **drawn}
+    return {"name": item.name, "category": item.category, "points": points, **drawn_of(item)}
 
 
 def prompts_version(objects: list[dict[str, Any]]) -> int:
     """The version of prompts.json that these need: an older r2c2r reads what is only clicked."""
-    return 2 if any("front" in entry for entry in objects) else 1
+    return 2 if any(entry.keys() & {"front", "frames"} for entry in objects) else 1
 
 
 def overrides_document(session: Session, project_id: str) -> dict[str, Any]:

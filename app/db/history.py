@@ -28,7 +28,7 @@ Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
 _FIELDS = ("name", "category", "colour", "deleted", "front")
-_POINT, _CORRECTION, _VERDICT = "point ", "override ", "verdict "  # what follows: its id, its name, its candidate
+_POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then its id, number, name, candidate
 
 
 class Steps(NamedTuple):
@@ -125,7 +125,8 @@ def snapshot(session: Session, item: SceneObject, scope: Scope) -> State:
     if scope == "prompts":
         clicks = clicks_of(session, item.id)
         points = {f"{_POINT}{c.id}": {"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in clicks}
-        return {**{name: getattr(item, name) for name in _FIELDS}, **points}
+        frames = {f"{_FRAME}{number}": said for number, said in item.frames.items()}
+        return {**{name: getattr(item, name) for name in _FIELDS}, **points, **frames}
     said = session.exec(select(Verdict).where(Verdict.object_id == item.id).order_by(col(Verdict.candidate)))
     corrected = {f"{_CORRECTION}{key}": value for key, value in override_data(session, item).items()}
     return corrected | {f"{_VERDICT}{v.candidate}": v.model_dump(include={"verdict", "reason", "who", "at"}) for v in said}
@@ -169,6 +170,8 @@ def _replace(session: Session, item: SceneObject, scope: Scope, there: State, wa
         _refuse_taken_name(session, item, wanted)
         for name in _FIELDS:
             setattr(item, name, wanted.get(name, getattr(item, name)))
+        kept_frames = {number: said for number, said in item.frames.items() if number not in _named(there, _FRAME)}
+        item.frames = kept_frames | _named(wanted, _FRAME)
         session.exec(delete(Point).where(col(Point.id).in_([int(key) for key in _named(there, _POINT)])))
         points = _named(wanted, _POINT).items()
         session.add_all(Point(id=int(key), object_id=item.id or 0, **point) for key, point in points)

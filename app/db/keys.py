@@ -17,26 +17,37 @@ from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.workspace import content_key
 
-Front = dict[str, Any] | None  # drawn: as in prompts.json
+Drawn = dict[str, Any]  # what an entry of prompts.json holds beside clicks: front, frames
 
 
-def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]], front: Front = None) -> str:
+def drawn_of(item: SceneObject) -> Drawn:
+    """What was drawn of an object, as in prompts.json; empty where nothing was."""
+    frames = [{"frame": int(number), "mask": mask} for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))]
+    front = {} if item.front is None else {"front": item.front}
+    return front | ({"frames": frames} if frames else {})
+
+
+def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]], drawn: Drawn) -> str:
     """Key of what an object's masks depend on, its name not among it.
 
     Empty while no click (frame, x, y, label) is on it and no front is drawn.
     """
     given: list[Any] = [[frame, x, y, label] for frame, x, y, label in clicks]
-    if front is None and not any(label for *_, label in given):
+    if "front" not in drawn and not any(label for *_, label in given):
         return ""
-    drawn = [{key: value for key, value in front.items() if key != "hinge"}] if front is not None else []
-    return hashlib.sha256(json.dumps([segmenter, category, given, *drawn]).encode()).hexdigest()[:20]
+    shown: list[Any] = []
+    if "front" in drawn:
+        shown.append({key: value for key, value in drawn["front"].items() if key != "hinge"})
+    if drawn.get("frames"):
+        shown.append(drawn["frames"])
+    return hashlib.sha256(json.dumps([segmenter, category, given, *shown]).encode()).hexdigest()[:20]
 
 
-def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any], front: Front = None) -> str:
+def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any], drawn: Drawn) -> str:
     """Key of everything about an object that a result depends on; empty where none does."""
     prompt: list[Any] | None = [[c.frame, c.x, c.y, c.label] for c in clicks] if any(c.label for c in clicks) else None
-    if front is not None:
-        prompt = [*(prompt or []), front]
+    if "front" in drawn or (prompt and drawn):
+        prompt = [*(prompt or []), *drawn.values()]
     corrected = overrides_entry(override)
     return content_key(name, category if prompt else "", prompt, corrected) if prompt or corrected else ""
 
@@ -58,8 +69,8 @@ def stored_entry(entry: dict[str, Any]) -> dict[str, Any]:
 
 def note_object(session: Session, item: SceneObject, segmenter: str, clicks: list[Click], override: dict[str, Any]) -> None:
     """Store the keys of an object that changed."""
-    item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks], item.front)
-    item.inputs = object_key(item.name, item.category, clicks, override, item.front)
+    item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks], drawn_of(item))
+    item.inputs = object_key(item.name, item.category, clicks, override, drawn_of(item))
     session.add(item)
 
 
@@ -83,8 +94,8 @@ def note_segmenter(session: Session, project: Project) -> None:
     """Store the keys of the masks after another segmenter was chosen to draw them."""
     clicks = clicks_by_object(session, project.id)
     for item in live_objects(session, project.id, deleted=True):
-        drawn = [(c.frame, c.x, c.y, c.label) for c in clicks.get(item.id or 0, [])]
-        item.masks_key = masks_key(project.segmenter, item.category, drawn, item.front)
+        clicked = [(c.frame, c.x, c.y, c.label) for c in clicks.get(item.id or 0, [])]
+        item.masks_key = masks_key(project.segmenter, item.category, clicked, drawn_of(item))
         session.add(item)
 
 

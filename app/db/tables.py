@@ -139,6 +139,9 @@ class SceneObject(SQLModel, table=True):
     colour: int  # index into the palette
     version: int = 1  # grows with every change
     deleted: bool = False
+    frames: dict[str, Any] = Field(  # by their numbers: a mask as in prompts.json, or None: not visible
+        default_factory=dict, sa_column=Column(JSON, nullable=False, server_default="{}")
+    )
     front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on

@@ -32,6 +32,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.progress import Progress
+from r2c2r_core.segment.corrected import as_found, corrected_stream
 from r2c2r_core.segment.prompts import check_prompt, parse_prompts
 from r2c2r_core.segment.protocol import Glimpse, SegmentSession
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
@@ -132,15 +133,16 @@ class Desk:
         try:
             prompt = _prompt(document)
             check_prompt(self.capture, prompt)
-            glimpsed = self.session.glimpse(prompt)
-            masks = iter(self.session.stream(prompt))
+            asked = as_found(prompt)
+            glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # it may be of a frame that is set right
+            masks = corrected_stream(iter(self.session.stream(asked)), prompt.frames)
         except Exception as error:
             _fail(number, key, _named(error))
             return
         with self._changed:
             if glimpsed is not None:
                 self._show(number, key, glimpsed)
-            self._open[number] = _Followed(key, prompt, masks, glimpsed)
+            self._open[number] = _Followed(key, asked, masks, glimpsed)
             self._changed.notify()
 
     def _work(self) -> None:

@@ -132,6 +132,7 @@ def adopt_prompts(session: Session, project: Project, document: dict[str, Any], 
             colours += 1
         with history.change(session, item, "prompts", "import", f"imported {prompt.name}", who=who):
             item.deleted, item.category, item.front = False, prompt.category, entry.get("front")
+            item.frames = {str(said["frame"]): said["mask"] for said in entry.get("frames", ())}
             session.add(item)
             for old in session.exec(select(Point).where(Point.object_id == item.id)):
                 session.delete(old)

@@ -68,6 +68,18 @@ def delete_point(context: Ctx, project: str, object: RowId, point: RowId, infer:
     return prompts.delete_point(context, project, object, point, infer)
 
 
+@router.put("/objects/{object}/frames/{frame}", operation_id="setFrame")
+def set_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber, body: schemas.FrameIn) -> schemas.SceneObject:
+    """Its mask in that frame, which stands, or that it is not visible there."""
+    return prompts.say_of_frame(context, project, object, frame, body)
+
+
+@router.delete("/objects/{object}/frames/{frame}", operation_id="leaveFrame")
+def leave_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber) -> schemas.SceneObject:
+    """As found there again."""
+    return prompts.say_of_frame(context, project, object, frame, None)
+
+
 @router.post("/undo", operation_id="undo")
 def undo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
     """Undo the last change of one object, or of the project; 409 when there is none, or `version` is old."""

@@ -8,6 +8,8 @@ from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
 from app.schemas.live import ProjectId, Watch
 from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits
 from app.schemas.objects import (
+    FrameIn,
+    FrameSaid,
     HistoryEntry,
     ObjectIn,
     ObjectPatch,
@@ -85,8 +87,10 @@ __all__ = [
     "FolderEntry",
     "FolderListing",
     "FoundFront",
+    "FrameIn",
     "FrameInfo",
     "FrameMask",
+    "FrameSaid",
     "HistoryEntry",
     "ImportPath",
     "Job",

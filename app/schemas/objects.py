@@ -6,7 +6,7 @@ from pydantic import Field
 
 from app.schemas.base import Shape
 from app.schemas.text import Word
-from r2c2r_core.schema.prompts import PromptsFileFront
+from r2c2r_core.schema.prompts import PromptsFileFront, PromptsFileMask
 
 SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"]
 
@@ -44,6 +44,19 @@ class Point(Shape):
     label: Literal[0, 1]
 
 
+class FrameIn(Shape):
+    """What an object is in one frame: a mask that stands, or None: not visible there."""
+
+    mask: PromptsFileMask | None
+
+
+class FrameSaid(Shape):
+    """A frame in which a person set an object right."""
+
+    frame: int
+    visible: bool
+
+
 class ObjectIn(Shape):
     """A new object; without a name it gets its category's and the next number."""
 
@@ -75,6 +88,7 @@ class SceneObject(Shape):
     deleted: bool
     points: list[Point]
     front: PromptsFileFront | None  # drawn; None: what the clicks find
+    frames: list[FrameSaid]  # set right by a person
     can_undo: bool
     can_redo: bool
     segment: SegmentState

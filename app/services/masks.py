@@ -270,9 +270,7 @@ def _finished_key(files: ProjectFiles, segmenter: str, name: str) -> str | None:
 def _keys_in(path: Path, segmenter: str) -> dict[str, str]:
     objects: list[dict[str, Any]] = json.loads(path.read_text())["objects"]
     clicks = {entry["name"]: [_click(point) for point in entry["points"]] for entry in objects}
-    return {
-        entry["name"]: masks_key(segmenter, entry["category"], clicks[entry["name"]], entry.get("front")) for entry in objects
-    }
+    return {entry["name"]: masks_key(segmenter, entry["category"], clicks[entry["name"]], entry) for entry in objects}
 
 
 def _click(point: dict[str, Any]) -> tuple[int, float, float, int]:

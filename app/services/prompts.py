@@ -166,6 +166,25 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
     return after_change(context, change)
 
 
+def say_of_frame(
+    context: Context, project_id: str, object_id: int, frame: int, body: schemas.FrameIn | None
+) -> schemas.SceneObject:
+    """Set an object right in one frame; None: it is as found there again."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        item = queries.object_row(session, project_id, object_id)
+        check_frame(context, project, frame)
+        others = {number: said for number, said in item.frames.items() if number != str(frame)}
+        said = {} if body is None else {str(frame): body.mask.model_dump() if body.mask is not None else None}
+        what = "as found" if body is None else "painted" if body.mask is not None else "not visible"
+        text = f"{item.name} {what}, frame {frame}"
+        with history.change(session, item, "prompts", "set frame", text, who=context.who, frame=frame):
+            item.frames = others | said
+            session.add(item)
+        change = answered_change(context, session, project, item, infer=True)
+    return after_change(context, change)
+
+
 def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """Compute the object's masks now, also when there are some for these clicks."""
     masks.segment(context, project_id, object_id)
@@ -263,6 +282,10 @@ def _shape(
         can_undo=steps.undo,
         can_redo=steps.redo,
         front=schemas.PromptsFileFront.model_validate(item.front) if item.front is not None else None,
+        frames=[
+            schemas.FrameSaid(frame=int(number), visible=mask is not None)
+            for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))
+        ],
         segment="none",
         mask_frames=0,
         mask_backend="",
@@ -315,11 +338,17 @@ def _point(session: Session, item: SceneObject, point_id: int) -> Point:
     return found
 
 
-def check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
-    """Raise PromptError for a click that is on no frame or outside its image."""
+def check_frame(context: Context, project: Project, frame: int) -> dict[int, dict[str, Any]]:
+    """The table of frames by their numbers; raises PromptError for a number that is none of them."""
     table = {entry["index"]: entry for entry in frame_table(context.files(project))}
     if frame not in table:
         raise PromptError(f"the recording has no frame {frame}", hint=f"its {len(table)} frames are listed under /frames")
+    return table
+
+
+def check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
+    """Raise PromptError for a click that is on no frame or outside its image."""
+    table = check_frame(context, project, frame)
     width, height = table[frame]["width"], table[frame]["height"]
     if not (0 <= x < width and 0 <= y < height):
         raise PromptError(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from r2c2r_core.arrays import Matrix4, Vector3
+from r2c2r_core.geometry.masks import PackedMask
 
 HingeSide = Literal["left", "right", "top", "bottom"]  # as seen by a person facing the front
 
@@ -40,6 +41,14 @@ class DrawnFront:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FrameSaid:
+    """What a person said of an object in one frame: its mask there, painted or kept, or that it is not visible."""
+
+    frame: int
+    mask: PackedMask | None  # at the frame's proportions, at any size; None: not visible
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectPrompt:
     """One object a person named, and clicked or drew."""
 
@@ -47,6 +56,7 @@ class ObjectPrompt:
     category: str
     points: tuple[PromptPoint, ...]
     front: DrawnFront | None = None  # drawn: used as it is, whatever is clicked
+    frames: tuple[FrameSaid, ...] = ()  # at most one a frame; they stand, whatever is found there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,13 +5,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from r2c2r_core.model.inputs import DrawnFront, DrawnHandle, HingeSide, ObjectPrompt, PromptPoint, Prompts
+from r2c2r_core.geometry.masks import PackedMask, pack_mask
+from r2c2r_core.model.inputs import DrawnFront, DrawnHandle, FrameSaid, HingeSide, ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.schema.document import Document
 from r2c2r_core.texts import OBEYED
 
 MOST_OBJECTS, MOST_POINTS = 10_000, 1000
 MOST_FRAMES = 2**31  # as they are stored
 FARTHEST_PX = 100_000  # no image is wider
+MOST_MASK_PX, MOST_RUNS = 20_000, 500_000
 FARTHEST_M = 1000  # no scan reaches farther
 SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
 _SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
@@ -99,6 +101,35 @@ class PromptsFileFront(Document):
         return DrawnFront(corners_capture=corners, handle=handle, hinge=self.hinge)
 
 
+class PromptsFileMask(Document):
+    """A mask of a whole frame by run lengths."""
+
+    width: int = Field(ge=1, le=MOST_MASK_PX, description="a whole number of pixels; the frame's own, or fewer")
+    height: int = Field(ge=1, le=MOST_MASK_PX, description="a whole number of pixels, in the frame's proportion")
+    runs: list[Annotated[int, Field(ge=0)]] = Field(
+        max_length=MOST_RUNS,
+        description="a list of lengths, row by row from the top left: off it, on it, off it and so on",
+    )
+
+    @model_validator(mode="after")
+    def _whole_frame(self) -> "PromptsFileMask":
+        if sum(self.runs) != self.width * self.height:
+            raise ValueError(f"runs of {sum(self.runs)} pixels found, {self.width} x {self.height} expected")
+        return self
+
+    def packed(self) -> PackedMask:
+        """The mask."""
+        on = np.arange(len(self.runs)) % 2 == 1
+        return pack_mask(np.repeat(on, self.runs).reshape(self.height, self.width))
+
+
+class PromptsFileFrame(Document):
+    """What was said of an object in one frame."""
+
+    frame: int = Field(ge=0, lt=MOST_FRAMES, description="a whole number: the frame's number in the recording")
+    mask: PromptsFileMask | None = Field(description="its mask there, which stands; null: it is not visible there")
+
+
 class PromptsFileObject(Document):
     """One object of prompts.json."""
 
@@ -106,12 +137,15 @@ class PromptsFileObject(Document):
     category: Category = Field(description=f"a word such as drawer, of at most {LONGEST} characters")
     points: list[PromptsFilePoint] = Field(max_length=MOST_POINTS, description=f"a list of at most {MOST_POINTS} clicks")
     front: PromptsFileFront | None = Field(default=None, description="from version 2 on: drawn, whatever is clicked")
+    frames: list[PromptsFileFrame] = Field(
+        default_factory=list, max_length=MOST_POINTS, description="from version 2 on: a list of frames, each at most once"
+    )
 
 
 class PromptsFile(Document):
     """prompts.json."""
 
-    version: PromptsVersion = Field(description="1 or 2: 2 where a front is drawn")
+    version: PromptsVersion = Field(description="1 or 2: 2 where a front is drawn or a frame is set right")
     objects: list[PromptsFileObject] = Field(
         max_length=MOST_OBJECTS, description="a list of objects, each with a name of its own"
     )
@@ -125,6 +159,10 @@ class PromptsFile(Document):
             seen.add(item.name)
             if item.front is not None and self.version == 1:
                 raise ValueError(f"a drawn front of '{item.name}' found in version 1, version 2 expected")
+            if item.frames and self.version == 1:
+                raise ValueError(f"frames of '{item.name}' found in version 1, version 2 expected")
+            if len({said.frame for said in item.frames}) < len(item.frames):
+                raise ValueError(f"two of the frames of '{item.name}' have one number, each at most once expected")
         return self
 
     def prompts(self) -> Prompts:
@@ -136,6 +174,10 @@ class PromptsFile(Document):
                     category=item.category,
                     points=tuple(PromptPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in item.points),
                     front=item.front.drawn() if item.front is not None else None,
+                    frames=tuple(
+                        FrameSaid(frame=said.frame, mask=said.mask.packed() if said.mask is not None else None)
+                        for said in item.frames
+                    ),
                 )
                 for item in self.objects
             )

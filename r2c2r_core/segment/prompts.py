@@ -52,6 +52,12 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
             f"{prompt.name}: {found} found, at least one click on it expected", hint="click on the object, or draw its front"
         )
     frames = {frame.index: frame for frame in capture.frames}
+    for said in prompt.frames:
+        if said.frame not in frames:
+            raise PromptError(
+                f"{prompt.name}: frame {said.frame} set right found, a frame of {min(frames)}..{max(frames)} expected",
+                hint="leave it out",
+            )
     for point in prompt.points:
         if point.frame not in frames:
             numbers = sorted(frames)

@@ -7,6 +7,7 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
+from r2c2r_core.segment.corrected import as_found, corrected_track
 from r2c2r_core.segment.protocol import SegmentConfig, Segmenter, SegmentSession
 
 __all__ = ["SEGMENTERS", "SegmentConfig", "open_session", "track_object"]
@@ -66,5 +67,5 @@ def open_session(
 
 
 def track_object(session: SegmentSession, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
-    """The object in every frame that sees it; raises ObjectNotSeen, PromptError."""
-    return session.track(prompt, progress=progress)
+    """The object in every frame that sees it, as a person set it right; raises ObjectNotSeen, PromptError."""
+    return corrected_track(session.track(as_found(prompt), progress=progress), prompt.frames)

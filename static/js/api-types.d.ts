@@ -310,6 +310,11 @@ export interface FoundFront {
   handle: PromptsFileHandle | null;
 }
 
+/** What an object is in one frame: a mask that stands, or None: not visible there. */
+export interface FrameIn {
+  mask: PromptsFileMask | null;
+}
+
 /** One frame; `index` is its number in the recording. Image: /media/{project}/frames/{index}.jpg?w=960&v={media_version}. */
 export interface FrameInfo {
   index: number;
@@ -327,6 +332,12 @@ export interface FrameMask {
   confidence: number;
   source: "live" | "run";
   mask: MaskBits;
+}
+
+/** A frame in which a person set an object right. */
+export interface FrameSaid {
+  frame: number;
+  visible: boolean;
 }
 
 /** Who changed what, when. */
@@ -662,6 +673,12 @@ export interface PromptsFileOutput {
   objects: PromptsFileObjectOutput[];
 }
 
+/** What was said of an object in one frame. */
+export interface PromptsFileFrame {
+  frame: number;
+  mask: PromptsFileMask | null;
+}
+
 /** A front's rectangle, drawn in the elevation of its run: used exactly as it is. */
 export interface PromptsFileFrontInput {
   corners_m: number[][];
@@ -684,12 +701,20 @@ export interface PromptsFileHandle {
   top_m: number;
 }
 
+/** A mask of a whole frame by run lengths. */
+export interface PromptsFileMask {
+  width: number;
+  height: number;
+  runs: number[];
+}
+
 /** One object of prompts.json. */
 export interface PromptsFileObjectInput {
   name: string;
   category: string;
   points: PromptsFilePoint[];
   front?: PromptsFileFrontInput | null;
+  frames?: PromptsFileFrame[];
 }
 
 /** One object of prompts.json. */
@@ -698,6 +723,7 @@ export interface PromptsFileObjectOutput {
   category: string;
   points: PromptsFilePoint[];
   front: PromptsFileFrontOutput | null;
+  frames: PromptsFileFrame[];
 }
 
 /** One click of prompts.json. */
@@ -827,6 +853,7 @@ export interface SceneObject {
   deleted: boolean;
   points: Point[];
   front: PromptsFileFrontOutput | null;
+  frames: FrameSaid[];
   can_undo: boolean;
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
@@ -1097,6 +1124,10 @@ export interface Operations {
   addPoints: { parameters: { project: string; object: number; infer?: boolean }; body: PointsIn; answer: SceneObject };
   /** GET /api/projects/{project}/objects/{object}/cloud */
   getObjectPoints: { parameters: { project: string; object: number }; body: undefined; answer: ObjectPoints };
+  /** DELETE /api/projects/{project}/objects/{object}/frames/{frame} */
+  leaveFrame: { parameters: { project: string; object: number; frame: number }; body: undefined; answer: SceneObject };
+  /** PUT /api/projects/{project}/objects/{object}/frames/{frame} */
+  setFrame: { parameters: { project: string; object: number; frame: number }; body: FrameIn; answer: SceneObject };
   /** GET /api/projects/{project}/objects/{object}/override */
   getOverride: { parameters: { project: string; object: number }; body: undefined; answer: OverrideData };
   /** PATCH /api/projects/{project}/objects/{object}/override */

@@ -4,7 +4,7 @@
  */
 
 /** @import {
- *   CandidateGroup, Comment, CommentIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, UndoRequest, VerdictIn
+ *   CandidateGroup, Comment, CommentIn, FrameIn, ObjectIn, ObjectPatch, OverridePatch, PointIn, PointPatch, Proposals, Reviewed, SceneObject, Undone, UndoRequest, VerdictIn
  * } from "./api-types" */
 
 /**
@@ -51,6 +51,18 @@ export const changeFront = (project, object, wanted, version, seen) => ({
 });
 /** @param {string} project @param {Ref} object @returns {Change<SceneObject>} */
 export const deleteObject = (project, object) => ({ method: "DELETE", path: on(project, object), json: {} });
+/** @param {string} project @param {number} object @param {number} frame @param {FrameIn["mask"]} mask null: not visible there @returns {Change<SceneObject>} */
+export const setFrame = (project, object, frame, mask) => ({
+  method: "PUT",
+  path: `${on(project, object)}/frames/${frame}`,
+  json: { mask },
+});
+/** @param {string} project @param {number} object @param {number} frame @returns {Change<SceneObject>} */
+export const leaveFrame = (project, object, frame) => ({
+  method: "DELETE",
+  path: `${on(project, object)}/frames/${frame}`,
+  json: {},
+});
 /** @param {string} project @param {Ref} object @param {PointIn} point @param {boolean} infer @returns {Change<SceneObject>} */
 export const addPoint = (project, object, point, infer = true) => ({
   method: "POST",

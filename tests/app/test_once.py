@@ -201,6 +201,8 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     first, *_, last = web.get(f"{at}/objects")[0]["points"]
     yield "movePoint", "PATCH", f"{on}/points/{first['id']}", {"x": 11.0}
     yield "deletePoint", "DELETE", f"{on}/points/{last['id']}", None
+    yield "setFrame", "PUT", f"{on}/frames/3", {"mask": None}
+    yield "leaveFrame", "DELETE", f"{on}/frames/3", None
     yield "undo", "POST", f"{at}/undo", {"object": 1}
     yield "redo", "POST", f"{at}/redo", {"object": 1}
     named = {"name": "of_the_file", "category": "mug", "points": [CLICK]}

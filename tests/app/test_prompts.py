@@ -169,3 +169,32 @@ def test_two_people_clicking_at_once_lose_nothing(web: Running) -> None:
     kept = web.get(f"/api/projects/{project}/objects")[0]
     assert sorted(p["x"] for p in kept["points"]) == [*range(12), 80.5]
     assert kept["version"] == 2 + 12
+
+
+def test_what_is_said_of_a_frame_is_stored_exported_undone_and_taken_back(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    item = web.get(f"{at}/objects")[0]
+    here, mask = f"{at}/objects/{item['id']}/frames", {"width": 4, "height": 3, "runs": [1, 2, 9]}
+
+    def put(frame: int, said: Any, status: int = 200) -> Any:
+        answer = web.client.put(f"{here}/{frame}", json={"mask": said})
+        assert answer.status_code == status, answer.text
+        return answer.json()
+
+    before = web.get(f"{at}/prompts.json")
+    assert before["version"] == 1
+    put(3, None)
+    put(7, mask)
+    assert put(0, mask)["frames"] == [{"frame": number, "visible": number != 3} for number in (0, 3, 7)]
+    file = web.get(f"{at}/prompts.json")
+    assert file["version"] == 2
+    assert file["objects"][0]["frames"][1:] == [{"frame": 3, "mask": None}, {"frame": 7, "mask": mask}]
+    assert web.post(f"{at}/undo", {"object": item["id"]})["object"]["frames"] == [
+        {"frame": 3, "visible": False},
+        {"frame": 7, "visible": True},
+    ]
+    assert web.delete(f"{here}/7")["frames"] == [{"frame": 3, "visible": False}]
+    assert len(web.post(f"{at}/undo", {"object": item["id"]})["object"]["frames"]) == 2
+    put(999, None, 422)
+    put(3, {**mask, "runs": [1]}, 422)

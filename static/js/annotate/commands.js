@@ -9,6 +9,7 @@ import { say } from "../elements/toasts.js";
  * @property {import("./edits.js").Edits} edits
  * @property {import("./player.js").Player} player
  * @property {import("./presses.js").Presses} presses
+ * @property {import("./painter.js").Painter} painter
  * @property {import("./objects-pane.js").ObjectsPane} pane
  * @property {import("./evidence-pane.js").EvidencePane} evidence
  * @property {import("./stage-tools.js").StageTools} tools
@@ -25,6 +26,8 @@ export const ONE_A_PRESS = [
   "comment",
   "depth",
   "mosaic",
+  "keep",
+  "absent",
 ];
 
 /**
@@ -69,7 +72,7 @@ function moves({ player, objects, masks }) {
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
-function changes({ objects, edits, player, pane: { proposals }, presses }) {
+function changes({ objects, edits, player, pane: { proposals }, presses, painter }) {
   const deleteLast = () => {
     const last = objects.chosen?.points.findLast((point) => point.frame === player.frame?.index);
     if (last) edits.removePoint(last.id);
@@ -78,6 +81,14 @@ function changes({ objects, edits, player, pane: { proposals }, presses }) {
     undo: () => edits.undoRedo("undo", player.frame?.index),
     redo: () => edits.undoRedo("redo", player.frame?.index),
     "delete-point": deleteLast,
+    brush: () => painter.use("brush"),
+    eraser: () => painter.use("eraser"),
+    lasso: () => painter.use("lasso"),
+    polygon: () => painter.use("polygon"),
+    "thinner-brush": () => painter.resize(0.75),
+    "wider-brush": () => painter.resize(1.35),
+    keep: () => painter.keep(),
+    absent: () => painter.absent(),
     segment: () => edits.segment(),
     "cancel-segment": () => edits.stopSegmenting(),
     "confirm-proposal": () => proposals.confirm(),

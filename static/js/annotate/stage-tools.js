@@ -1,10 +1,23 @@
 /**
  * What lies over the frame's upper edge: how things stand, what a click does, how strong the masks are; on a narrow screen the
- * way to depth, shape and comments. Says "opacity", "sign" and "evidence" when they are changed.
+ * way to depth, shape and comments. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
  */
 
 import { h, segments, slider } from "../dom.js";
 import { SegmenterChip } from "./segmenter-chip.js";
+
+/** @type {[string, string, string][]} */
+const PAINTS = [
+  ["brush", "Brush", "Paint the chosen object's mask in this frame (B)"],
+  ["eraser", "Eraser", "Take away from it (Shift B)"],
+  ["lasso", "Lasso", "Draw around what belongs to it (L)"],
+  ["polygon", "Polygon", "Click its corners, Enter closes it (O)"],
+];
+/** @type {[string, string, string][]} */
+const HERE = [
+  ["keep", "Keep", "Its mask in this frame is right: it stands (W)"],
+  ["absent", "Not here", "It is not visible in this frame; again: as found (A)"],
+];
 
 export class StageTools extends EventTarget {
   segmenter = new SegmenterChip();
@@ -13,6 +26,22 @@ export class StageTools extends EventTarget {
   #adds = h("button", { type: "button" }, "+ Add");
   #takes = h("button", { type: "button" }, "− Take away");
   #evidence = h("button", { type: "button", class: "narrow-only", "aria-expanded": "false" }, "Depth, shape, comments");
+  #paints = segments(
+    "What a drag paints",
+    ...PAINTS.map(([tool, text, title]) =>
+      h(
+        "button",
+        { type: "button", title, "aria-pressed": "false", "data-tool": tool, onClick: () => this.#paint(tool) },
+        text,
+      ),
+    ),
+  );
+  #here = segments(
+    "This frame",
+    ...HERE.map(([what, text, title]) =>
+      h("button", { type: "button", title, onClick: () => this.#paint(what) }, text),
+    ),
+  );
   /** @type {0 | 1} what a click says */
   sign = 1;
   element = h(
@@ -21,6 +50,8 @@ export class StageTools extends EventTarget {
     this.segmenter.element,
     this.#saved,
     h("span", { class: "spring" }),
+    this.#paints,
+    this.#here,
     segments("What a click does", this.#adds, this.#takes),
     slider("Masks", this.#opacity),
     this.#evidence,
@@ -48,6 +79,17 @@ export class StageTools extends EventTarget {
   /** @param {boolean} on whether depth, shape and comments are shown */
   showEvidence(on) {
     this.#evidence.setAttribute("aria-expanded", String(on));
+  }
+
+  /** @param {string | null} tool in use */
+  showTool(tool) {
+    for (const one of this.#paints.querySelectorAll("button"))
+      one.setAttribute("aria-pressed", String(one.dataset.tool === tool));
+  }
+
+  /** @param {string} what */
+  #paint(what) {
+    this.dispatchEvent(new CustomEvent("paint", { detail: what }));
   }
 
   /**

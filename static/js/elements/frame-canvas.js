@@ -1,12 +1,12 @@
 /**
  * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
- * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id.
+ * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id; while a brush is set "paint" path instead of boxes.
  * Zoom with the wheel or two fingers, pan with the middle button, Alt-drag or two fingers; a crosshair moved by arrows
  * replaces the mouse.
  */
 
 import { h, LiveElement } from "../dom.js";
-import { drawBox, drawClick, drawCrosshair, drawPin, isOnClick, isOnPin } from "../lib/frame-marks.js";
+import { drawBox, drawClick, drawPath, drawCrosshair, drawPin, isOnClick, isOnPin } from "../lib/frame-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
 import { Newest } from "../lib/newest.js";
@@ -44,6 +44,10 @@ export class FrameCanvas extends LiveElement {
   /** @type {At | null} */
   #crosshair = null;
   #raw = false;
+  /** @type {{ tool: string, px: number } | null} */
+  #brush = null;
+  /** A stroke being drawn, or the corners of a polygon, in the frame. @type {At[]} */
+  #path = [];
   /** @type {Gestures<Marker>} */
   #gestures = new Gestures();
   /** What a click says: 1 adds, 0 takes away; the right button and Shift say the opposite. @type {0 | 1} */
@@ -112,6 +116,23 @@ export class FrameCanvas extends LiveElement {
     this.#draw();
   }
 
+  /** What a drag paints with, so wide on the screen; null: it draws a box. @param {string | null} tool @param {number} px */
+  setBrush(tool, px) {
+    this.#brush = tool === null ? null : { tool, px };
+    this.#draw();
+  }
+
+  /** @param {At[]} path corners so far */
+  setPath(path) {
+    this.#path = path;
+    this.#draw();
+  }
+
+  /** Pixels of the screen a pixel of the frame. */
+  get scale() {
+    return this.#view.scale;
+  }
+
   fit() {
     this.#view = fit(this.#size, this.#room);
     this.#fitted = true;
@@ -162,8 +183,14 @@ export class FrameCanvas extends LiveElement {
     for (const outline of this.#outlines) drawOutline(context, this.#view, outline);
     for (const marker of this.#markers) drawClick(context, toScreen(this.#view, marker), marker);
     for (const pin of this.#pins) drawPin(context, toScreen(this.#view, pin));
+    if (this.#brush)
+      drawPath(
+        context,
+        this.#path.map((at) => toScreen(this.#view, at)),
+        this.#brush,
+      );
     const { box } = this.#gestures;
-    if (box) drawBox(context, box.from, box.to);
+    if (box && !this.#brush) drawBox(context, box.from, box.to);
     if (this.#crosshair) drawCrosshair(context, toScreen(this.#view, this.#crosshair));
   }
 
@@ -174,7 +201,7 @@ export class FrameCanvas extends LiveElement {
     this.#canvas.setPointerCapture(event.pointerId);
     const at = this.#at(event);
     const pan = event.button === 1 || event.altKey;
-    this.#gestures.press(event.pointerId, at, { pan, held: pan ? null : this.#markerAt(at) });
+    this.#gestures.press(event.pointerId, at, { pan, held: pan || this.#brush ? null : this.#markerAt(at) });
     if (event.button === 1) event.preventDefault();
   }
 
@@ -190,6 +217,9 @@ export class FrameCanvas extends LiveElement {
       this.#see(pinch(this.#view, motion.before, motion.after, this.#least));
     } else if (motion.kind === "carry") {
       Object.assign(motion.held, this.#inFrame(motion.at));
+    } else if (this.#brush && this.#brush.tool !== "polygon") {
+      if (!this.#path.length) this.#path = [this.#inFrame(motion.from)];
+      this.#path.push(this.#inFrame(motion.to));
     }
     this.#draw();
   }
@@ -201,6 +231,7 @@ export class FrameCanvas extends LiveElement {
     const hold = event.ctrlKey || event.metaKey;
     if (meant?.kind === "drop") this.emit("move-point", { id: meant.held.id, ...this.#inFrame(meant.at) });
     else if (meant?.kind === "pick") this.emit("remove-point", { id: meant.held.id });
+    else if (meant?.kind === "box" && this.#brush) this.#endStroke();
     else if (meant?.kind === "box" && event.button === 0)
       this.emit("draw-box", { from: this.#inFrame(meant.from), to: this.#inFrame(meant.to), hold });
     else if (meant?.kind === "click") this.#click(meant.at, event.button === 2 || event.shiftKey, hold);
@@ -217,6 +248,13 @@ export class FrameCanvas extends LiveElement {
     const position = toImage(this.#view, at);
     if (!isInside(position, this.#size)) return;
     this.emit("click-point", { ...position, label: opposite ? 1 - this.sign : this.sign, hold });
+  }
+
+  #endStroke() {
+    const path = this.#path;
+    if (this.#brush?.tool === "polygon") return;
+    this.setPath([]);
+    this.emit("paint", path);
   }
 
   /** @param {PointerEvent} event */

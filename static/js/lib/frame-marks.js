@@ -105,3 +105,25 @@ function stroke(context, width, style) {
   context.strokeStyle = style;
   context.stroke();
 }
+
+/**
+ * A stroke as wide as its brush, or the outline of what a lasso or a polygon will take in.
+ * @param {CanvasRenderingContext2D} context
+ * @param {{ x: number, y: number }[]} path on the screen
+ * @param {{ tool: string, px: number }} brush
+ */
+export function drawPath(context, path, { tool, px }) {
+  if (!path.length) return;
+  const wide = tool === "brush" || tool === "eraser";
+  context.save();
+  context.lineCap = "round";
+  context.lineJoin = "round";
+  context.lineWidth = wide ? px : 2;
+  context.strokeStyle = wide ? (tool === "eraser" ? "rgb(255 95 82 / 50%)" : "rgb(255 255 255 / 50%)") : "#ffffff";
+  context.beginPath();
+  for (const { x, y } of path) context.lineTo(x, y);
+  context.stroke();
+  if (!wide)
+    for (const { x, y } of path.slice(0, tool === "polygon" ? undefined : 0)) context.strokeRect(x - 3, y - 3, 6, 6);
+  context.restore();
+}

@@ -7,6 +7,7 @@ import { Contradictions } from "../annotate/contradictions.js";
 import { Edits } from "../annotate/edits.js";
 import { EvidencePane } from "../annotate/evidence-pane.js";
 import { LiveMasks } from "../annotate/live-masks.js";
+import { Painter } from "../annotate/painter.js";
 import { ObjectsPane } from "../annotate/objects-pane.js";
 import { Picture } from "../annotate/picture.js";
 import { Player } from "../annotate/player.js";
@@ -60,7 +61,8 @@ export class AnnotatePage extends LiveElement {
     canvas: this.#canvas,
     mosaic: this.#mosaic,
   };
-  #commands = new Commands("annotate", actionsOf(this.#parts), ONE_A_PRESS);
+  #painter = new Painter({ ...this.#parts });
+  #commands = new Commands("annotate", actionsOf({ ...this.#parts, painter: this.#painter }), ONE_A_PRESS);
   #picture = new Picture(
     { ...this.#parts, proposals: this.#pane.proposals, comments: this.#evidence.comments },
     this.#canvas,
@@ -68,7 +70,7 @@ export class AnnotatePage extends LiveElement {
   );
 
   connected() {
-    for (const part of [this.#edits, this.#masks, this.#pane, this.#evidence, this.#mosaic])
+    for (const part of [this.#painter, this.#edits, this.#masks, this.#pane, this.#evidence, this.#mosaic])
       part.project = this.project;
     const stage = h("div", { class: "stage" }, this.#canvas, this.#tools.element, this.#tip.element);
     this.replaceChildren(
@@ -105,7 +107,10 @@ export class AnnotatePage extends LiveElement {
 
   #listenToThePicture() {
     const { signal } = this;
-    this.#on(this.#canvas, "click-point", (point) => this.#presses.click(point));
+    this.#on(this.#canvas, "click-point", (point) => this.#painter.click(point) || this.#presses.click(point));
+    this.#on(this.#canvas, "paint", (path) => this.#painter.stroke(path));
+    this.#on(this.#painter, "tool", () => this.#tools.showTool(this.#painter.tool));
+    this.#on(this.#tools, "paint", (tool) => this.act(tool));
     this.#on(this.#canvas, "draw-box", (box) => this.#presses.box(box));
     this.#on(this.#canvas, "move-point", ({ id, x, y }) => this.#edits.movePoint(id, { x, y }));
     this.#on(this.#canvas, "remove-point", ({ id }) => this.#edits.removePoint(id));
@@ -289,6 +294,8 @@ export class AnnotatePage extends LiveElement {
   #onKey(event) {
     if (!isForPage(event)) return;
     if (event.key === "Escape" && this.#presses.pinning) return void (this.#presses.pinning = false);
+    if (event.key === "Escape" && this.#painter.tool) return this.#painter.use(null);
+    if (event.key === "Enter" && this.#painter.close()) return event.preventDefault();
     const click = (/** @type {0 | 1} */ label) =>
       this.#canvas.crosshair && this.#presses.click({ ...this.#canvas.crosshair, label, hold: false });
     if (crosshairKey(event, this.#canvas, click)) return event.preventDefault();

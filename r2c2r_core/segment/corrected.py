@@ -1,0 +1,57 @@
+"""What a person said of an object in single frames stands, whichever segmenter found the rest."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
+from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.segment.protocol import Glimpse
+
+
+def as_found(prompt: ObjectPrompt) -> ObjectPrompt:
+    """What a segmenter is asked: single frames teach it nothing, and setting one right finds nothing anew."""
+    return replace(prompt, frames=())
+
+
+def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
+    """The track with those frames as a person set them right; raises ObjectNotSeen where none is left."""
+    if not said:
+        return track
+    size = next(iter(track.masks.values()))
+    numbers = {one.frame for one in said}
+    painted = {one.frame: _at_size(one.mask, size) for one in said if one.mask is not None}
+    masks = {frame: mask for frame, mask in track.masks.items() if frame not in numbers} | painted
+    if not masks:
+        raise ObjectNotSeen(f"{track.name}: said to be visible in 0 frames, at least 1 expected", hint="take one back")
+    return replace(
+        track,
+        masks=dict(sorted(masks.items())),
+        confidence={frame: 1.0 if frame in painted else track.confidence[frame] for frame in sorted(masks)},
+        opened_m={frame: by for frame, by in track.opened_m.items() if frame not in numbers},
+        swung={frame: swing for frame, swing in track.swung.items() if frame not in numbers},
+    )
+
+
+def corrected_stream(found: Iterator[Glimpse], said: tuple[FrameSaid, ...]) -> Iterator[Glimpse]:
+    """The same, one frame after the other: those that were painted first."""
+    numbers = {one.frame for one in said}
+    for one in said:
+        if one.mask is not None:
+            yield one.frame, one.mask, 1.0
+    for glimpse in found:
+        if glimpse[0] not in numbers:
+            yield glimpse
+
+
+def _at_size(mask: PackedMask, size: PackedMask) -> PackedMask:
+    """The mask at the frames' own size."""
+    if (mask.width, mask.height) == (size.width, size.height):
+        return mask
+    pixels = unpack_mask(mask).astype(np.uint8)
+    grown = cv2.resize(pixels, (size.width, size.height), interpolation=cv2.INTER_NEAREST)
+    return pack_mask(grown > 0)

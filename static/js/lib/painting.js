@@ -1,0 +1,37 @@
+/** Masks as they are painted: one byte a pixel of a whole frame, at any size; no DOM. */
+
+/** @typedef {import("../api-types").MaskBits} MaskBits */
+/** @typedef {{ width: number, height: number, pixels: Uint8Array }} Mask */
+
+/**
+ * The mask of a whole frame, from the bytes of its box.
+ * @param {MaskBits} box
+ * @param {Uint8Array} inside
+ * @returns {Mask}
+ */
+export function wholeMask({ width, height, left, top, box_width, box_height }, inside) {
+  const pixels = new Uint8Array(width * height);
+  for (let y = 0; y < box_height; y++)
+    pixels.set(inside.subarray(y * box_width, (y + 1) * box_width), (top + y) * width + left);
+  return { width, height, pixels };
+}
+
+/**
+ * Lengths of what is off it, on it, off it and so on, row by row: as prompts.json holds it.
+ * @param {Mask} mask
+ */
+export function runsOf({ width, height, pixels }) {
+  /** @type {number[]} */
+  const runs = [];
+  let on = 0;
+  let length = 0;
+  for (const pixel of pixels) {
+    if (Number(pixel > 0) === on) length += 1;
+    else {
+      runs.push(length);
+      on = 1 - on;
+      length = 1;
+    }
+  }
+  return { width, height, runs: [...runs, length] };
+}

@@ -1,0 +1,77 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.geometry.masks import pack_mask, unpack_mask
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import FrameSaid
+from r2c2r_core.segment.corrected import corrected_stream
+from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.prompts import parse_prompts
+from r2c2r_core.segment.stage import track_object
+from tests.core.segment.conftest import Truth
+from tests.core.segment.scenes import FRONT_Y, HEIGHT, WIDTH, click_on, prompt
+
+Boxes = tuple[Capture, Truth]
+SMALL = np.zeros((HEIGHT // 4, WIDTH // 4), bool)
+SMALL[10:20, 30:50] = True
+
+
+def test_what_was_said_of_a_frame_stands_and_the_others_are_as_found(session: GeometricSession, boxes: Boxes) -> None:
+    found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
+    first, second, *others = sorted(session.track(found).masks)
+    said = (FrameSaid(frame=first, mask=None), FrameSaid(frame=second, mask=pack_mask(SMALL)))
+    track = track_object(session, replace(found, frames=said))
+    assert set(track.masks) == {second, *others}
+    np.testing.assert_array_equal(unpack_mask(track.masks[second]), np.kron(SMALL, np.ones((4, 4), bool)))
+    assert track.confidence[second] == 1.0
+    assert track.masks[others[0]] == session.track(found).masks[others[0]]
+
+
+def test_one_that_is_visible_nowhere_is_told(session: GeometricSession, boxes: Boxes) -> None:
+    found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
+    said = tuple(FrameSaid(frame=frame.index, mask=None) for frame in boxes[0].frames)
+    with pytest.raises(ObjectNotSeen, match="visible in 0 frames"):
+        track_object(session, replace(found, frames=said))
+
+
+def test_a_frame_that_the_recording_has_not_is_refused(session: GeometricSession, boxes: Boxes) -> None:
+    found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
+    session.find(found)
+    with pytest.raises(PromptError, match="frame 61 set right found"):
+        session.find(replace(found, frames=(FrameSaid(frame=61, mask=None),)))
+
+
+def test_painted_frames_come_first_and_once() -> None:
+    mask, other = pack_mask(SMALL), pack_mask(~SMALL)
+    said = (FrameSaid(frame=3, mask=None), FrameSaid(frame=5, mask=mask))
+    found = iter([(5, other, 0.4), (3, other, 0.5), (7, other, 0.6)])
+    assert list(corrected_stream(found, said)) == [(5, mask, 1.0), (7, other, 0.6)]
+
+
+def document(**mask: Any) -> dict[str, Any]:
+    point = {"frame": 60, "x": 100.0, "y": 50.5, "label": 1}
+    frames = [{"frame": 3, "mask": None}, {"frame": 5, "mask": {"width": 4, "height": 2, "runs": [1, 2, 5], **mask}}]
+    return {"version": 2, "objects": [{"name": "mug", "category": "mug", "points": [point], "frames": frames}]}
+
+
+def test_a_mask_is_read_from_its_runs() -> None:
+    absent, painted = parse_prompts(document()).objects[0].frames
+    assert absent == FrameSaid(frame=3, mask=None)
+    assert painted.mask is not None
+    np.testing.assert_array_equal(unpack_mask(painted.mask), [[False, True, True, False], [False] * 4])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (document(runs=[1, 2]), "runs of 3 pixels found, 4 x 2 expected"),
+        ({**document(), "version": 1}, "frames of 'mug' found in version 1, version 2 expected"),
+    ],
+)
+def test_wrong_masks_are_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(PromptError, match=message):
+        parse_prompts(wrong)
