@@ -47,15 +47,11 @@ class Layout:
 
 
 def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floor_found: bool) -> Layout:
-    """Align the runs, settle what stands, solve for shared lines without overlaps, settle again."""
+    """Align the runs, settle what stands, solve for shared lines without overlaps."""
     params = tuned(Params)
     placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
-    for i, item in enumerate(placed):
-        lower = settled(item, placed, floor_found=floor_found)
-        if not _collides(lower, [other for other in placed if other is not item]):
-            placed[i] = lower
     moves = {
         before.name: float(np.linalg.norm(anchor(after) - anchor(before)))
         for before, after in zip(objects, placed, strict=True)
@@ -133,11 +129,6 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
                 continue
             found.append((i, j, d))
     return found
-
-
-def _collides(item: MeasuredObject, others: Sequence[MeasuredObject]) -> bool:
-    """Whether the object comes nearer to another than it may, other than by standing on it."""
-    return any(0 in pair[:2] for pair in overlapping_pairs([item, *others]))
 
 
 def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:
