@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points
@@ -14,10 +13,9 @@ from r2c2r_core.generate.consistency import VIEWS_KEPT, render_depth, sensor_dep
 from r2c2r_core.generate.evidence import View, moved_edge
 from r2c2r_core.generate.unseen import fill_unseen, own_texels, spread_colours
 from r2c2r_core.geometry.camera import project, sample_nearest
+from r2c2r_core.geometry.texels import bilinear_colours
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.tuning import param, tuned
-
-_REMAP_WIDTH = 1024  # cv2.remap needs each side below 32767
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,7 +188,7 @@ def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple
     surface, measured = both[:, 0], both[:, 1]
     hidden = noise.occluded(measured, z, params.sensor_gap_m)
     beyond = noise.seen_through(measured, z, params.sensor_gap_m) & grazing
-    return _sample_bilinear(photo.view.rgb, uv), inside & in_mask & (z < surface + params.hidden_m) & ~hidden & ~beyond
+    return bilinear_colours(photo.view.rgb, uv), inside & in_mask & (z < surface + params.hidden_m) & ~hidden & ~beyond
 
 
 def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:
@@ -252,15 +250,3 @@ def _median_shown(grey: np.ndarray, shown: np.ndarray) -> np.ndarray:
     ordered.sort(axis=1)
     middle = np.maximum(shown.sum(axis=0) - 1, 0) // 2
     return np.asarray(ordered[np.arange(len(middle)), middle])
-
-
-def _sample_bilinear(image: Image, uv_px: np.ndarray) -> Colours:
-    """Colours at continuous pixel positions; outside gives the border."""
-    count = len(uv_px)
-    rows = -(-count // _REMAP_WIDTH)
-    x, y = (np.zeros(rows * _REMAP_WIDTH, np.float32) for _ in range(2))
-    limited = np.clip(np.nan_to_num(uv_px), -1e4, 1e4)
-    x[:count], y[:count] = limited[:, 0] - 0.5, limited[:, 1] - 0.5
-    shape = (rows, _REMAP_WIDTH)
-    colours = cv2.remap(image, x.reshape(shape), y.reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(colours.reshape(-1, 3)[:count])

@@ -12,7 +12,7 @@ import numpy as np
 from r2c2r_core.arrays import Colours, Faces, Image, Points, TextureCoords
 from r2c2r_core.errors import OverrideError
 from r2c2r_core.geometry.meshes import closest_on_mesh
-from r2c2r_core.geometry.raster import sample_texture
+from r2c2r_core.geometry.texels import texture_colours
 
 SUFFIXES = (".glb", ".obj", ".ply", ".stl")
 
@@ -163,10 +163,7 @@ def _part_colours(part: MeshPart, points: Points, face: np.ndarray) -> Colours:
     weights = _barycentric(points, corners)
     if part.uv is not None and part.texture is not None:
         uv = (part.uv[part.faces[face]] * weights[..., None]).sum(axis=1) % 1.0
-        rows = -(-len(uv) // 1024)
-        padded = np.zeros((rows * 1024, 2))
-        padded[: len(uv)] = uv
-        return sample_texture(part.texture, padded.reshape(rows, 1024, 2)).reshape(-1, 3)[: len(uv)]
+        return texture_colours(part.texture, uv)
     blended = (part.vertex_colours[part.faces[face]] * weights[..., None]).sum(axis=1)
     return np.asarray(np.round(blended).clip(0, 255).astype(np.uint8))
 

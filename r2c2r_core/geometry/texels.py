@@ -1,18 +1,23 @@
-"""Texture colours at a list of uv coordinates."""
+"""Colours at a list of places in an image: OpenCV's sampler, which wants pictures of places."""
 
+import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image
 
+_WIDTH = 1024  # cv2.remap needs each side below 32767
+
 
 def texture_colours(texture: Image, uv: np.ndarray) -> np.ndarray:
-    """Bilinear colours (n, 3), float 0..255, at uv (n, 2); v = 0 is the bottom row, borders are repeated."""
+    """Bilinear colours (n, 3), uint8, at uv (n, 2); v = 0 is the bottom row, borders are repeated."""
     height, width = texture.shape[:2]
-    x = np.clip(uv[:, 0] * width - 0.5, 0, width - 1)
-    y = np.clip((1.0 - uv[:, 1]) * height - 0.5, 0, height - 1)
-    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    wx, wy = (x - left)[:, None], (y - top)[:, None]
-    upper = texture[top, left] * (1 - wx) + texture[top, right] * wx
-    lower = texture[bottom, left] * (1 - wx) + texture[bottom, right] * wx
-    return np.asarray(upper * (1 - wy) + lower * wy)
+    return bilinear_colours(texture, np.column_stack([uv[:, 0] * width, (1.0 - uv[:, 1]) * height]))
+
+
+def bilinear_colours(image: Image, uv_px: np.ndarray) -> np.ndarray:
+    """Bilinear colours (n, 3), uint8, at continuous pixel positions (n, 2); outside gives the border."""
+    count = len(uv_px)
+    places = np.zeros((-(-count // _WIDTH) * _WIDTH, 2), np.float32)
+    places[:count] = np.clip(np.nan_to_num(uv_px), -1e4, 1e4) - 0.5
+    x, y = (np.ascontiguousarray(column).reshape(-1, _WIDTH) for column in places.T)
+    return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(-1, 3)[:count])
