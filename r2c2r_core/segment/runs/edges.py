@@ -13,7 +13,7 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """How a cut is refined by colour."""
 
-    inside_m: float = param(0.010, "m", "inside the cut, where an edge is looked for")
+    inside_m: float = param(0.0125, "m", "inside the cut, where an edge is looked for")
     outside_m: float = param(0.010, "m", "outside the cut, where an edge is looked for")
     depth_ends_m: float = param(0.008, "m", "depth that stops this far short of the cut moves the search there")
     depth_short_m: float = param(
@@ -90,6 +90,8 @@ def _end(
     least = max(params.clear * own, params.least_gradient)
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
+    while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
+        last -= 1  # the flank of what lies farther in
     peaks = _peaks(gradient[first:last], least)
     if not peaks:  # the cut followed depth, which ends before the panel does
         first, last = max(round(low - params.depth_short_m / cell_m), 1), first + 2

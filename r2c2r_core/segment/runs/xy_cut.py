@@ -39,7 +39,7 @@ class Params:
     short_m: float = param(0.45, "m", "lines across less must be clearer: a knob alone is a third of a drawer")
     least_known: float = param(0.5, "share", "of a line's blocks that must be known")
     uneven_m: float = param(0.025, "m", "neighbours may be cut that differently across")
-    enough_z: float = param(3.2, "σ", "prominence that is always enough: strong grain must not outlaw every line")
+    enough_z: float = param(2.6, "σ", "prominence that is always enough: strong grain must not outlaw every line")
     even_z: float = param(0.06, "σ", "deviation of a profile, at least")
     shown_z: float = param(1.0, "σ", "of a block that shows the line")
     widest_front_m: float = param(0.98, "m", "width of a front, at most")

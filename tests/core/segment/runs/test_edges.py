@@ -34,6 +34,11 @@ def test_an_edge_is_where_colour_changes_though_depth_ends_3_cm_short_of_it() ->
     assert edges(mosaic((PANEL, BLUE)), PANEL, short) == true  # the cut followed colour
 
 
+def test_a_cut_10_mm_outside_the_panel_finds_its_edge() -> None:
+    outside = Cell(56, 56, 264, 304)
+    assert edges(mosaic((PANEL, BLUE)), outside, outside) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
+
+
 def in_shade(colour: tuple[int, int, int], share: float) -> tuple[int, int, int]:
     red, green, blue = (round(value * share ** (1 / 2.2)) for value in colour)
     return red, green, blue

@@ -34,6 +34,16 @@ def test_a_line_from_edge_to_edge_is_a_seam_and_one_that_ends_short_of_both_is_n
     assert len(cut(240, 60, [(96, 12, 48)], [])) == 1  # the end of a drawer's handle
 
 
+def test_a_seam_stands_out_from_strong_grain_around_it() -> None:
+    rng = np.random.default_rng(0)
+    grain = evidence(480, 288, [])
+    grain.score[:] = np.clip(rng.normal(0.2, 0.6, (1, 480)), -0.5, 2.0)  # upright lines from end to end, faint
+    grain.score[:, 230:250] = 0.3
+    grain.score[:, 240] = 3.6  # the seam
+    cells = cut_panels(grain, evidence(288, 480, []), np.full((288, 480, 3), 128, np.uint8), CELL_M)
+    assert sorted((round(cell.left), round(cell.right)) for cell in cells) == [(0, 240), (240, 480)]
+
+
 def test_handles_that_are_level_do_not_cut_two_units_at_once() -> None:
     handles = [(90, 36, 204), (90, 276, 444)]
     cells = cut(480, 288, [(240, 0, 288)], handles)
