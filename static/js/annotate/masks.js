@@ -40,10 +40,12 @@ export class Masks {
     for (const key of [...this.#masks.keys()]) if (key.startsWith(`${object}/`)) this.#masks.delete(key);
   }
 
-  /** @param {number} object */
-  forget(object) {
+  /** All of an object, or its mask in one frame. @param {number} object @param {number} [frame] */
+  forget(object, frame) {
+    if (frame !== undefined) return void this.#masks.delete(`${object}/${frame}`);
     this.restart(object);
     this.#lanes.delete(object);
+    return undefined;
   }
 
   /**

@@ -6,8 +6,9 @@
 import * as changes from "../changes.js";
 import { say } from "../elements/toasts.js";
 import { decodeBox } from "../lib/masks.js";
-import { runsOf, wholeMask } from "../lib/painting.js";
+import { encoded, runsOf, wholeMask } from "../lib/painting.js";
 
+/** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {import("../lib/painting.js").Mask} Mask */
 /** @typedef {"brush" | "eraser" | "lasso" | "polygon"} Tool */
 /** @typedef {{ x: number, y: number }} Spot in pixels of the frame */
@@ -92,7 +93,8 @@ export class Painter extends EventTarget {
     const change = said
       ? changes.leaveFrame(this.project, object.id, frame)
       : changes.setFrame(this.project, object.id, frame, null);
-    this.#store(change, said ? "as found again" : "not visible");
+    this.#local = null;
+    this.#store(change, `${object.name}: ${said ? "as found again" : "not visible"} in frame ${frame}`);
     return undefined;
   }
 
@@ -108,36 +110,49 @@ export class Painter extends EventTarget {
     if (!now) return void say("Choose an object first.");
     this.#work = this.#work.then(async () => {
       const mask = alter(await this.#maskOf(now), now.size);
-      this.#local = { object: now.object.id, frame: now.frame, mask, version: null };
-      this.#store(changes.setFrame(this.project, now.object.id, now.frame, runsOf(mask)), "set right");
+      this.#local = { object: now.object.id, frame: now.frame, mask, bits: await encoded(mask), version: null };
+      this.#store(changes.setFrame(this.project, now.object.id, now.frame, runsOf(mask)));
+      this.#known.masks.forget(now.object.id, now.frame);
+      this.dispatchEvent(new CustomEvent("painted", { detail: now.frame }));
     });
   }
 
-  /** What was painted last: it may not have come back yet. @type {{ object: number, frame: number, mask: Mask, version: number | null } | null} */
+  /** What was painted last: it may not have come back yet. @type {{ object: number, frame: number, mask: Mask, bits: MaskBits, version: number | null } | null} */
   #local = null;
+
+  /** Show what was painted last until it comes back. */
+  restore() {
+    const last = this.#local;
+    if (!last || !this.#isNewest(last) || this.#known.masks.on(last.object, last.frame)) return;
+    const { object, frame, bits } = last;
+    this.#known.masks.receive({ object, frame, confidence: 1, source: "live", mask: bits });
+  }
+
+  /** Whether nothing was changed about the object since. @param {{ object: number, version: number | null }} last */
+  #isNewest({ object, version }) {
+    return version === null || version === this.#known.objects.get(object)?.version;
+  }
 
   /** @param {{ object: { id: number }, frame: number, size: { width: number, height: number } }} now @returns {Promise<Mask>} */
   async #maskOf({ object, frame, size }) {
     const known = this.#known.masks.on(object.id, frame)?.mask;
     const last = this.#local;
-    const version = this.#known.objects.get(object.id)?.version;
-    if (last?.object === object.id && last.frame === frame && (last.version ?? version) === version) return last.mask;
+    if (last?.object === object.id && last.frame === frame && this.#isNewest(last)) return last.mask;
     if (known) return wholeMask(known, await decodeBox(known));
     const width = Math.min(PREVIEW_PX, size.width);
     const height = Math.max(Math.round((size.height * width) / size.width), 1);
     return { width, height, pixels: new Uint8Array(width * height) };
   }
 
-  /** @param {import("../changes.js").Change<import("../api-types").SceneObject>} change @param {string} what */
-  #store(change, what) {
-    const { object, frame } = this.#now ?? {};
+  /** @param {import("../changes.js").Change<import("../api-types").SceneObject>} change @param {string} [text] */
+  #store(change, text) {
     this.#known.edits.save(change).then(
       (stored) => {
-        this.#known.objects.answered(stored);
         if (this.#local?.object === stored.id) this.#local.version = stored.version;
-        say(`${object?.name ?? "It"}: ${what} in frame ${frame}`);
+        this.#known.objects.answered(stored);
+        if (text) say(text);
       },
-      () => {}, // said where it was refused
+      () => (this.#local = null), // said where it was refused
     );
   }
 

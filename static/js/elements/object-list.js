@@ -139,8 +139,8 @@ export class ObjectList extends LiveElement {
  * @param {boolean} current
  */
 function state(object, current) {
-  if (!object.points.length) return "no click yet";
-  const clicks = counted(object.points.length, "click");
+  if (!object.points.length && !object.front) return "no click yet";
+  const clicks = object.front ? "drawn" : counted(object.points.length, "click");
   if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
   if (object.mask_frames) {

@@ -35,3 +35,17 @@ export function runsOf({ width, height, pixels }) {
   }
   return { width, height, runs: [...runs, length] };
 }
+
+/**
+ * As masks come from the server: zlib of packed bits, here of the whole frame.
+ * @param {Mask} mask
+ * @returns {Promise<MaskBits>}
+ */
+export async function encoded({ width, height, pixels }) {
+  const packed = new Uint8Array(Math.ceil(pixels.length / 8));
+  for (let i = 0; i < pixels.length; i++) if (pixels[i]) packed[i >> 3] = (packed[i >> 3] ?? 0) | (128 >> (i & 7));
+  const stream = new Blob([packed]).stream().pipeThrough(new CompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const bits = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  return { width, height, left: 0, top: 0, box_width: width, box_height: height, bits };
+}

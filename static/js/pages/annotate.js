@@ -110,6 +110,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#canvas, "click-point", (point) => this.#painter.click(point) || this.#presses.click(point));
     this.#on(this.#canvas, "paint", (path) => this.#painter.stroke(path));
     this.#on(this.#painter, "tool", () => this.#tools.showTool(this.#painter.tool));
+    this.#on(this.#painter, "painted", (frame) => this.#drawMasks(frame));
     this.#on(this.#tools, "paint", (tool) => this.act(tool));
     this.#on(this.#canvas, "draw-box", (box) => this.#presses.box(box));
     this.#on(this.#canvas, "move-point", ({ id, x, y }) => this.#edits.movePoint(id, { x, y }));
@@ -269,6 +270,7 @@ export class AnnotatePage extends LiveElement {
 
   /** @param {number | null} of the frame whose masks changed; null: of many */
   #drawMasks(of) {
+    this.#painter.restore();
     this.#picture.drawMasks(of);
     const { frame } = this.#player;
     if (frame && (of ?? frame.index) === frame.index) this.#contradictions.lookSoon(frame);

@@ -1,0 +1,57 @@
+"""A mask painted, kept and said not to be there in one frame, taken back, and in prompts.json."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_together import sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path) as running:
+        yield running
+
+
+def said(page: Page) -> list[dict[str, Any]]:
+    """What prompts.json says of the first object's frames."""
+    project = page.url.split("/p/")[1].split("/")[0]
+    file = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
+    frames: list[dict[str, Any]] = file["objects"][0].get("frames", [])
+    return frames
+
+
+def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Annotate").click()
+    canvas = page.locator("r2c2r-frame-canvas canvas")
+    page.get_by_role("button", name="Brush").wait_for()
+    page.keyboard.press("1")
+    page.keyboard.press("b")
+    expect(page.get_by_role("button", name="Brush")).to_have_attribute("aria-pressed", "true")
+    box = canvas.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x - 60, y)
+    page.mouse.down()
+    page.mouse.move(x + 60, y, steps=5)
+    page.mouse.up()
+    saved = page.locator(".stage-tools .chip").nth(1)
+    expect(saved).to_contain_text("saved")
+    (painted,) = said(page)
+    assert sum(painted["mask"]["runs"]) == painted["mask"]["width"] * painted["mask"]["height"]
+    assert sum(painted["mask"]["runs"][1::2]) > 0
+    page.keyboard.press("Escape")
+    page.keyboard.press("a")
+    expect(page.locator(".toast")).to_contain_text("not visible")
+    assert said(page) == [{"frame": painted["frame"], "mask": None}]
+    page.keyboard.press("Control+z")
+    expect(page.locator(".toast").last).to_contain_text("Undone")
+    assert said(page) == [painted]
+    context.close()
