@@ -12,7 +12,7 @@ from r2c2r_core.ingest.stage import IngestConfig
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import Overrides, Prompts
 from r2c2r_core.overrides import NO_OVERRIDES
-from r2c2r_core.pipeline import Request, reconstruct
+from r2c2r_core.pipeline import Request, doubts_about, reconstruct
 from r2c2r_core.workspace import Workspace
 from tests.core.ingest.tiny import TinyRoom, write_r3d
 
@@ -85,3 +85,13 @@ def test_what_a_person_says_of_the_room_moves_it_and_decodes_nothing(
     np.testing.assert_allclose(after.surface.vertices_world, moved.apply(before.surface.vertices_world), atol=1e-9)
     for new, old in zip(after.frames, before.frames, strict=True):
         np.testing.assert_allclose(new.world_from_camera.matrix, (moved @ old.world_from_camera).matrix, atol=1e-9)
+
+
+def test_the_doctor_looks_at_the_recording_as_the_run_will_read_it(scan: Path, tmp_path: Path) -> None:
+    config = replace(FAR, params={"cloud": {"most_blocks": 40_000}, "doctor.verdict": {"frames": (1000, 2000)}})
+    work = Workspace(tmp_path / "work")
+    request = Request(source=scan, prompts=Prompts(objects=()), config=ReconstructConfig(ingest=config))
+    doubts = doubts_about(request, work)
+    assert any(f"only {len(ROOM.poses())} frames" in reason for reason in doubts.reasons)
+    again = Workspace(tmp_path / "work")
+    assert read(scan, again, config)[1] == ()
