@@ -5,6 +5,7 @@ import {
   around,
   cornersOf,
   decoded,
+  handleAfter,
   handleAt,
   likelyCategory,
   nearestEdge,
@@ -97,6 +98,14 @@ test("a handle stays on its front, upright beside a door's side and lying on a d
   assert.ok(door.right_m <= 0.3 + 1e-9);
   const drawer = handleAt({ left: 0, right: 0.6, top: 0, bottom: 0.15 }, { x: 0.3, y: 0.05 });
   assert.ok(drawer.right_m - drawer.left_m > drawer.top_m - drawer.bottom_m);
+});
+
+test("a handle stays where it is when an edge is moved, and goes with the front", () => {
+  const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
+  const wider = handleAfter(box, RECT, { ...RECT, right: 1, bottom: 0.92 });
+  assert.deepEqual(wider, { left_m: 0.1, right_m: 0.12, bottom_m: 0.15, top_m: 0.31 });
+  assert.equal(handleAfter(box, RECT, { ...RECT, left: 0.3, right: 0.9 }), box);
+  assert.equal(handleAfter("none", RECT, { ...RECT, right: 1 }), "none");
 });
 
 test("what a front is follows from its shape and height", () => {

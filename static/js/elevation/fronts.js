@@ -13,10 +13,10 @@ import { newKey, outbox } from "../outbox.js";
 /** @typedef {{ name?: string, category?: string, front?: Drawn }} Wanted */
 /** @typedef {{ category: string, corners: number[][], handle?: "none" | null }} Making */
 /**
- * `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
+ * `seen` is the handle that was found; `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
  * @typedef {{
  *   key: string, id: number | null, name: string, category: string, colour: number, version: number, corners: number[][],
- *   handle: Drawn["handle"], hinge: Drawn["hinge"], drawn: boolean, pending: number,
+ *   handle: Drawn["handle"], seen: FoundFront["handle"], hinge: Drawn["hinge"], drawn: boolean, pending: number,
  * }} Front
  */
 
@@ -89,7 +89,8 @@ export class Fronts extends EventTarget {
       colour: object.colour,
       version: object.version,
       corners,
-      handle: object.front?.handle ?? found?.handle ?? null,
+      handle: object.front?.handle ?? null,
+      seen: found?.handle ?? null,
       hinge: object.front?.hinge ?? null,
       drawn: object.front !== null,
       pending: 0,
@@ -178,6 +179,7 @@ export class Fronts extends EventTarget {
       version: 0,
       corners,
       handle,
+      seen: null,
       hinge: null,
       drawn: true,
       pending: 1,

@@ -232,6 +232,32 @@ export function handleAt(rect, at) {
 }
 
 /**
+ * A drawn handle stays where it is when an edge is moved, and goes with a front that is moved as a whole.
+ * @template {Box | "none" | null} T
+ * @param {T} handle
+ * @param {Rect} before
+ * @param {Rect} after
+ * @returns {T | Box}
+ */
+export function handleAfter(handle, before, after) {
+  if (handle === null || handle === "none" || sameSize(before, after)) return handle;
+  const [from, to] = [middleOf(before), middleOf(after)];
+  const box = /** @type {Box} */ (handle);
+  const [right, up] = [from.x - to.x, to.y - from.y];
+  return {
+    left_m: round(box.left_m + right),
+    right_m: round(box.right_m + right),
+    bottom_m: round(box.bottom_m + up),
+    top_m: round(box.top_m + up),
+  };
+}
+
+/** @param {Rect} a @param {Rect} b */
+function sameSize(a, b) {
+  return Math.abs(widthOf(a) - widthOf(b)) < 1e-4 && Math.abs(heightOf(a) - heightOf(b)) < 1e-4;
+}
+
+/**
  * What a front of that shape and height most likely is.
  * @param {Rect} rect
  * @param {number} top height of the plane's upper end above the floor, metres

@@ -221,7 +221,7 @@ export class ElevationPage extends LiveElement {
       ...front,
       paint: this.#paint(front),
       chosen: chosen.has(front.key),
-      handle: typeof front.handle === "string" ? null : (front.handle ?? null),
+      handle: front.handle === "none" ? null : (front.handle ?? front.seen),
       hinge: front.hinge ?? null,
       overlaps: here.some((other) => other.key !== front.key && plane.overlap(other.rect, front.rect)),
     }));
@@ -273,11 +273,13 @@ export class ElevationPage extends LiveElement {
   /** @param {string} key @param {Rect} rect */
   #place(key, rect) {
     const front = this.#fronts.get(key);
-    if (!front || !this.#elevation) return;
+    const elevation = this.#elevation;
+    const before = elevation && front && plane.rectOf(elevation, front.corners);
+    if (!before) return;
     this.#fronts.choose(key);
-    this.#fronts.do({
-      change: [{ front, wanted: { front: { ...drawnOf(front), corners_m: plane.cornersOf(this.#elevation, rect) } } }],
-    });
+    const handle = plane.handleAfter(front.handle ?? null, before, rect);
+    const corners_m = plane.cornersOf(elevation, rect);
+    this.#fronts.do({ change: [{ front, wanted: { front: { ...drawnOf(front), corners_m, handle } } }] });
   }
 
   /** All chosen fronts, as one gesture. @param {(front: Front) => import("../elevation/fronts.js").Wanted | false} want */
