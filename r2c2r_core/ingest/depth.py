@@ -20,13 +20,30 @@ def usable_depth(
     near_m: float,
     far_m: float,
 ) -> DepthMetres:
-    """The depth with every pixel that cannot be believed set to 0: unknown, out of range, unsure or flying."""
+    """The depth with every pixel that cannot be believed set to 0: unknown, out of range, unsure or flying.
+
+    A sensor is never sure of what is two or three pixels wide: its ridge is believed one level of confidence below.
+    """
     depth = np.nan_to_num(metres, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32, copy=False)
-    keep = (depth >= near_m) & (depth <= far_m)
+    depth = np.where((depth >= near_m) & (depth <= far_m), depth, np.float32(0))
     if confidence is not None:
-        keep &= confidence >= least_confidence
-    depth = np.where(keep, depth, np.float32(0))
+        nearly = np.where(confidence >= max(least_confidence - 1, 1), depth, np.float32(0))
+        depth = np.where((confidence >= least_confidence) | ridges(nearly), nearly, np.float32(0))
     return np.where(flying_pixels(depth, camera), np.float32(0), depth)
+
+
+def ridges(depth_m: DepthMetres) -> Mask:
+    """Pixels on what is up to four wide and stands before farther surface on both sides, along a row or a column."""
+    valid = depth_m > 0
+    for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
+    step, margin = _least_step(depth_m), 0.3 * _most_margin(depth_m)
+    found = np.zeros(depth_m.shape, dtype=bool)
+    for axis in (0, 1):
+        low, _ = _range(for_min, for_max, 2, across=axis == 1)
+        sides = np.stack([np.roll(for_max, k, axis) for k in (-4, -3, -2, -1, 1, 2, 3, 4)])
+        behind = np.minimum(sides[:4].max(axis=0), sides[4:].max(axis=0))
+        found |= (depth_m < low + margin) & (behind > depth_m + step)
+    return found & valid
 
 
 def flying_pixels(depth_m: DepthMetres, camera: Intrinsics, *, grazing_deg: float = 84.0) -> Mask:
@@ -39,9 +56,7 @@ def flying_pixels(depth_m: DepthMetres, camera: Intrinsics, *, grazing_deg: floa
     valid = depth_m > 0
     for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
     flying = np.zeros(depth_m.shape, dtype=bool)
-    squared = depth_m * depth_m  # sensor noise grows with it (Kinect: 1.4 mm/m^2 one sigma)
-    least_step = 0.05 + 0.006 * squared  # handles stand out by 3 to 5 cm and are only a pixel or two wide: keep every one
-    most_margin = 0.015 + 0.004 * squared
+    least_step, most_margin = _least_step(depth_m), _most_margin(depth_m)
     for across, focal in ((True, camera.fx), (False, camera.fy)):
         low, high = _range(for_min, for_max, 2, across)
         wide_low, wide_high = _range(for_min, for_max, 4, across)
@@ -72,6 +87,16 @@ def fill_for_display(depth_m: DepthMetres) -> DepthMetres:
         raise CaptureError("a depth image without one known pixel cannot be filled", hint="choose another frame")
     rows, columns = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     return np.asarray(depth_m[rows, columns])
+
+
+def _least_step(depth_m: DepthMetres) -> DepthMetres:
+    """Between two surfaces, metres: handles stand out by 3 to 5 cm and are only a pixel or two wide: keep every one."""
+    return np.float32(0.05) + np.float32(0.006) * depth_m * depth_m
+
+
+def _most_margin(depth_m: DepthMetres) -> DepthMetres:
+    """Of noise, metres, which grows with the squared distance (Kinect: 1.4 mm/m^2 one sigma)."""
+    return np.float32(0.015) + np.float32(0.004) * depth_m * depth_m
 
 
 def _range(for_min: np.ndarray, for_max: np.ndarray, radius: int, across: bool) -> tuple[np.ndarray, np.ndarray]:

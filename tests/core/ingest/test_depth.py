@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.camera import Intrinsics
-from r2c2r_core.ingest.depth import decode_depth, encode_depth, fill_for_display, flying_pixels, usable_depth
+from r2c2r_core.ingest.depth import decode_depth, encode_depth, fill_for_display, flying_pixels, ridges, usable_depth
 
 CAMERA = Intrinsics(fx=193.0, fy=193.0, cx=96.0, cy=128.0, width=192, height=256)  # a phone's LiDAR
 
@@ -44,6 +44,25 @@ def test_a_bar_handle_12_mm_thick_stays(distance):
     on_bar = depth < distance - 0.02
     assert on_bar.sum() > 200
     assert (flying_pixels(depth, CAMERA) & on_bar).sum() < 0.03 * on_bar.sum()
+
+
+@pytest.mark.parametrize("width_m", [0.02, 0.028])
+def test_a_bottles_neck_stays_though_the_sensor_is_unsure_of_it(width_m):
+    """A phone's LiDAR gives medium confidence to each pixel near a step: of a neck 28 mm wide, to all of them."""
+    _, x = grid()
+    neck = np.abs(x - 380) < width_m / 2 / 1.4 * 193 * 4
+    depth = mixed(scene(1.7, 1.4, neck), noise=0.002)
+    unsure = cv2.dilate((np.abs(np.gradient(depth, axis=1)) > 0.02).astype(np.uint8), np.ones((3, 3))) > 0
+    confidence = np.where(unsure, 1, 2).astype(np.uint8)
+    usable = usable_depth(depth, confidence, CAMERA, least_confidence=2, near_m=0.1, far_m=8.0)
+    assert ((usable > 0) & (usable < 1.6)).any(axis=1).mean() > 0.95
+
+
+def test_the_edge_of_what_is_wide_is_no_ridge():
+    """There the sensor's doubt is about where the edge is, and a sure pixel beside it shows the surface."""
+    _, x = grid()
+    depth = mixed(scene(2.0, 1.4, x < 380))
+    assert ridges(depth).mean() < 1e-3
 
 
 def test_a_chair_leg_before_a_far_wall_stays():
