@@ -10,8 +10,9 @@ import pytest
 
 from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import BackendUnavailable, Cancelled, EnvironmentProblem, ObjectNotSeen
-from r2c2r_core.geometry.masks import PackedMask
+from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.ledger import Kept, Ledger, Reached
+from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.workspace import Workspace, content_key, file_key, write_atomically
 
@@ -36,6 +37,23 @@ def test_a_second_run_computes_nothing(tmp_path: Path) -> None:
 def test_a_changed_prompt_recomputes_only_its_object(tmp_path: Path) -> None:
     run(tmp_path, {"a": 1, "b": 2})
     assert run(tmp_path, {"a": 1, "b": 3}).computed == ["segment/b"]
+
+
+def test_a_prompt_with_a_painted_mask_is_computed_again_once_a_pixel_of_it_changes(tmp_path: Path) -> None:
+    def computed(mask: np.ndarray) -> list[str]:
+        said = (FrameSaid(frame=0, mask=pack_mask(mask)),)
+        prompt = ObjectPrompt(name="a", category="drawer", points=(), frames=said)
+        work = Workspace(tmp_path)
+        Ledger(work, SILENT).each("segment", lambda prompt, progress: noun(1), ["a"], {"a": prompt})
+        return work.computed
+
+    painted = np.zeros((8, 8), dtype=bool)
+    painted[[1, 6], [1, 6]] = True
+    other = painted.copy()
+    other[3, 3] = True  # in the same box: the bits alone tell
+    assert computed(painted) == ["segment/a"]
+    assert computed(painted) == []
+    assert computed(other) == ["segment/a"]
 
 
 def test_a_damaged_file_is_computed_again(tmp_path: Path) -> None:
