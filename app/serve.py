@@ -120,6 +120,7 @@ def new_address(data_dir: Path) -> str:
 def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path, workdir: Path) -> str:
     """A finished workspace as a project, read where it is; the same workspace is the same project. Returns its id."""
     from app.jobs.ingest import describe
+    from r2c2r_core.segment.prompts import checked_prompts
     from r2c2r_core.workspace import Workspace, write_atomically
 
     data_dir, workdir = resolved(data_dir), resolved(workdir)
@@ -137,7 +138,7 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
         write_atomically(files.finished_prompts, json.dumps(document).encode())
         adopt_capture(project, files)
         if found is None:
-            adopt_prompts(session, project, document, settings.user)
+            adopt_prompts(session, project, checked_prompts(document), settings.user)
         if (workdir / "bundle.zip").is_file():
             adopt_bundle(session, project, files, project.inputs)
         session.add(project)

@@ -135,13 +135,14 @@ class Desk:
             check_prompt(self.capture, prompt)
             asked = as_found(prompt)
             glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # it may be of a frame that is set right
+            first = self._shown(glimpsed) if glimpsed is not None else None
             masks = corrected_stream(iter(self.session.stream(asked)), prompt.frames)
         except Exception as error:
-            _fail(number, key, _named(error))
+            _say(object=number, key=key, **_failed(error))
             return
         with self._changed:
-            if glimpsed is not None:
-                self._show(number, key, glimpsed)
+            if first is not None:
+                _say(object=number, key=key, **first)
             self._open[number] = _Followed(key, asked, masks, glimpsed)
             self._changed.notify()
 
@@ -183,33 +184,29 @@ class Desk:
             _say(proposals=[proposal_line(proposal, self.width) for proposal in found], fraction=round(fraction, 3))
 
     def _segment_step(self, number: int, followed: _Followed) -> None:
-        failure: R2C2RError | None = None
         found: Glimpse | None = None
         try:
             found = next(followed.masks, None)
+            said = self._shown(found) if found is not None else {"end": "done", "front": self._front(followed.prompt)}
         except Exception as error:  # one object must not take the others with it
-            failure = _named(error)
+            found, said = None, _failed(error)
         with self._changed:
             if self._open.get(number) is not followed:
                 return  # superseded or cancelled meanwhile
             if found is None:
                 del self._open[number]
-            if failure is not None:
-                _fail(number, followed.key, failure)
-            elif found is None:
-                _say(object=number, key=followed.key, end="done", front=self._front(followed.prompt))
-            elif found != followed.glimpsed:
-                self._show(number, followed.key, found)
+            if found is None or found != followed.glimpsed:
+                _say(object=number, key=followed.key, **said)
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
         panel = self.session.panel(prompt)
         return front_line(panel, self.capture.world_from_capture) if panel is not None else None
 
-    def _show(self, number: int, key: str, found: Glimpse) -> None:
+    def _shown(self, found: Glimpse) -> dict[str, Any]:
         frame, packed, confidence = found
         share = packed.area_px / max(packed.width * packed.height, 1)
         mask = mask_bits(packed, self.width)
-        _say(object=number, key=key, frame=int(frame), confidence=round(float(confidence), 4), area=round(share, 6), mask=mask)
+        return {"frame": int(frame), "confidence": round(float(confidence), 4), "area": round(share, 6), "mask": mask}
 
 
 def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
@@ -250,8 +247,8 @@ def _named(error: Exception) -> R2C2RError:
     return R2C2RError(f"unexpected: {error}", hint="see the log of the live segmenter")
 
 
-def _fail(number: int, key: str, error: R2C2RError) -> None:
-    _say(object=number, key=key, end="failed", error=told(error))
+def _failed(error: Exception) -> dict[str, Any]:
+    return {"end": "failed", "error": told(_named(error))}
 
 
 def _read_commands(commands: Commands) -> None:

@@ -18,7 +18,8 @@ from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
 from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
-from r2c2r_core.segment.prompts import parse_prompts
+from r2c2r_core.schema.prompts import PromptsFile
+from r2c2r_core.segment.prompts import checked_prompts
 from r2c2r_core.workspace import write_atomically
 
 
@@ -44,7 +45,7 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
     adopt_capture(project, files)
     session.add(project)
     if not live_objects(session, project.id):
-        adopt_prompts(session, project, json.loads((files.source / "prompts.json").read_text()), job.who)
+        adopt_prompts(session, project, checked_prompts(json.loads((files.source / "prompts.json").read_text())), job.who)
 
 
 def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
@@ -118,26 +119,27 @@ def adopt_capture(project: Project, files: ProjectFiles) -> None:
     shutil.rmtree(files.previews, ignore_errors=True)
 
 
-def adopt_prompts(session: Session, project: Project, document: dict[str, Any], who: str) -> list[SceneObject]:
+def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: str) -> list[SceneObject]:
     """Add the objects of a prompts.json; one whose name is taken gets the file's clicks and category."""
     known = {item.name: item for item in live_objects(session, project.id)}
     colours = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
     items = []
-    for prompt, entry in zip(parse_prompts(document).objects, document["objects"], strict=True):
-        item = known.get(prompt.name)
+    for entry in file.objects:
+        item = known.get(entry.name)
         if item is None:
-            item = SceneObject(project_id=project.id, name=prompt.name, category=prompt.category, colour=colours, deleted=True)
+            item = SceneObject(project_id=project.id, name=entry.name, category=entry.category, colour=colours, deleted=True)
             session.add(item)
             session.flush()
             colours += 1
-        with history.change(session, item, "prompts", "import", f"imported {prompt.name}", who=who):
-            item.deleted, item.category, item.front = False, prompt.category, entry.get("front")
-            item.frames = {str(said["frame"]): said["mask"] for said in entry.get("frames", ())}
+        with history.change(session, item, "prompts", "import", f"imported {entry.name}", who=who):
+            item.deleted, item.category = False, entry.category
+            item.front = entry.front.model_dump() if entry.front is not None else None
+            item.frames = {str(said.frame): said.mask.model_dump() if said.mask is not None else None for said in entry.frames}
             session.add(item)
             for old in session.exec(select(Point).where(Point.object_id == item.id)):
                 session.delete(old)
             session.flush()
-            session.add_all(Point(object_id=item.id or 0, frame=p.frame, x=p.x, y=p.y, label=p.label) for p in prompt.points)
+            session.add_all(Point(object_id=item.id or 0, frame=p.frame, x=p.x, y=p.y, label=p.label) for p in entry.points)
         items.append(item)
     return items
 

@@ -6,7 +6,7 @@ from app.db.documents import prompt_entry, prompts_version
 from app.db.engine import reading, writing
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
-from app.services.prompts import after_change, change_of, check_point
+from app.services.prompts import after_change, change_of, check_point, check_said
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
@@ -25,6 +25,8 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
         for entry in body.objects:
             for point in entry.points:
                 check_point(context, project, point.frame, point.x, point.y)
-        items = adopt_prompts(session, project, body.model_dump(), context.who)
+            for said in entry.frames:
+                check_said(context, project, entry.name, said.frame, said.mask)
+        items = adopt_prompts(session, project, body, context.who)
         changes = [change_of(context, session, project, item, infer=False) for item in items]
     return [after_change(context, change) for change in changes]

@@ -15,6 +15,8 @@ from app.services import masks
 from app.services.context import Context
 from app.services.projects import frame_table
 from r2c2r_core.errors import PromptError
+from r2c2r_core.schema.prompts import PromptsFileMask
+from r2c2r_core.segment.prompts import check_mask_size
 
 
 class Change(NamedTuple):
@@ -173,7 +175,8 @@ def say_of_frame(
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        check_frame(context, project, frame)
+        if body is not None:  # whatever is said of a frame that is not there can be taken back
+            check_said(context, project, item.name, frame, body.mask)
         others = {number: said for number, said in item.frames.items() if number != str(frame)}
         said = {} if body is None else {str(frame): body.mask.model_dump() if body.mask is not None else None}
         what = "as found" if body is None else "painted" if body.mask is not None else "not visible"
@@ -344,6 +347,13 @@ def check_frame(context: Context, project: Project, frame: int) -> dict[int, dic
     if frame not in table:
         raise PromptError(f"the recording has no frame {frame}", hint=f"its {len(table)} frames are listed under /frames")
     return table
+
+
+def check_said(context: Context, project: Project, name: str, frame: int, mask: PromptsFileMask | None) -> None:
+    """Raise PromptError for a frame that the recording lacks, and for a mask that does not fit it."""
+    entry = check_frame(context, project, frame)[frame]
+    if mask is not None:
+        check_mask_size(f"{name}: frame {frame}", mask, (entry["width"], entry["height"]))
 
 
 def check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:

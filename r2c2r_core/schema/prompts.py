@@ -13,7 +13,9 @@ from r2c2r_core.texts import OBEYED
 MOST_OBJECTS, MOST_POINTS = 10_000, 1000
 MOST_FRAMES = 2**31  # as they are stored
 FARTHEST_PX = 100_000  # no image is wider
-MOST_MASK_PX, MOST_RUNS = 20_000, 500_000
+LONGEST_SIDE_PX, MOST_RUNS = 20_000, 500_000  # of a mask
+MOST_MASK_PX = 64_000_000  # no camera of a phone has more
+MOST_PAINTED_PX = 4_000_000_000  # of all masks of a file: some 6000 at the size the app paints them
 FARTHEST_M = 1000  # no scan reaches farther
 SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
 _SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
@@ -104,8 +106,8 @@ class PromptsFileFront(Document):
 class PromptsFileMask(Document):
     """A mask of a whole frame by run lengths."""
 
-    width: int = Field(ge=1, le=MOST_MASK_PX, description="a whole number of pixels; the frame's own, or fewer")
-    height: int = Field(ge=1, le=MOST_MASK_PX, description="a whole number of pixels, in the frame's proportion")
+    width: int = Field(ge=1, le=LONGEST_SIDE_PX, description="a whole number of pixels; the frame's own, or fewer")
+    height: int = Field(ge=1, le=LONGEST_SIDE_PX, description="a whole number of pixels, in the frame's proportion")
     runs: list[Annotated[int, Field(ge=0)]] = Field(
         max_length=MOST_RUNS,
         description="a list of lengths, row by row from the top left: off it, on it, off it and so on",
@@ -113,6 +115,8 @@ class PromptsFileMask(Document):
 
     @model_validator(mode="after")
     def _whole_frame(self) -> "PromptsFileMask":
+        if self.width * self.height > MOST_MASK_PX:  # some bytes of runs stand for any number of pixels
+            raise ValueError(f"a mask of {self.width} x {self.height} found, at most {MOST_MASK_PX} pixels expected")
         if sum(self.runs) != self.width * self.height:
             raise ValueError(f"runs of {sum(self.runs)} pixels found, {self.width} x {self.height} expected")
         return self
@@ -163,6 +167,10 @@ class PromptsFile(Document):
                 raise ValueError(f"frames of '{item.name}' found in version 1, version 2 expected")
             if len({said.frame for said in item.frames}) < len(item.frames):
                 raise ValueError(f"two of the frames of '{item.name}' have one number, each at most once expected")
+        masks = [said.mask for item in self.objects for said in item.frames if said.mask is not None]
+        painted_px = sum(mask.width * mask.height for mask in masks)
+        if painted_px > MOST_PAINTED_PX:
+            raise ValueError(f"masks of {painted_px} pixels in all found, at most {MOST_PAINTED_PX} expected")
         return self
 
     def prompts(self) -> Prompts:

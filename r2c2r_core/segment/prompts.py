@@ -7,11 +7,12 @@ from typing import Any
 
 from r2c2r_core.documents import read_json
 from r2c2r_core.errors import PromptError
+from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, Prompts
 from r2c2r_core.schema.document import checked
-from r2c2r_core.schema.prompts import PromptsFile
+from r2c2r_core.schema.prompts import PromptsFile, PromptsFileMask
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 _HINT = "see `r2c2r sample` for one"
@@ -24,7 +25,12 @@ def read_prompts(path: Path) -> Prompts:
 
 def parse_prompts(document: Any, where: str = "prompts") -> Prompts:
     """The same, from a decoded JSON document that `where` names."""
-    return checked(PromptsFile, document, where, PromptError, hint=_HINT).prompts()
+    return checked_prompts(document, where).prompts()
+
+
+def checked_prompts(document: Any, where: str = "prompts") -> PromptsFile:
+    """The same as it is written: nothing is unpacked."""
+    return checked(PromptsFile, document, where, PromptError, hint=_HINT)
 
 
 def check_prompts(capture: Capture, prompts: Prompts) -> None:
@@ -58,6 +64,9 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
                 f"{prompt.name}: frame {said.frame} set right found, a frame of {min(frames)}..{max(frames)} expected",
                 hint="leave it out",
             )
+        if said.mask is not None:
+            camera = frames[said.frame].rgb_camera
+            check_mask_size(f"{prompt.name}: frame {said.frame}", said.mask, (camera.width, camera.height))
     for point in prompt.points:
         if point.frame not in frames:
             numbers = sorted(frames)
@@ -72,6 +81,17 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
                 f"0 <= x < {camera.width} and 0 <= y < {camera.height} expected",
                 hint="click inside the image",
             )
+
+
+def check_mask_size(where: str, mask: PackedMask | PromptsFileMask, frame_px: tuple[int, int]) -> None:
+    """Raise PromptError for a mask that is larger than its frame (width, height) or, but for rounding, of other proportions."""
+    width, height = frame_px
+    slanted = abs(mask.width * height - mask.height * width) > max(width, height) / 2  # half a pixel of the mask
+    if mask.width > width or mask.height > height or slanted:
+        raise PromptError(
+            f"{where}: a mask of {mask.width} x {mask.height} found, {width} x {height} or smaller in that proportion expected",
+            hint="paint it over the whole frame",
+        )
 
 
 def without_hinge(prompt: ObjectPrompt) -> ObjectPrompt:

@@ -11,6 +11,7 @@ import pytest
 
 from app.jobs import live_segment
 from app.jobs.live_segment import Desk
+from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.model.inputs import ObjectPrompt
@@ -127,6 +128,43 @@ def test_clicks_that_a_later_one_replaces_are_not_looked_at(desk: Any, said: lis
     until(lambda: said and said[-1].get("end") == "done")
     assert desk.session.looked == [7.0]
     assert {line["key"] for line in said} == {"1-7"}
+
+
+def test_one_whose_masks_or_front_cannot_be_shown_fails_alone(
+    desk: Any, said: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def panel(prompt: ObjectPrompt) -> None:
+        if prompt.name == "o1":
+            raise MemoryError
+
+    def bits(packed: PackedMask, width: int) -> Any:
+        if packed.area_px == 7:
+            raise MemoryError
+        return mask_bits(packed, width)
+
+    monkeypatch.setattr(desk.session, "panel", panel)
+    monkeypatch.setattr(live_segment, "mask_bits", bits)
+    monkeypatch.setattr(desk.session, "glimpse", lambda prompt: None)
+    desk.session.gate.set()
+    desk.start()
+    for number, x, end in ((1, 20.0, "failed"), (2, 7.0, "failed"), (3, 10.0, "done")):
+        desk.put(click(number, x))
+        until(lambda: said and "end" in said[-1])
+        assert (said[-1]["object"], said[-1]["end"]) == (number, end)
+        said.clear()
+
+
+def test_a_first_look_that_cannot_be_shown_fails_its_object_alone(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.session.gate.set()
+    desk.start()
+    broken = SimpleNamespace(area_px=1, width=80, height=60)  # no bits in it
+    look = desk.session.glimpse
+    desk.session.glimpse = lambda prompt: (0, broken, 0.5)
+    desk.put(click(1, 20.0))
+    until(lambda: said and said[-1].get("end") == "failed")
+    desk.session.glimpse = look
+    desk.put(click(2, 10.0))
+    until(lambda: said[-1].get("end") == "done")
 
 
 def test_a_cancelled_object_says_so_and_nothing_after(desk: Any, said: list[dict[str, Any]]) -> None:

@@ -1,6 +1,8 @@
 from collections.abc import Callable
 from typing import Any
 
+from app.db import queries
+from app.db.engine import writing
 from tests.app.conftest import Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
@@ -198,3 +200,26 @@ def test_what_is_said_of_a_frame_is_stored_exported_undone_and_taken_back(web: R
     assert len(web.post(f"{at}/undo", {"object": item["id"]})["object"]["frames"]) == 2
     put(999, None, 422)
     put(3, {**mask, "runs": [1]}, 422)
+
+
+def test_a_mask_of_other_proportions_than_its_frame_is_refused(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    item = web.get(f"{at}/objects")[0]
+    wide = {"width": 16, "height": 9, "runs": [144]}  # on a frame of 160 x 120
+    answer = web.client.put(f"{at}/objects/{item['id']}/frames/3", json={"mask": wide})
+    assert answer.status_code == 422
+    assert "frame 3: a mask of 16 x 9 found, 160 x 120 or smaller" in answer.json()["message"]
+    entry = {"name": "mug_9", "category": "mug", "points": [CLICK], "frames": [{"frame": 3, "mask": wide}]}
+    web.post(f"{at}/prompts.json", {"version": 2, "objects": [entry]}, 422)
+
+
+def test_what_is_said_of_a_frame_that_the_recording_lacks_is_neither_imported_nor_kept_for_good(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    entry = {"name": "mug_9", "category": "mug", "points": [CLICK], "frames": [{"frame": 999, "mask": None}]}
+    web.post(f"{at}/prompts.json", {"version": 2, "objects": [entry]}, 422)
+    item = web.get(f"{at}/objects")[0]
+    with writing(web.context.engine) as session:  # as an import left it before
+        queries.object_row(session, project, item["id"]).frames = {"999": None}
+    assert web.delete(f"{at}/objects/{item['id']}/frames/999")["frames"] == []

@@ -10,7 +10,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import FrameSaid
 from r2c2r_core.segment.corrected import corrected_stream
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.prompts import parse_prompts
+from r2c2r_core.segment.prompts import check_mask_size, check_prompt, checked_prompts, parse_prompts
 from r2c2r_core.segment.stage import track_object
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import FRONT_Y, HEIGHT, WIDTH, click_on, prompt
@@ -45,6 +45,22 @@ def test_a_frame_that_the_recording_has_not_is_refused(session: GeometricSession
         session.find(replace(found, frames=(FrameSaid(frame=61, mask=None),)))
 
 
+@pytest.mark.parametrize("size", [(WIDTH // 4, HEIGHT // 4 - 2), (2 * WIDTH, 2 * HEIGHT)])
+def test_a_mask_that_would_be_stretched_onto_its_frame_is_refused(boxes: Boxes, size: tuple[int, int]) -> None:
+    found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
+    check_prompt(boxes[0], replace(found, frames=(FrameSaid(frame=60, mask=pack_mask(SMALL)),)))
+    other = pack_mask(np.ones(size[::-1], bool))
+    with pytest.raises(PromptError, match=f"door_b: frame 60: a mask of {size[0]} x {size[1]} found, {WIDTH} x {HEIGHT}"):
+        check_prompt(boxes[0], replace(found, frames=(FrameSaid(frame=60, mask=other),)))
+
+
+@pytest.mark.parametrize("frame_px", [(1920, 1440), (1440, 1920), (1296, 968), (641, 479), (160, 120)])
+def test_a_mask_rounded_to_whole_pixels_fits_its_frame(frame_px: tuple[int, int]) -> None:
+    for width in (1, 2, 97, frame_px[0] - 1, frame_px[0]):
+        height = max(round(frame_px[1] * width / frame_px[0]), 1)
+        check_mask_size("", pack_mask(np.ones((height, width), bool)), frame_px)
+
+
 def test_painted_frames_come_first_and_once() -> None:
     mask, other = pack_mask(SMALL), pack_mask(~SMALL)
     said = (FrameSaid(frame=3, mask=None), FrameSaid(frame=5, mask=mask))
@@ -58,6 +74,17 @@ def document(**mask: Any) -> dict[str, Any]:
     return {"version": 2, "objects": [{"name": "mug", "category": "mug", "points": [point], "frames": frames}]}
 
 
+def many_masks(count: int) -> dict[str, Any]:
+    mask = {"width": 8000, "height": 8000, "runs": [64_000_000]}
+    written = document()
+    written["objects"][0]["frames"] = [{"frame": number, "mask": mask} for number in range(count)]
+    return written
+
+
+def test_the_size_of_all_masks_is_checked_before_one_is_unpacked() -> None:
+    assert len(checked_prompts(many_masks(62)).objects[0].frames) == 62
+
+
 def test_a_mask_is_read_from_its_runs() -> None:
     absent, painted = parse_prompts(document()).objects[0].frames
     assert absent == FrameSaid(frame=3, mask=None)
@@ -69,6 +96,8 @@ def test_a_mask_is_read_from_its_runs() -> None:
     ("wrong", "message"),
     [
         (document(runs=[1, 2]), "runs of 3 pixels found, 4 x 2 expected"),
+        (document(width=20_000, height=20_000, runs=[400_000_000]), "a mask of 20000 x 20000 found, at most 64000000 pixels"),
+        (many_masks(63), "masks of 4032000000 pixels in all found, at most 4000000000 expected"),
         ({**document(), "version": 1}, "frames of 'mug' found in version 1, version 2 expected"),
     ],
 )
