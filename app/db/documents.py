@@ -2,11 +2,13 @@
 
 from typing import Any
 
+from pydantic import ValidationError
 from sqlmodel import Session
 
-from app.db.keys import drawn_of, overrides_entry
+from app.db.keys import Drawn, drawn_of, overrides_entry
 from app.db.queries import Click, clicks_by_object, live_objects, overrides_by_object
 from app.db.tables import SceneObject
+from r2c2r_core.schema.prompts import PromptsFileFront
 
 
 def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
@@ -20,7 +22,20 @@ def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
 def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
     """One object of prompts.json."""
     points = [{"frame": c.frame, "x": c.x, "y": c.y, "label": c.label} for c in clicks]
-    return {"name": item.name, "category": item.category, "points": points, **drawn_of(item)}
+    return {"name": item.name, "category": item.category, "points": points, **_readable(drawn_of(item))}
+
+
+def readable_front(front: dict[str, Any]) -> dict[str, Any]:
+    """A stored front; its handle is looked for where merging fronts had left it outside, which no reader takes any more."""
+    try:
+        PromptsFileFront.model_validate(front)
+    except ValidationError:
+        return front | {"handle": None}
+    return front
+
+
+def _readable(drawn: Drawn) -> Drawn:
+    return drawn | {"front": readable_front(drawn["front"])} if "front" in drawn else drawn
 
 
 def prompts_version(objects: list[dict[str, Any]]) -> int:

@@ -8,6 +8,7 @@ from sqlmodel import Session, select
 
 from app import schemas
 from app.db import history, once, queries
+from app.db.documents import readable_front
 from app.db.engine import reading, writing
 from app.db.tables import Point, Project, SceneObject
 from app.errors import Conflict, NotFound
@@ -284,7 +285,7 @@ def _shape(
         points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
         can_undo=steps.undo,
         can_redo=steps.redo,
-        front=schemas.PromptsFileFront.model_validate(item.front) if item.front is not None else None,
+        front=schemas.PromptsFileFront.model_validate(readable_front(item.front)) if item.front is not None else None,
         frames=[
             schemas.FrameSaid(frame=int(number), visible=mask is not None)
             for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))

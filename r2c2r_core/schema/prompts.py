@@ -19,6 +19,7 @@ MOST_PAINTED_PX = 4_000_000_000  # of all masks of a file: some 6000 at the size
 FARTHEST_M = 1000  # no scan reaches farther
 SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
 _SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
+_OVER_M = 0.002  # by which a handle may reach over its front
 LONGEST = 60  # characters of a name: a mesh's file name holds it twice, and file systems end at 255 bytes
 
 
@@ -66,6 +67,11 @@ class PromptsFileHandle(Document):
             raise ValueError("a handle without width or height found, left_m < right_m and bottom_m < top_m expected")
         return self
 
+    def within(self, width_m: float, height_m: float) -> bool:
+        """Whether it lies on a front of that size."""
+        across, up = width_m / 2 + _OVER_M, height_m / 2 + _OVER_M
+        return -across <= self.left_m and self.right_m <= across and -up <= self.bottom_m and self.top_m <= up
+
 
 class PromptsFileFront(Document):
     """A front's rectangle, drawn in the elevation of its run: used exactly as it is."""
@@ -94,6 +100,9 @@ class PromptsFileFront(Document):
         slant_m = abs(across @ down) / max(sides)
         if np.abs(corners[0] + across + down - corners[2]).max() > _SQUARE_M or slant_m > _SQUARE_M:
             raise ValueError("corners of no rectangle found, top left, top right, bottom right, bottom left expected")
+        if isinstance(self.handle, PromptsFileHandle) and not self.handle.within(*sides):
+            found = " by ".join(f"{side:.3f}" for side in sides)
+            raise ValueError(f"a handle outside its front of {found} m found, a box within it expected")
         return self
 
     def drawn(self) -> DrawnFront:
