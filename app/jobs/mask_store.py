@@ -17,6 +17,7 @@ from r2c2r_core.workspace import write_atomically
 Entry = dict[str, Any]  # of one frame: {"frame", "confidence", "area", "mask"}
 
 _TAIL_BYTES = 1 << 16  # the last line of a file of some 1000 masks
+OUTDATED = "outdated"  # done before a file said what flat front was found
 _END = b'{"end"'
 _INDEX_BYTES = 40  # of a frame in memory
 
@@ -24,7 +25,7 @@ _INDEX_BYTES = 40  # of a frame in memory
 class Masks(Protocol):
     """The masks computed for one state of an object's clicks."""
 
-    end: str | None  # done | failed | cancelled; None when it never came to an end
+    end: str | None  # done | failed | cancelled | OUTDATED; None when it never came to an end
     error: dict[str, Any] | None
     front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
 
@@ -186,6 +187,8 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
     found.front = line.get("front")
+    if found.end == "done" and "front" not in line:
+        found.end = OUTDATED
     index = line.get("index", [])  # numbers, in files of before they were packed
     rows = np.frombuffer(base64.b64decode(index), "<f8") if isinstance(index, str) else np.array(index, float)
     found.index = rows.reshape(-1, 5)

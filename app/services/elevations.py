@@ -43,9 +43,5 @@ def found_fronts(context: Context, project_id: str) -> list[schemas.FoundFront]:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
     places = masks.Places.of(context.files(project))
-    known = [(item.id or 0, masks.found_of(context, project, item, places)) for item in items]
-    return [
-        schemas.FoundFront(object=number, **found.masks.front)
-        for number, found in known
-        if found is not None and found.masks.front is not None
-    ]
+    known = [(item.id or 0, masks.front_of(context, project, item, places)) for item in items]
+    return [schemas.FoundFront(object=number, **front) for number, front in known if front is not None]

@@ -67,9 +67,14 @@ def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
     """Start preparing the live segmenter."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
+        items = queries.live_objects(session, project_id)
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
-    context.live.open(project_id, context.files(project), project.segmenter)
+    places = Places.of(context.files(project))
+    context.live.open(project_id, places.files, project.segmenter)
+    for item in items:
+        if _outdated(found_of(context, project, item, places)):
+            segment(context, project_id, item.id or 0)
     return context.live.status(project_id)
 
 
@@ -198,6 +203,19 @@ def found_of(
     return Found("failed" if stored.end == "failed" else "partial", stored, "live")
 
 
+def front_of(context: Context, project: Project, item: SceneObject, places: Places) -> dict[str, Any] | None:
+    """The object's flat front: as its masks were drawn with it, else as the last run measured it from the same clicks."""
+    found = found_of(context, project, item, places)
+    if found is None or found.masks.front is not None or found.source == "run":
+        return found.masks.front if found is not None else None
+    run = _run_masks(places.files, item, project.segmenter, context.settings.preview_width)
+    return run.front if run is not None else None
+
+
+def _outdated(found: Found | None) -> bool:
+    return found is not None and found.masks.end == mask_store.OUTDATED
+
+
 def _frame_mask(number: int, found: Found, entry: Entry) -> FrameMask:
     shown = {"object": number, "frame": entry["frame"], "confidence": entry["confidence"]}
     return shown | {"source": found.source, "mask": entry["mask"]}
@@ -230,7 +248,8 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
     if not noun.is_file():
         return None
     kept = files.previews / "masks" / f"{item.name}-{noun.stat().st_mtime_ns:x}.jsonl"
-    if not kept.is_file():
+    found = _stored(kept)
+    if found is None or found.end != "done":
         track: MaskTrack | None = Workspace(files.work).load_latest("segment", item.name)
         if track is None:
             return None
@@ -238,7 +257,7 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
             older.unlink(missing_ok=True)
         front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
         mask_store.write(kept, _entries(track, width), track.backend, front)
-    found = _stored(kept)
+        found = _stored(kept)
     return found if found is not None and found.backend == segmenter else None
 
 

@@ -1,12 +1,21 @@
+import json
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app.db import queries
+from app.db.engine import reading, writing
+from app.files import ProjectFiles
 from app.jobs.front_wire import front_line
+from app.jobs.mask_store import mask_path
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
+from tests.app.nouns import track
 
 CORNERS = [[0.0, 2.0, 0.8], [0.6, 2.0, 0.8], [0.6, 2.0, 0.1], [0.0, 2.0, 0.1]]
 FRONT: dict[str, Any] = {"corners_m": CORNERS, "handle": "none", "hinge": "left"}
@@ -95,6 +104,66 @@ def test_prompts_json_holds_what_was_drawn_and_is_read_again(web: Running) -> No
 def test_what_is_no_rectangle_is_refused(web: Running, corners: Any) -> None:
     project = web.sample()
     web.post(f"/api/projects/{project}/objects", {"front": {"corners_m": corners}}, 422)
+
+
+OUTSIDE = {"left_m": 0.29, "bottom_m": 0.0, "right_m": 0.31, "top_m": 0.1}
+
+
+def test_a_handle_outside_its_front_is_refused_and_one_stored_before_is_looked_for(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", DRAWN, 201)
+    here = f"{at}/objects/{made['id']}"
+    web.patch(here, {"front": {**FRONT, "handle": {**OUTSIDE, "right_m": 0.3}}})
+    answer = web.client.patch(here, json={"front": {**FRONT, "handle": OUTSIDE}})
+    assert answer.status_code == 422
+    assert "a handle outside its front of 0.600 by 0.700 m found" in answer.text
+    with writing(web.context.engine) as session:
+        queries.object_row(session, project, made["id"]).front = {**FRONT, "handle": OUTSIDE}
+    assert web.get(f"{at}/objects")[-1]["front"]["handle"] is None
+    assert web.get(f"{at}/prompts.json")["objects"][-1]["front"]["hinge"] == "left"
+
+
+def clicked(web: Running) -> tuple[str, ProjectFiles, Path]:
+    """A project whose first object's masks are done, and where they are."""
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    number = web.get(f"{at}/objects")[0]["id"]
+    web.post(f"{at}/objects/{number}/segment")
+    web.until(lambda: web.get(f"{at}/objects")[0]["segment"] == "done")
+    with reading(web.context.engine) as session:
+        files = web.context.files(queries.project_row(session, project))
+        key = queries.object_row(session, project, number).masks_key
+    return at, files, mask_path(files.masks, number, key)
+
+
+def without_front(path: Path) -> None:
+    """The file as it was written before it said what front was found."""
+    *lines, end = path.read_text().splitlines()
+    older = {key: value for key, value in json.loads(end).items() if key != "front"}
+    path.write_text("\n".join([*lines, json.dumps(older)]) + "\n")
+
+
+def test_a_front_that_the_last_run_measured_is_shown_where_live_masks_have_none(web: Running) -> None:
+    at, files, _ = clicked(web)
+    assert web.get(f"{at}/elevations/fronts") == []
+    front = FrontPanel(world_from_front=Rigid3(), width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
+    found = replace(track("drawer_1"), front=front)
+    Workspace(files.work).save("segment", "drawer_1", found, {"key": "k", "seconds": 1.0})
+    files.finished_prompts.write_text(json.dumps(web.get(f"{at}/prompts.json")))
+    (shown,) = web.get(f"{at}/elevations/fronts")
+    (kept,) = (files.previews / "masks").iterdir()
+    without_front(kept)
+    assert web.get(f"{at}/elevations/fronts") == [shown]
+
+
+def test_masks_of_before_fronts_were_kept_are_made_anew_when_the_scan_is_opened(web: Running) -> None:
+    at, _, path = clicked(web)
+    without_front(path)
+    assert web.get(f"{at}/objects")[0]["segment"] == "partial"
+    web.post(f"{at}/live/open")
+    web.until(lambda: web.get(f"{at}/objects")[0]["segment"] == "done")
+    assert "front" in json.loads(path.read_text().splitlines()[-1])
 
 
 def test_a_found_front_goes_out_as_it_would_be_drawn() -> None:
