@@ -113,6 +113,38 @@ def test_fronts_are_drawn_split_typed_merged_and_taken_back(browser: Browser, se
     context.close()
 
 
+def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Elevation").click()
+    expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
+    drag(page, (0.6, 0.1), (1.2, 0.8))
+    page.mouse.move(*at(page, 1.1, 0.4))
+    page.keyboard.press("k")
+    drag(page, (1.25, 0.1), (1.8, 0.8))
+    expect(fronts(page)).to_have_count(2)
+    page.mouse.click(*at(page, 0.8, 0.4))
+    page.mouse.move(*at(page, 1.1, 0.4))
+    page.keyboard.press("k")  # it is there already
+    page.keyboard.press("Control+z")
+    expect(fronts(page)).to_have_count(1)
+    page.keyboard.press("Control+Shift+z")
+    expect(fronts(page)).to_have_count(2)
+    alone = stored(page)[0]["front"]
+    page.mouse.click(*at(page, 0.8, 0.4))
+    page.keyboard.down("Shift")
+    page.mouse.click(*at(page, 1.5, 0.4))
+    page.keyboard.up("Shift")
+    with page.expect_response(lambda response: response.request.method == "DELETE"):  # the last of it
+        page.keyboard.press("m")
+    expect(fronts(page)).to_have_count(1)
+    (merged,) = (entry["front"] for entry in stored(page))
+    for side in ("left_m", "right_m"):
+        assert merged["handle"][side] == pytest.approx(alone["handle"][side] - 0.3, abs=0.02)
+    context.close()
+
+
 def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) -> None:
     context = browser.new_context(viewport={"width": 420, "height": 800})
     page = signed_in(context, server, "ann")

@@ -12,6 +12,7 @@ import {
   overlap,
   profileOf,
   rectOf,
+  sameFront,
   SMALLEST_M,
   snapped,
   split,
@@ -106,6 +107,25 @@ test("a handle stays where it is when an edge is moved, and goes with the front"
   assert.deepEqual(wider, { left_m: 0.1, right_m: 0.12, bottom_m: 0.15, top_m: 0.31 });
   assert.equal(handleAfter(box, RECT, { ...RECT, left: 0.3, right: 0.9 }), box);
   assert.equal(handleAfter("none", RECT, { ...RECT, right: 1 }), "none");
+});
+
+test("a handle that its front no longer reaches is looked for anew", () => {
+  const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
+  assert.equal(handleAfter(box, RECT, { ...RECT, right: 0.71 }), null);
+  assert.equal(handleAfter(box, RECT, { ...RECT, top: 0.25 }), null);
+  assert.notEqual(handleAfter(box, RECT, { ...RECT, right: 0.72 }), null); // up to its edge
+});
+
+test("fronts that nobody could tell apart are the same, whatever order they are said in", () => {
+  const handle = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
+  const said = { right_m: 0.22, top_m: 0.26, left_m: 0.2, bottom_m: 0.1 };
+  const front = { corners_m: cornersOf(PLANE, RECT), handle, hinge: null };
+  const back = cornersOf(PLANE, rectOf(PLANE, front.corners_m) ?? RECT);
+  assert.ok(sameFront(front, { corners_m: back, handle: said }));
+  assert.ok(!sameFront(front, { ...front, corners_m: cornersOf(PLANE, { ...RECT, right: 0.801 }) }));
+  assert.ok(!sameFront(front, { ...front, handle: { ...handle, top_m: 0.261 } }));
+  assert.ok(!sameFront(front, { ...front, handle: "none" }));
+  assert.ok(!sameFront(front, { ...front, hinge: "left" }));
 });
 
 test("what a front is follows from its shape and height", () => {

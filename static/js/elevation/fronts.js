@@ -5,6 +5,7 @@
 
 import * as changes from "../changes.js";
 import { say, sayError } from "../elements/toasts.js";
+import { sameFront } from "../lib/elevation.js";
 import { newKey, outbox } from "../outbox.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
@@ -106,16 +107,18 @@ export class Fronts extends EventTarget {
   }
 
   /**
-   * New fronts, changed ones and ones that go, as one gesture.
+   * New fronts, changed ones and ones that go, as one gesture; one that changes nothing is none: there is nothing to take back.
    * @param {{ make?: Making[], change?: { front: Front, wanted: Wanted }[], remove?: Front[] }} gesture
    * @returns {Front[]} the new ones
    */
   do({ make = [], change = [], remove = [] }) {
+    const changed = change.filter(({ front, wanted }) => isNews(front, wanted));
+    if (!make.length && !changed.length && !remove.length) return [];
     const made = make.map((one) => this.#make(one));
-    for (const { front, wanted } of change) this.#change(front, wanted);
+    for (const { front, wanted } of changed) this.#change(front, wanted);
     for (const front of remove) this.#remove(front);
     this.#done.push([
-      ...change.map(({ front }) => front.key),
+      ...changed.map(({ front }) => front.key),
       ...remove.map(({ key }) => key),
       ...made.map(({ key }) => key),
     ]);
@@ -269,6 +272,12 @@ export class Fronts extends EventTarget {
   #say(type, detail) {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
+}
+
+/** Whether anything of it is not so already. @param {Front} front @param {Wanted} wanted */
+function isNews(front, { name = front.name, category = front.category, front: drawn }) {
+  const redrawn = drawn !== undefined && !(front.drawn && sameFront(drawn, drawnOf(front)));
+  return redrawn || name !== front.name || category !== front.category;
 }
 
 /** @param {Front} front @returns {Drawn} as prompts.json holds it */

@@ -2,6 +2,7 @@
 
 /** @typedef {import("../api-types").Elevation} Elevation */
 /** @typedef {import("../api-types").ElevationLines} ElevationLines */
+/** @typedef {import("../api-types").PromptsFileFrontOutput} Drawn */
 /** @typedef {{ left: number, top: number, right: number, bottom: number }} Rect */
 /** @typedef {"left" | "right" | "top" | "bottom"} Side */
 /** @typedef {{ positions: Float32Array, cell: number }} Profile how clearly a line shows at each position, 0 to 1 */
@@ -14,6 +15,7 @@ const OFF_PLANE_M = 0.03; // of a front that is still on the plane
 const CLEAR = 0.2; // of a line that is worth snapping to
 const DOOR_M = 0.4; // in height, from which a front is a door rather than a drawer
 const HANDLE_M = { long: 0.16, thick: 0.02 };
+const SAME_M = 1e-4; // finer than any scan: what differs by less is the same
 
 /** @param {number[]} a @param {number[]} b */
 const dot = (a, b) => a.reduce((sum, value, k) => sum + value * (b[k] ?? 0), 0);
@@ -232,17 +234,23 @@ export function handleAt(rect, at) {
 }
 
 /**
- * A drawn handle stays where it is when an edge is moved, and goes with a front that is moved as a whole.
+ * A drawn handle stays where it is when an edge is moved, and goes with a front that is moved as a whole; it is looked for anew
+ * where the front no longer reaches it.
  * @template {Box | "none" | null} T
  * @param {T} handle
  * @param {Rect} before
  * @param {Rect} after
- * @returns {T | Box}
+ * @returns {T | Box | null}
  */
 export function handleAfter(handle, before, after) {
-  if (handle === null || handle === "none" || sameSize(before, after)) return handle;
-  const [from, to] = [middleOf(before), middleOf(after)];
+  if (handle === null || handle === "none") return handle;
   const box = /** @type {Box} */ (handle);
+  const stays = sameSize(before, after) ? box : shifted(box, middleOf(before), middleOf(after));
+  return isOn(after, stays) ? stays : null;
+}
+
+/** @param {Box} box from one centre @param {{ x: number, y: number }} from @param {{ x: number, y: number }} to @returns {Box} */
+function shifted(box, from, to) {
   const [right, up] = [from.x - to.x, to.y - from.y];
   return {
     left_m: round(box.left_m + right),
@@ -252,9 +260,33 @@ export function handleAfter(handle, before, after) {
   };
 }
 
+/** Whether a front reaches all of a handle. @param {Rect} rect @param {Box} box */
+function isOn(rect, { left_m, right_m, bottom_m, top_m }) {
+  const [across, up] = [widthOf(rect) / 2 + SAME_M, heightOf(rect) / 2 + SAME_M];
+  return left_m >= -across && right_m <= across && bottom_m >= -up && top_m <= up;
+}
+
 /** @param {Rect} a @param {Rect} b */
 function sameSize(a, b) {
-  return Math.abs(widthOf(a) - widthOf(b)) < 1e-4 && Math.abs(heightOf(a) - heightOf(b)) < 1e-4;
+  return isNear(widthOf(a), widthOf(b)) && isNear(heightOf(a), heightOf(b));
+}
+
+/** @param {number} a @param {number} b metres */
+const isNear = (a, b) => Math.abs(a - b) < SAME_M;
+
+/** Whether nobody could tell two drawn fronts apart. @param {Drawn} a @param {Drawn} b */
+export function sameFront(a, b) {
+  const corners = b.corners_m.flat();
+  const placed = a.corners_m.flat().every((value, k) => isNear(value, corners[k] ?? Number.NaN));
+  return placed && sameHandle(a.handle ?? null, b.handle ?? null) && (a.hinge ?? null) === (b.hinge ?? null);
+}
+
+/** @param {Box | "none" | null} a @param {Box | "none" | null} b */
+function sameHandle(a, b) {
+  if (a === null || b === null || a === "none" || b === "none") return a === b;
+  return /** @type {(keyof Box)[]} */ (["left_m", "right_m", "bottom_m", "top_m"]).every((side) =>
+    isNear(a[side], b[side]),
+  );
 }
 
 /**

@@ -329,13 +329,15 @@ export class ElevationPage extends LiveElement {
 
   #merge() {
     const elevation = this.#elevation;
-    const chosen = new Set(this.#fronts.chosen.map(({ key }) => key));
-    const rects = this.#here.filter(({ key }) => chosen.has(key));
-    const [first, ...others] = this.#fronts.chosen;
-    if (!elevation || !first || rects.length < 2) return say("Choose two fronts first: Shift-click adds one.");
-    const corners_m = plane.cornersOf(elevation, plane.around(rects.map(({ rect }) => rect)));
+    const rects = new Map(this.#here.map(({ key, rect }) => [key, rect]));
+    const [first, ...others] = this.#fronts.chosen.filter(({ key }) => rects.has(key));
+    const before = first && rects.get(first.key);
+    if (!elevation || !before || !others.length) return say("Choose two fronts first: Shift-click adds one.");
+    const rect = plane.around([before, ...others.map(({ key }) => rects.get(key) ?? before)]);
+    const handle = plane.handleAfter(first.handle ?? null, before, rect);
+    const corners_m = plane.cornersOf(elevation, rect);
     this.#fronts.do({
-      change: [{ front: first, wanted: { front: { ...drawnOf(first), corners_m } } }],
+      change: [{ front: first, wanted: { front: { ...drawnOf(first), corners_m, handle } } }],
       remove: others,
     });
     return this.#pick(first.key, null, false);
