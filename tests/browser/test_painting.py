@@ -32,6 +32,7 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, serve
     page.get_by_role("link", name="Annotate").click()
     canvas = page.locator("r2c2r-frame-canvas canvas")
     page.get_by_role("button", name="Brush").wait_for()
+    page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     page.keyboard.press("1")
     page.keyboard.press("b")
     expect(page.get_by_role("button", name="Brush")).to_have_attribute("aria-pressed", "true")

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { decodeBox } from "../../static/js/lib/masks.js";
-import { encoded, runsOf, wholeMask } from "../../static/js/lib/painting.js";
+import { encoded, isEmpty, runsOf, wholeMask } from "../../static/js/lib/painting.js";
 
 const MASK = { width: 4, height: 2, pixels: Uint8Array.from([0, 1, 1, 0, 0, 0, 0, 1]) };
 
@@ -15,6 +15,15 @@ test("a mask's runs begin with what is off it and cover the frame", () => {
 test("a painted mask goes out as those of the server come, and a box is put in its frame", async () => {
   const bits = await encoded(MASK);
   assert.deepEqual(wholeMask(bits, await decodeBox(bits)), MASK);
+  assert.equal(isEmpty(MASK), false);
   const box = { ...bits, left: 1, top: 1, box_width: 2, box_height: 1 };
   assert.deepEqual([...wholeMask(box, Uint8Array.from([1, 1])).pixels], [0, 0, 0, 0, 0, 1, 1, 0]);
+});
+
+test("a mask with nothing on it has no box, as those of the server", async () => {
+  const none = { width: 4, height: 2, pixels: new Uint8Array(8) };
+  assert.ok(isEmpty(none));
+  const bits = await encoded(none);
+  assert.deepEqual([bits.box_width, bits.box_height], [0, 0]);
+  assert.deepEqual(wholeMask(bits, await decodeBox(bits)), none);
 });

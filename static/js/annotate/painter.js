@@ -3,15 +3,20 @@
  * be there. What is set right stands, whatever is found later. Says "tool" when another one or none is used.
  */
 
+import { getMasks } from "../api.js";
 import * as changes from "../changes.js";
-import { say } from "../elements/toasts.js";
+import { say, sayError } from "../elements/toasts.js";
 import { decodeBox } from "../lib/masks.js";
-import { encoded, runsOf, wholeMask } from "../lib/painting.js";
+import { encoded, isEmpty, runsOf, wholeMask } from "../lib/painting.js";
+import { outbox } from "../outbox.js";
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {import("../lib/painting.js").Mask} Mask */
 /** @typedef {"brush" | "eraser" | "lasso" | "polygon"} Tool */
 /** @typedef {{ x: number, y: number }} Spot in pixels of the frame */
+/** @typedef {{ width: number, height: number }} Size */
+/** @typedef {{ object: import("../api-types").SceneObject, frame: number, size: Size }} Place an object in a frame */
+/** @typedef {(mask: Mask, size: Size) => Mask} Alter */
 /**
  * @typedef {object} Known
  * @property {import("./scene-objects.js").SceneObjects} objects
@@ -30,7 +35,7 @@ export class Painter extends EventTarget {
   tool = null;
   #known;
   #size = 24;
-  /** Corners so far. @type {Spot[]} */
+  /** Corners so far, of one object in one frame. @type {Spot[]} */
   #polygon = [];
   /** One stroke after the other: each is painted over the one before it. */
   #work = Promise.resolve();
@@ -39,6 +44,8 @@ export class Painter extends EventTarget {
   constructor(known) {
     super();
     this.#known = known;
+    known.player.addEventListener("frame", () => this.#drop());
+    known.objects.addEventListener("choose", () => this.#drop());
   }
 
   /** Use a tool, or leave it. @param {Tool | null} tool */
@@ -58,19 +65,28 @@ export class Painter extends EventTarget {
   /** A press that did not wander: a corner of the polygon, or a dot. @param {Spot} at @returns {boolean} whether it was for a tool */
   click(at) {
     if (!this.tool) return false;
-    if (this.tool === "polygon") {
-      this.#polygon = [...this.#polygon, at];
-      this.#known.canvas.setPath(this.#polygon);
-    } else this.stroke([at, at]);
+    if (this.tool !== "polygon") this.stroke([at, at]);
+    else if (!this.#now) say("Choose an object first.");
+    else this.#setPolygon([...this.#polygon, at]);
     return true;
+  }
+
+  /** Corners belong to the object and the frame that they were clicked in: in another, they are of nothing. */
+  #drop() {
+    if (this.#polygon.length) this.#setPolygon([]);
+  }
+
+  /** @param {Spot[]} corners */
+  #setPolygon(corners) {
+    this.#polygon = corners;
+    this.#known.canvas.setPath(corners);
   }
 
   /** Close the polygon. @returns {boolean} whether there was one */
   close() {
     if (this.#polygon.length < 3) return false;
     const corners = this.#polygon;
-    this.#polygon = [];
-    this.#known.canvas.setPath([]);
+    this.#setPolygon([]);
     this.#paint(corners, "lasso");
     return true;
   }
@@ -82,7 +98,7 @@ export class Painter extends EventTarget {
 
   /** What is shown stands. */
   keep() {
-    this.#change((mask) => mask);
+    this.#change((mask) => mask, false);
   }
 
   /** The object is not visible in this frame, or it is as found there again. */
@@ -101,20 +117,37 @@ export class Painter extends EventTarget {
   /** @param {Spot[]} path @param {Tool} tool */
   #paint(path, tool) {
     const width = this.#size / this.#known.canvas.scale;
-    this.#change((mask, size) => painted(mask, path, tool, width, size));
+    this.#change((mask, size) => painted(mask, path, tool, width, size), tool !== "eraser");
   }
 
-  /** @param {(mask: Mask, size: { width: number, height: number }) => Mask} alter */
-  #change(alter) {
+  /** @param {Alter} alter @param {boolean} fromNothing whether it needs no mask to begin with */
+  #change(alter, fromNothing) {
     const now = this.#now;
     if (!now) return void say("Choose an object first.");
-    this.#work = this.#work.then(async () => {
-      const mask = alter(await this.#maskOf(now), now.size);
-      this.#local = { object: now.object.id, frame: now.frame, mask, bits: await encoded(mask), version: null };
-      this.#store(changes.setFrame(this.project, now.object.id, now.frame, runsOf(mask)));
-      this.#known.masks.forget(now.object.id, now.frame);
-      this.dispatchEvent(new CustomEvent("painted", { detail: now.frame }));
-    });
+    this.#work = this.#work.then(() => this.#alter(now, alter, fromNothing)).catch(sayError);
+  }
+
+  /** @param {Place} now @param {Alter} alter @param {boolean} fromNothing */
+  async #alter(now, alter, fromNothing) {
+    const { object, frame, size } = now;
+    const coming = this.#isComing(object.id); // asked first: what is not there after that is not to come
+    const before = await this.#maskOf(now);
+    const where = `${object.name} in frame ${frame}`;
+    if (!before && coming) return say(`The mask of ${where} is not here yet: try again in a moment.`);
+    if (!before && !fromNothing) return say(`There is no mask of ${where}.`);
+    const mask = alter(before ?? blank(size), size);
+    const gone = isEmpty(mask);
+    this.#local = { object: object.id, frame, mask, bits: await encoded(mask), version: null };
+    const change = changes.setFrame(this.project, object.id, frame, gone ? null : runsOf(mask));
+    this.#store(change, gone ? `${object.name}: not visible in frame ${frame}` : undefined);
+    this.#known.masks.forget(object.id, frame);
+    this.dispatchEvent(new CustomEvent("painted", { detail: frame }));
+    return undefined;
+  }
+
+  /** Whether masks of it may be about to change: while it is found, and while changes are on their way. @param {number} object */
+  #isComing(object) {
+    return outbox.waiting > 0 || ["waiting", "running"].includes(this.#known.objects.get(object)?.segment ?? "");
   }
 
   /** What was painted last: it may not have come back yet. @type {{ object: number, frame: number, mask: Mask, bits: MaskBits, version: number | null } | null} */
@@ -133,15 +166,18 @@ export class Painter extends EventTarget {
     return version === null || version === this.#known.objects.get(object)?.version;
   }
 
-  /** @param {{ object: { id: number }, frame: number, size: { width: number, height: number } }} now @returns {Promise<Mask>} */
-  async #maskOf({ object, frame, size }) {
-    const known = this.#known.masks.on(object.id, frame)?.mask;
+  /** What was painted last, else what is here, else what is stored; null where there is none. @param {Place} now @returns {Promise<Mask | null>} */
+  async #maskOf({ object, frame }) {
     const last = this.#local;
     if (last?.object === object.id && last.frame === frame && this.#isNewest(last)) return last.mask;
-    if (known) return wholeMask(known, await decodeBox(known));
-    const width = Math.min(PREVIEW_PX, size.width);
-    const height = Math.max(Math.round((size.height * width) / size.width), 1);
-    return { width, height, pixels: new Uint8Array(width * height) };
+    const known = this.#known.masks.on(object.id, frame) ?? (await this.#stored(object.id, frame));
+    return known ? wholeMask(known.mask, await decodeBox(known.mask)) : null;
+  }
+
+  /** @param {number} object @param {number} frame */
+  async #stored(object, frame) {
+    if (outbox.waiting) return undefined; // it may be another one once they are there
+    return (await getMasks(this.project, frame)).find((mask) => mask.object === object);
   }
 
   /** @param {import("../changes.js").Change<import("../api-types").SceneObject>} change @param {string} [text] */
@@ -156,6 +192,7 @@ export class Painter extends EventTarget {
     );
   }
 
+  /** @returns {Place | null} */
   get #now() {
     const { objects, player } = this.#known;
     const { chosen } = objects;
@@ -171,12 +208,19 @@ export class Painter extends EventTarget {
   }
 }
 
+/** @param {Size} size of the frame @returns {Mask} to paint on where there is none */
+function blank(size) {
+  const width = Math.min(PREVIEW_PX, size.width);
+  const height = Math.max(Math.round((size.height * width) / size.width), 1);
+  return { width, height, pixels: new Uint8Array(width * height) };
+}
+
 /**
  * @param {Mask} mask
  * @param {Spot[]} path in pixels of the frame
  * @param {Tool} tool
  * @param {number} brush across, in pixels of the frame
- * @param {{ width: number, height: number }} size of the frame
+ * @param {Size} size of the frame
  * @returns {Mask}
  */
 function painted({ width, height, pixels }, path, tool, brush, size) {

@@ -16,6 +16,9 @@ export function wholeMask({ width, height, left, top, box_width, box_height }, i
   return { width, height, pixels };
 }
 
+/** Whether nothing is on it. @param {Mask} mask */
+export const isEmpty = ({ pixels }) => !pixels.includes(1);
+
 /**
  * Lengths of what is off it, on it, off it and so on, row by row: as prompts.json holds it.
  * @param {Mask} mask
@@ -37,11 +40,13 @@ export function runsOf({ width, height, pixels }) {
 }
 
 /**
- * As masks come from the server: zlib of packed bits, here of the whole frame.
+ * As masks come from the server: zlib of packed bits, here of the whole frame; no box where nothing is on it.
  * @param {Mask} mask
  * @returns {Promise<MaskBits>}
  */
-export async function encoded({ width, height, pixels }) {
+export async function encoded(mask) {
+  const { width, height, pixels } = mask;
+  if (isEmpty(mask)) return { width, height, left: 0, top: 0, box_width: 0, box_height: 0, bits: "" };
   const packed = new Uint8Array(Math.ceil(pixels.length / 8));
   for (let i = 0; i < pixels.length; i++) if (pixels[i]) packed[i >> 3] = (packed[i >> 3] ?? 0) | (128 >> (i & 7));
   const stream = new Blob([packed]).stream().pipeThrough(new CompressionStream("deflate"));
