@@ -17,12 +17,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from measure import Cost, run_measured
+from measure import Cost
 from table import gate, markdown
+from whole_way import CLI, REPOSITORY, whole_way
 
-REPOSITORY = Path(__file__).resolve().parents[1]
 BASELINE = Path(__file__).resolve().parent / "baseline.json"
-CLI = [sys.executable, "-m", "r2c2r_core.cli"]
 ACCURACY = (
     "objects_found",
     "mask_iou",
@@ -73,35 +72,11 @@ def bench_seed(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> 
     """All numbers of one seed by name, each with value, unit, better and tolerance."""
     sample = made_sample(seed, frames, size, workdir)
     work = workdir / f"run-{seed}"
-    shutil.rmtree(work, ignore_errors=True)
-    work.mkdir(parents=True)
-    bundle, masks = work / "bundle.zip", work / "masks"
-    run = [*CLI, "run", str(sample / "scan.r3d"), "--prompts", str(sample / "prompts.json"), "-o", str(bundle)]
-    cost = run_measured([*run, "--workdir", str(work / "work"), "--masks", str(masks)], cwd=REPOSITORY, log=work / "run.log")
-    metrics: dict[str, Any] = {"certificate": _entry(0.0, "share passed", "higher", 0.0)} | _cost_entries(cost)
-    if not bundle.exists():
-        print(f"seed {seed}: no bundle (exit {cost.exit_code}); see {work / 'run.log'}", file=sys.stderr)
+    outcome = whole_way(sample / "scan.r3d", sample / "prompts.json", sample / "truth.json", work)
+    metrics = {"certificate": _entry(float(outcome.certified), "share passed", "higher", 0.0)} | _cost_entries(outcome.cost)
+    if outcome.evaluation is None:
         return metrics
-    check = subprocess.run([*CLI, "check", str(bundle)], cwd=REPOSITORY, capture_output=True, text=True, check=False)
-    metrics["certificate"]["value"] = float(check.returncode == 0)
-    answer = work / "evaluation.json"
-    evaluate = [
-        *CLI,
-        "evaluate",
-        str(bundle),
-        "--truth",
-        str(sample / "truth.json"),
-        "--masks",
-        str(masks),
-        "--json",
-        str(answer),
-    ]
-    done = subprocess.run(evaluate, cwd=REPOSITORY, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        print(f"seed {seed}: {done.stderr.strip()}", file=sys.stderr)
-        return metrics
-    (work / "evaluation.txt").write_text(done.stdout, encoding="utf-8")
-    scene = json.loads(answer.read_text(encoding="utf-8"))["scene"]
+    scene = outcome.evaluation["scene"]
     return {name: scene[name] for name in ACCURACY if name in scene} | metrics
 
 

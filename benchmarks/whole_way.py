@@ -1,0 +1,46 @@
+"""A recording through `r2c2r run`, `check` and `evaluate`, from nothing."""
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from measure import Cost, run_measured
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+CLI = [sys.executable, "-m", "r2c2r_core.cli"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What came out, and what it cost."""
+
+    cost: Cost
+    certified: bool
+    evaluation: dict[str, Any] | None  # what `r2c2r evaluate --json` writes; None where there is no bundle
+
+
+def whole_way(recording: Path, prompts: Path, truth: Path, work: Path) -> Outcome:
+    """Run the commands; `work` is emptied before, and keeps bundle.zip, run.log and evaluation.json."""
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    bundle, masks, answer = work / "bundle.zip", work / "masks", work / "evaluation.json"
+    run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle)]
+    cost = run_measured([*run, "--workdir", str(work / "work"), "--masks", str(masks)], cwd=REPOSITORY, log=work / "run.log")
+    if not bundle.exists():
+        print(f"{work.name}: no bundle (exit {cost.exit_code}); see {work / 'run.log'}", file=sys.stderr)
+        return Outcome(cost=cost, certified=False, evaluation=None)
+    certified = _said("check", str(bundle)).returncode == 0
+    done = _said("evaluate", str(bundle), "--truth", str(truth), "--masks", str(masks), "--json", str(answer))
+    if done.returncode != 0:
+        print(f"{work.name}: {done.stderr.strip()}", file=sys.stderr)
+        return Outcome(cost=cost, certified=certified, evaluation=None)
+    (work / "evaluation.txt").write_text(done.stdout, encoding="utf-8")
+    return Outcome(cost=cost, certified=certified, evaluation=json.loads(answer.read_text(encoding="utf-8")))
+
+
+def _said(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*CLI, *words], cwd=REPOSITORY, capture_output=True, text=True, check=False)
