@@ -3,7 +3,7 @@
     python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json]
 
 A FOLDER holds capture.r3d or scan.r3d, prompts.json and truth.json. Usable: every extent within 5 %, and the joint of the
-right type, hinged on the right side. What is missing is wrong: its joint, its size by 100 %, its mask altogether. Rows are added
+right type, hinged on the right side. What is missing is wrong: its joint, its size by 100 %, all its mask. Rows are added
 to the JSON file by the folder's name.
 """
 
