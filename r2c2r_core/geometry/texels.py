@@ -16,8 +16,8 @@ def texture_colours(texture: Image, uv: np.ndarray) -> np.ndarray:
 
 def bilinear_colours(image: Image, uv_px: np.ndarray) -> np.ndarray:
     """Bilinear colours (n, 3), uint8, at continuous pixel positions (n, 2); outside gives the border."""
-    count = len(uv_px)
-    places = np.zeros((-(-count // _WIDTH) * _WIDTH, 2), np.float32)
-    places[:count] = np.clip(np.nan_to_num(uv_px), -1e4, 1e4) - 0.5
+    count, (height, width) = len(uv_px), image.shape[:2]
+    places = np.zeros((max(-(-count // _WIDTH), 1) * _WIDTH, 2), np.float32)
+    places[:count] = np.clip(np.nan_to_num(uv_px), 0, (width, height)) - 0.5
     x, y = (np.ascontiguousarray(column).reshape(-1, _WIDTH) for column in places.T)
     return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(-1, 3)[:count])

@@ -40,8 +40,7 @@ def ridges(depth_m: DepthMetres) -> Mask:
     found = np.zeros(depth_m.shape, dtype=bool)
     for axis in (0, 1):
         low, _ = _range(for_min, for_max, 2, across=axis == 1)
-        sides = np.stack([np.roll(for_max, k, axis) for k in (-4, -3, -2, -1, 1, 2, 3, 4)])
-        behind = np.minimum(sides[:4].max(axis=0), sides[4:].max(axis=0))
+        behind = np.minimum(_farthest_beside(for_max, axis), np.flip(_farthest_beside(np.flip(for_max, axis), axis), axis))
         found |= (depth_m < low + margin) & (behind > depth_m + step)
     return found & valid
 
@@ -87,6 +86,13 @@ def fill_for_display(depth_m: DepthMetres) -> DepthMetres:
         raise CaptureError("a depth image without one known pixel cannot be filled", hint="choose another frame")
     rows, columns = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     return np.asarray(depth_m[rows, columns])
+
+
+def _farthest_beside(for_max: np.ndarray, axis: int) -> np.ndarray:
+    """Greatest depth among the four pixels before each along an axis; nothing is known before the first."""
+    padded = np.pad(for_max, [(4, 0) if k == axis else (0, 0) for k in (0, 1)], constant_values=-_FAR)
+    count = for_max.shape[axis]
+    return np.asarray(np.max([padded.take(range(k, k + count), axis) for k in range(4)], axis=0))
 
 
 def _least_step(depth_m: DepthMetres) -> DepthMetres:
