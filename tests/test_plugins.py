@@ -13,6 +13,7 @@ from r2c2r_core.errors import InputError
 from r2c2r_core.export.lint import lint
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.support import supported
+from r2c2r_core.export.writers.meshes import write_meshes
 from r2c2r_core.export.writers.table import FORMATS, formats, write_formats
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.ingest.readers.table import open_recording
@@ -197,6 +198,8 @@ def test_a_format_that_cannot_be_written_is_left_out(
     install: Install, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT.replace("    Path(folder", "    1 / 0; Path(folder"))
-    write_formats(supported(plan_bundle(kitchen())), tmp_path)
+    plan = supported(plan_bundle(kitchen()))
+    write_meshes(plan, tmp_path, 64)
+    write_formats(plan, tmp_path)
     assert {path.name for path in tmp_path.glob("scene.*")} == {entry.file for entry in FORMATS}
     assert "scene.count is left out of the bundle: ZeroDivisionError: division by zero" in caplog.text

@@ -14,7 +14,16 @@ from tests.app.conftest import Running, running
 from tests.app.finished import finished_kitchen
 from tests.core.export.kitchen import kitchen, reconstruction
 
-WANTS = {"project": "{project}", "object": 1, "job": 1, "frame": 7, "version": 1, "candidate": "c0", "side": "plan"}
+WANTS = {
+    "project": "{project}",
+    "object": 1,
+    "job": 1,
+    "frame": 7,
+    "version": 1,
+    "candidate": "c0",
+    "side": "plan",
+    "elevation": "e0",
+}
 
 
 @pytest.fixture(scope="module")
