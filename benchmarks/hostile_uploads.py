@@ -53,6 +53,7 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
         for project in web.get("/api/projects"):
             web.delete(f"/api/projects/{project['id']}")
         memory = [_memory_mb()]
+        ours = set(psutil.Process().children(recursive=True))  # of whoever measures
         for number in range(count):
             name = names[number % len(names)]
             sent = time.monotonic()
@@ -63,7 +64,7 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
             slowest = max(slowest, (time.monotonic() - sent, name))
             by_kind[name] += 1
             statuses.update(answer.status_code for answer in answers)
-            problem = next(filter(None, (complaint(web, answer) for answer in answers)), "") or left_behind(web)
+            problem = next(filter(None, (complaint(web, answer) for answer in answers)), "") or left_behind(web, ours)
             if problem:
                 wrong.append(f"{name} ({number}): {problem}")
             if number % max(count // 4, 1) == 0:
@@ -133,8 +134,8 @@ def complaint(web: Running, answer: Any) -> str:
     return ""
 
 
-def left_behind(web: Running) -> str:
-    """Files, rows or processes that a refused upload left."""
+def left_behind(web: Running, before: set[psutil.Process]) -> str:
+    """Files, rows or processes that a refused upload left; `before`: processes that ran already."""
     data = web.settings.data_dir
     files = [path for place in ("projects", "uploads") for path in (data / place).rglob("*") if path.is_file()]
     for place, rows in (("projects", web.get("/api/projects")), ("uploads", web.get("/api/uploads"))):
@@ -143,7 +144,7 @@ def left_behind(web: Running) -> str:
             files.append(Path(row["id"]))
     if files or web.get("/api/jobs"):
         return f"left behind: {files[:3]}"
-    processes = [child for child in psutil.Process().children(recursive=True) if child.is_running()]
+    processes = [child for child in psutil.Process().children(recursive=True) if child not in before and child.is_running()]
     _, alive = psutil.wait_procs(processes, timeout=5)
     return f"still running: {alive[:3]}" if alive else ""
 

@@ -113,7 +113,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
     expect(name).to_be_focused()
     expect(name).to_have_value("")
     below = "card => card.parentElement.nextElementSibling.getBoundingClientRect().top - card.getBoundingClientRect().bottom"
-    assert panel.evaluate(below) >= 12  # px between the card and what follows
+    ann.wait_for_function(f"({below})(document.activeElement.closest('section')) >= 12")  # px between the card and what follows
     picture(ann, "23-members")
 
     card.click()  # it is there again
