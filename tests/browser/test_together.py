@@ -123,7 +123,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     server.kill()
     pick(ann, "drawer_1")
     click_frame(ann, 60, 60)
-    click_frame(ann, 84, 60, button="right")
+    click_frame(ann, 60, 90, button="right")
     expect(ann.locator(".banner")).to_contain_text("2 changes not stored yet")
     context = ann.context
     ann.close()
