@@ -18,7 +18,7 @@ from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
 from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
-from r2c2r_core.schema.prompts import PromptsFile
+from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject
 from r2c2r_core.segment.prompts import checked_prompts
 from r2c2r_core.workspace import write_atomically
 
@@ -133,8 +133,7 @@ def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: st
             colours += 1
         with history.change(session, item, "prompts", "import", f"imported {entry.name}", who=who):
             item.deleted, item.category = False, entry.category
-            item.front = entry.front.model_dump() if entry.front is not None else None
-            item.frames = {str(said.frame): said.mask.model_dump() if said.mask is not None else None for said in entry.frames}
+            item.front, item.frames = drawn_in(entry)
             session.add(item)
             for old in session.exec(select(Point).where(Point.object_id == item.id)):
                 session.delete(old)
@@ -142,6 +141,12 @@ def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: st
             session.add_all(Point(object_id=item.id or 0, frame=p.frame, x=p.x, y=p.y, label=p.label) for p in entry.points)
         items.append(item)
     return items
+
+
+def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str, Any]]:
+    """What a person drew of an object in a prompts.json, as it is stored: its front, and its masks by frame."""
+    frames = {str(said.frame): said.mask.model_dump() if said.mask is not None else None for said in entry.frames}
+    return entry.front.model_dump() if entry.front is not None else None, frames
 
 
 def adopt_bundle(

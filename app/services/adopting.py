@@ -23,10 +23,11 @@ from app.db.keys import stored_entry
 from app.db.queries import clicks_of
 from app.db.tables import Account, Bundle, Comment, Event, Job, Point, Project, ProjectMember, SceneObject, Verdict
 from app.files import ProjectFiles, project_files
-from app.jobs.outcomes import adopt_capture, bundle_row
+from app.jobs.outcomes import adopt_capture, bundle_row, drawn_in
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError, R2C2RError
-from r2c2r_core.segment.prompts import parse_prompts
+from r2c2r_core.schema.prompts import PromptsFileObject
+from r2c2r_core.segment.prompts import checked_prompts
 
 _log = logging.getLogger(__name__)
 CHOSEN = {
@@ -195,7 +196,7 @@ def _read_again(session: Session, project: Project, files: ProjectFiles, who: st
 
 
 def _of_an_older_version(files: ProjectFiles) -> Description:
-    """What can be told of a folder without a project.json: the recording's facts, and the clicks of its last run."""
+    """What can be told of a folder without a project.json: the recording's facts, and its last run's prompts."""
     found, sources = _json(files.facts), sorted(files.source.glob("*"))
     if not found and not sources:
         raise InputError(f"{files.root}: neither project.json nor a recording in it", hint="take out of it what you need")
@@ -208,16 +209,23 @@ def _of_an_older_version(files: ProjectFiles) -> Description:
         changed=files.root.stat().st_mtime,
         project={"name": Path(source).stem or "Recovered", "source_name": Path(source).name, "source_path": source},
         objects=[
-            DescribedObject(
-                id=None,
-                name=prompt.name,
-                category=prompt.category,
-                colour=colour,
-                points=[DescribedPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in prompt.points],
-                override=stored_entry(overrides.get(prompt.name, {})),
-            )
-            for colour, prompt in enumerate(parse_prompts(prompts).objects if prompts else ())
+            _of_prompts(entry, colour, overrides.get(entry.name, {}))
+            for colour, entry in enumerate(checked_prompts(prompts).objects if prompts else ())
         ],
+    )
+
+
+def _of_prompts(entry: PromptsFileObject, colour: int, override: dict[str, Any]) -> DescribedObject:
+    front, frames = drawn_in(entry)
+    return DescribedObject(
+        id=None,
+        name=entry.name,
+        category=entry.category,
+        colour=colour,
+        points=[DescribedPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in entry.points],
+        front=front,
+        frames=frames,
+        override=stored_entry(override),
     )
 
 

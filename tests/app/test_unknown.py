@@ -202,13 +202,16 @@ def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_
     assert {path.name for path in folder.iterdir()} == {"project"}
 
 
-def test_a_folder_of_an_older_version_is_adopted_with_the_clicks_of_its_last_run(start: Start, tmp_path: Path) -> None:
+def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
         project = worked_on(web)
     folder = data / "projects" / project
     (folder / "project.json").unlink()
-    shutil.copy(folder / "finished-prompts.json", folder / "work" / "prompts.json")
+    prompts = json.loads((folder / "finished-prompts.json").read_text())
+    corners = [[0.0, 1.0, 0.8], [0.5, 1.0, 0.8], [0.5, 1.0, 0.1], [0.0, 1.0, 0.1]]
+    prompts["objects"][0] |= {"front": {"corners_m": corners}, "frames": [{"frame": 3, "mask": None}]}
+    (folder / "work" / "prompts.json").write_text(json.dumps(prompts | {"version": 2}))
     corrections = {"version": 1, "objects": {"drawer_1": {"hinge": "left", "joint_limits": [0.0, 1.0]}}}
     (folder / "work" / "overrides.json").write_text(json.dumps(corrections))
     lose(data)
@@ -218,6 +221,8 @@ def test_a_folder_of_an_older_version_is_adopted_with_the_clicks_of_its_last_run
     with start() as web:
         (drawer, _) = web.get(f"/api/projects/{project}/objects")
         assert (drawer["name"], len(drawer["points"])) == ("drawer_1", 2)
+        kept = web.get(f"/api/projects/{project}/prompts.json")["objects"][0]
+        assert (kept["front"]["corners_m"], kept["frames"]) == (corners, [{"frame": 3, "mask": None}])
         override = web.get(f"/api/projects/{project}/objects/{drawer['id']}/override")
         assert (override["hinge"], override["joint_upper"]) == ("left", 1.0)
         assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [1]
