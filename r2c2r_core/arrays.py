@@ -17,5 +17,4 @@ DepthMetres = Float[np.ndarray, "h w"]  # z-depth along the optical axis; 0 wher
 Mask = Bool[np.ndarray, "h w"]
 Image = UInt8[np.ndarray, "h w 3"]  # RGB order
 Texture = UInt8[np.ndarray, "rows columns 3"]  # RGB; a size of its own beside the image it is seen in
-Grey = UInt8[np.ndarray, "h w"]
 Colours = UInt8[np.ndarray, "n 3"]

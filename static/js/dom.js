@@ -124,6 +124,28 @@ export class LiveElement extends HTMLElement {
 }
 
 /**
+ * What a person does on a canvas that fills its element, and every change of that element's size, while it is on the page.
+ * @param {LiveElement} element
+ * @param {HTMLCanvasElement} canvas
+ * @param {{
+ *   down: (event: PointerEvent) => void, move: (event: PointerEvent) => void, up: (event: PointerEvent) => void,
+ *   cancel: (event: PointerEvent) => void, wheel: (event: WheelEvent) => void, resized: () => void,
+ * }} handlers
+ */
+export function wire(element, canvas, { down, move, up, cancel, wheel, resized }) {
+  const { signal } = element;
+  canvas.addEventListener("pointerdown", down, { signal });
+  canvas.addEventListener("pointermove", move, { signal });
+  canvas.addEventListener("pointerup", up, { signal });
+  canvas.addEventListener("pointercancel", cancel, { signal });
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+  canvas.addEventListener("wheel", wheel, { signal, passive: false });
+  const observer = new ResizeObserver(resized);
+  observer.observe(element);
+  signal.addEventListener("abort", () => observer.disconnect());
+}
+
+/**
  * The detail of one of our events.
  * @template T
  * @param {Event} event

@@ -9,8 +9,6 @@ from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.tuning import param, tuned
 
-_RIM_M = 0.02
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:

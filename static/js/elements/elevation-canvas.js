@@ -4,7 +4,7 @@
  * Zoom with the wheel or two fingers, pan with the middle button, Space-drag or two fingers; Alt leaves edges where they are put.
  */
 
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, wire } from "../dom.js";
 import {
   between,
   heightOf,
@@ -67,23 +67,21 @@ export class ElevationCanvas extends LiveElement {
 
   connected() {
     this.replaceChildren(this.#canvas);
+    wire(this, this.#canvas, {
+      down: (event) => this.#down(event),
+      move: (event) => this.#move(event),
+      up: (event) => this.#up(event),
+      cancel: (event) => this.#drop(event),
+      wheel: (event) => this.#wheel(event),
+      resized: () => this.#resize(),
+    });
     const { signal } = this;
-    const canvas = this.#canvas;
-    canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
-    canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
-    canvas.addEventListener("pointerup", (event) => this.#up(event), { signal });
-    canvas.addEventListener("pointercancel", (event) => this.#drop(event), { signal });
-    canvas.addEventListener("pointerleave", () => (this.pointer = null), { signal });
-    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
-    canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
+    this.#canvas.addEventListener("pointerleave", () => (this.pointer = null), { signal });
     const space = (/** @type {boolean} */ on) => (/** @type {KeyboardEvent} */ event) => {
       if (event.key === " ") this.#space = on;
     };
     document.addEventListener("keydown", space(true), { signal });
     document.addEventListener("keyup", space(false), { signal });
-    const observer = new ResizeObserver(() => this.#resize());
-    observer.observe(this);
-    signal.addEventListener("abort", () => observer.disconnect());
   }
 
   /**

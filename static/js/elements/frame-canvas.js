@@ -5,7 +5,7 @@
  * replaces the mouse.
  */
 
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, wire } from "../dom.js";
 import { drawBox, drawClick, drawPath, drawCrosshair, drawPin, isOnClick, isOnPin } from "../lib/frame-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
@@ -56,17 +56,14 @@ export class FrameCanvas extends LiveElement {
 
   connected() {
     this.replaceChildren(this.#canvas);
-    const { signal } = this;
-    const canvas = this.#canvas;
-    canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
-    canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
-    canvas.addEventListener("pointerup", (event) => this.#up(event), { signal });
-    canvas.addEventListener("pointercancel", (event) => this.#cancel(event), { signal });
-    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
-    canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
-    const observer = new ResizeObserver(() => this.#resize());
-    observer.observe(this);
-    signal.addEventListener("abort", () => observer.disconnect());
+    wire(this, this.#canvas, {
+      down: (event) => this.#down(event),
+      move: (event) => this.#move(event),
+      up: (event) => this.#up(event),
+      cancel: (event) => this.#cancel(event),
+      wheel: (event) => this.#wheel(event),
+      resized: () => this.#resize(),
+    });
   }
 
   // What is shown

@@ -4,9 +4,10 @@
  */
 
 import * as changes from "../changes.js";
-import { say, sayError } from "../elements/toasts.js";
+import { say } from "../elements/toasts.js";
 import { sameFront } from "../lib/elevation.js";
 import { newKey, outbox } from "../outbox.js";
+import { saving } from "../saving.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {import("../api-types").FoundFront} FoundFront */
@@ -252,17 +253,8 @@ export class Fronts extends EventTarget {
    * @param {string} [key]
    * @returns {Promise<T>}
    */
-  async #send(change, key) {
-    this.#say("saved", { text: "saving…", tone: "" });
-    try {
-      const answer = await outbox.send(change, key);
-      this.#say("saved", { text: `saved ${new Date().toLocaleTimeString()}`, tone: "" });
-      return answer;
-    } catch (error) {
-      this.#say("saved", { text: "not saved", tone: "bad" });
-      sayError(error);
-      throw error;
-    }
+  #send(change, key) {
+    return saving(change, key, (how) => this.#say("saved", how));
   }
 
   /**

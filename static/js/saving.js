@@ -1,0 +1,25 @@
+/** A change that is sent, and how it stands is said. */
+
+import { sayError } from "./elements/toasts.js";
+import { outbox } from "./outbox.js";
+
+/**
+ * What the server refuses is said here, and thrown.
+ * @template T
+ * @param {import("./changes.js").Change<T>} change
+ * @param {string | undefined} key
+ * @param {(how: { text: string, tone: string }) => void} tell
+ * @returns {Promise<T>}
+ */
+export async function saving(change, key, tell) {
+  tell({ text: "saving…", tone: "" });
+  try {
+    const answer = await outbox.send(change, key);
+    tell({ text: `saved ${new Date().toLocaleTimeString()}`, tone: "" });
+    return answer;
+  } catch (error) {
+    tell({ text: "not saved", tone: "bad" });
+    sayError(error);
+    throw error;
+  }
+}
