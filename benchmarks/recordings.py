@@ -1,6 +1,7 @@
-"""Recordings with a truth, of either sample generator: their true masks, and clicks on the frames that were read."""
+"""Recordings with a truth, of either sample generator: their true masks, clicks on the frames that were read, random clicks."""
 
 import json
+import zipfile
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -9,11 +10,18 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask
-from r2c2r_core.evaluate.iou import MIN_TRUTH_PX
-from r2c2r_core.evaluate.records import JointRecord, ObjectRecord
+from r2c2r_core.evaluate.iou import MIN_TRUTH_PX, read_mask
+from r2c2r_core.evaluate.records import JointRecord, ObjectRecord, read_truth
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
+from r2c2r_core.geometry.masks import mask_iou
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.segment.prompts import read_prompts
+
+CLICK_MARGIN_PX = 3  # from the border of what a person clicks
+_WELL_VISIBLE = 0.5  # of its pixels in the frame that shows most of them
 
 TrueMask = Callable[[str, int], Mask | None]
 
@@ -50,6 +58,83 @@ def clicked(folder: Path, frames: Sequence[int]) -> Prompts:
         if points:
             found.append(ObjectPrompt(name=prompt.name, category=prompt.category, points=points))
     return Prompts(objects=tuple(found))
+
+
+def random_clicks(folder: Path, rng: np.random.Generator) -> Prompts:
+    """One click an object that some frame shows: any pixel of its visible face, in any frame that shows it well.
+
+    The face of what opens is the front of its box; of other things it is all that is seen of them. Clear views are not
+    preferred, nor are middles: a person clicks where the hand is.
+    """
+    source = recording_in(folder)
+    with zipfile.ZipFile(source) as archive:
+        recorded = parse_metadata(archive.read("metadata"), str(source))
+    masks, found = true_masks(folder), []
+    for thing in read_truth(folder / "truth.json", Rigid3()):
+        shown = [_pixels(masks(thing.name, frame)) for frame in range(len(recorded.poses))]
+        well = [f for f, pixels in enumerate(shown) if pixels >= max(MIN_TRUTH_PX, _WELL_VISIBLE * max(shown))]
+        points = (_click(thing, recorded, masks, int(frame), rng) for frame in rng.permutation(well))
+        if point := next((point for point in points if point is not None), None):
+            found.append(ObjectPrompt(name=thing.name, category=thing.category, points=(point,)))
+    return Prompts(objects=tuple(found))
+
+
+def write_prompts(prompts: Prompts, path: Path) -> None:
+    """Clicks as prompts.json."""
+    entries = [
+        {
+            "name": prompt.name,
+            "category": prompt.category,
+            "points": [{"frame": p.frame, "x": p.x, "y": p.y, "label": p.label} for p in prompt.points],
+        }
+        for prompt in prompts.objects
+    ]
+    path.write_text(json.dumps({"version": 1, "objects": entries}, indent=1) + "\n", encoding="utf-8")
+
+
+def _pixels(mask: Mask | None) -> int:
+    return 0 if mask is None else int(np.count_nonzero(mask))
+
+
+def _click(
+    thing: ObjectRecord, recorded: Record3DMetadata, masks: TrueMask, frame: int, rng: np.random.Generator
+) -> PromptPoint | None:
+    """A pixel of the visible face, not near its border; None where this frame shows no such pixel."""
+    mask, pose = masks(thing.name, frame), recorded.poses[frame]
+    if mask is None or pose is None:
+        return None
+    face = mask & _front_pixels(thing, recorded.camera(frame), pose) if thing.joints else mask
+    inside = cv2.distanceTransform(np.pad(face.astype(np.uint8), 1), cv2.DIST_L2, 5)[1:-1, 1:-1] > CLICK_MARGIN_PX
+    if not inside.any():
+        return None
+    y, x = rng.choice(np.argwhere(inside))
+    return PromptPoint(frame=frame, x=float(x) + 0.5, y=float(y) + 0.5, label=1)
+
+
+def _front_pixels(thing: ObjectRecord, camera: Intrinsics, pose: Rigid3) -> Mask:
+    """Where rays reach the front of the object's box (its -y side) from outside."""
+    object_from_camera = thing.world_from_object.inverse @ pose
+    half, eye = thing.dimensions_m / 2, object_from_camera.translation
+    if eye[1] >= -half[1]:
+        return np.zeros((camera.height, camera.width), np.bool_)
+    rays = object_from_camera.turn(pixel_rays(pixel_centres(camera), camera).reshape(-1, 3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (-half[1] - eye[1]) / rays[:, 1]
+        at = eye + reach[:, None] * rays
+        within = (reach > 0) & (np.abs(at[:, 0]) < half[0]) & (np.abs(at[:, 2]) < half[2])
+    return np.asarray(within.reshape(camera.height, camera.width))
+
+
+def mask_overlap(folder: Path, name: str, found: Path) -> float:
+    """Mean IoU of the masks in `found` (<frame:06d>.png) in the frames that show the object; a missing one counts as 0."""
+    masks, overlaps = true_masks(folder), []
+    for frame in range(len(list((folder / "masks").glob("*.png")))):
+        true = masks(name, frame)
+        if true is None or np.count_nonzero(true) < MIN_TRUTH_PX:
+            continue
+        file = found / f"{frame:06d}.png"
+        overlaps.append(mask_iou(true, read_mask(file, like=true)) if file.exists() else 0.0)
+    return float(np.mean(overlaps)) if overlaps else 0.0
 
 
 def _middle(prompt: ObjectPrompt, masks: dict[int, Mask | None]) -> tuple[PromptPoint, ...]:

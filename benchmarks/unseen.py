@@ -1,10 +1,12 @@
-"""Kitchens that nobody here drew: how many objects come out usable, one click an object.
+"""Kitchens that nobody here drew: how many objects come out usable, one random click an object.
 
-    python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json]
+    python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json] [--seed N]
 
-A FOLDER holds capture.r3d or scan.r3d, prompts.json and truth.json. Usable: every extent within 5 %, and the joint of the
-right type, hinged on the right side. What is missing is wrong: its joint, its size by 100 %, all its mask. Rows are added
-to the JSON file by the folder's name.
+A FOLDER holds capture.r3d or scan.r3d, truth.json and masks/NNNNNN.png (number of the object in truth.json + 1), as
+second_styles.py, franka.py and replicacad.py write them. Clicks are random ones of `recordings.random_clicks`, with the seed.
+Usable: every extent within 5 %, the joint of the right type, hinged on the right side. What is missing is wrong in every
+mean: its size by 100 %, its joint, all its mask. Joint figures are over the objects that have joints. Rows are added to the
+JSON file by the folder's name, each as soon as it is known.
 """
 
 import argparse
@@ -12,15 +14,19 @@ import json
 import statistics
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from recordings import recording_in
+import numpy as np
+from recordings import mask_overlap, random_clicks, recording_in, write_prompts
 from whole_way import Outcome, whole_way
 
-USABLE_PERCENT = 5.0
+from r2c2r_core.kitchen.names import category_of
+
+USABLE_PERCENT, FAR_OFF_PERCENT = 5.0, 10.0
 _SIDES = ("width_error", "depth_error", "height_error")
+_HEIGHTS = ("bottle", "wall_cabinet")  # categories whose height has a bound of its own
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,49 +35,93 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--workdir", type=Path, help="kept afterwards")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--seed", type=int, default=0, help="of the clicks")
     options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory(prefix="r2c2r-unseen-") as folder:
-        rows = {}
-        for each in options.folders:
-            print(f"{each.name} …", file=sys.stderr, flush=True)
-            work = (options.workdir or Path(folder)) / f"unseen-{each.name}"
-            rows[each.name] = row_of(
-                whole_way(recording_in(each), each / "prompts.json", each / "truth.json", work), each / "truth.json"
-            )
+    rows: dict[str, dict[str, Any]] = {}
+    with tempfile.TemporaryDirectory(prefix="r2c2r-unseen-") as scratch:
+        for folder in options.folders:
+            print(f"{folder.name} …", file=sys.stderr, flush=True)
+            rows[folder.name] = run_folder(folder, (options.workdir or Path(scratch)) / folder.name, options.seed)
+            if options.json:
+                before = json.loads(options.json.read_text(encoding="utf-8")) if options.json.exists() else {}
+                options.json.write_text(json.dumps(before | rows, indent=1) + "\n", encoding="utf-8")
     print(table(rows))
-    if options.json:
-        before = json.loads(options.json.read_text(encoding="utf-8")) if options.json.exists() else {}
-        options.json.write_text(json.dumps(before | rows, indent=1) + "\n", encoding="utf-8")
     return 0
 
 
-def row_of(outcome: Outcome, truth: Path) -> dict[str, Any]:
-    """The figures of one kitchen."""
-    names = [item["name"] for item in json.loads(truth.read_text(encoding="utf-8"))["objects"]]
+def run_folder(folder: Path, work: Path, seed: int) -> dict[str, Any]:
+    """One kitchen from random clicks to its figures; `work`/masks are compared with the true ones."""
+    prompts, clicks = random_clicks(folder, np.random.default_rng(seed)), work.parent / f"{work.name}.prompts.json"
+    clicks.parent.mkdir(parents=True, exist_ok=True)
+    write_prompts(prompts, clicks)
+    outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work)
+    found = {} if outcome.evaluation is None else {item["name"]: item for item in outcome.evaluation["objects"]}
+    overlaps = {
+        prompt.name: mask_overlap(folder, prompt.name, work / "masks" / (found.get(prompt.name, {}).get("matched") or "-"))
+        for prompt in prompts.objects
+    }
+    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["objects"]
+    return row_of(outcome, [item for item in truth if item["name"] in overlaps], overlaps)
+
+
+def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str, float]) -> dict[str, Any]:
+    """The figures of one kitchen; `truth` are the clicked objects of truth.json, `overlaps` the IoU of their masks."""
     found = {} if outcome.evaluation is None else {item["name"]: item["metrics"] for item in outcome.evaluation["objects"]}
-    judged = {name: judge(found.get(name, {})) for name in names}
-    errors = [error for error, _ in judged.values()]
-    masks = [_value(found.get(name, {}), "mask_iou") or 0.0 for name in names]
+    errors = {item["name"]: extents_of(found.get(item["name"], {})) for item in truth}
+    largest = {name: max(sides) for name, sides in errors.items()}
+    joints = {item["name"]: joint_right(found.get(item["name"], {})) for item in truth if item["joint"]}
+    usable = [name for name in errors if largest[name] <= USABLE_PERCENT and joints.get(name, True)]
+    category = {item["name"]: item["category"] for item in truth}
     return {
-        "objects": len(names),
-        "usable": sum(error <= USABLE_PERCENT and right for error, right in judged.values()),
-        "median_percent": round(statistics.median(errors), 2),
-        "worst_percent": round(max(errors), 1),
-        "joints_right": sum(right for _, right in judged.values()),
-        "mask_iou": round(statistics.fmean(masks), 3),
+        "objects": len(errors),
+        "usable": len(usable),
+        "usable_percent": round(100 * len(usable) / len(errors), 1),
+        "median_percent": round(statistics.median(largest.values()), 2),
+        "worst_percent": round(max(largest.values()), 1),
+        "mean_extents_percent": _mean(float(np.mean(sides)) for sides in errors.values()),
+        "box_iou": _mean(_value(found.get(name, {}), "box_iou") or 0.0 for name in errors),
+        "joints_right": f"{sum(joints.values())} of {len(joints)}",
+        "mask_iou": {
+            kind: _mean(overlaps[name] for name in errors if kind_of(category[name]) == kind)
+            for kind in sorted({kind_of(category[name]) for name in errors})
+        },
+        "worst_height_percent": {
+            each: round(max(errors[name][2] for name in errors if category[name] == each), 1)
+            for each in _HEIGHTS
+            if each in category.values()
+        },
+        "far_off": [name for name in errors if largest[name] > FAR_OFF_PERCENT],
         "certified": outcome.certified,
         "cpu_minutes": round(outcome.cost.cpu_s / 60, 1),
-        "wrong": {name: round(error, 1) for name, (error, right) in judged.items() if error > USABLE_PERCENT or not right},
+        "wrong": {name: _failing(errors[name], joints.get(name, True)) for name in errors if name not in usable},
     }
 
 
-def judge(metrics: dict[str, Any]) -> tuple[float, bool]:
-    """The largest error of an extent, percent, and whether the joint is right (as it is of what has none); missing: wrong."""
-    sides = [value for name in _SIDES if (value := _value(metrics, name)) is not None]
-    if not sides:
-        return 100.0, False
-    joint = (_value(metrics, name) for name in ("joint_type", "hinge_side"))
-    return min(max(sides), 100.0), all(share is None or share == 1.0 for share in joint)
+def kind_of(category: str) -> str:
+    """Front, appliance or thing."""
+    known = category_of(category)
+    return "thing" if known is None else known.kind
+
+
+def extents_of(metrics: dict[str, Any]) -> list[float]:
+    """Errors of width, depth and height, percent; 100 where the object is missing."""
+    return [100.0 if (value := _value(metrics, name)) is None else value for name in _SIDES]
+
+
+def joint_right(metrics: dict[str, Any]) -> bool:
+    """Whether the joint's type is right and its hinge on the right side; missing: wrong."""
+    return _value(metrics, "joint_type") == 1.0 and _value(metrics, "hinge_side") in (None, 1.0)
+
+
+def _failing(sides: list[float], right: bool) -> str:
+    """The sides beyond the bound, as people read them, and the joint where it is wrong."""
+    words = [f"{name[0]} {error:.0f}" for name, error in zip(_SIDES, sides, strict=True) if error > USABLE_PERCENT]
+    return " ".join([*words, *([] if right else ["joint"])])
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    listed = list(values)
+    return round(statistics.fmean(listed), 3) if listed else None
 
 
 def _value(metrics: dict[str, Any], name: str) -> float | None:
@@ -80,12 +130,15 @@ def _value(metrics: dict[str, Any], name: str) -> float | None:
 
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
-    """As Markdown."""
-    lines = ["| kitchen | usable | median % | worst % | mask IoU | certified | wrong |", "|---|---|---|---|---|---|---|"]
+    """As Markdown; w, d and h are width, depth and height in percent."""
+    heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "wrong")
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, row in rows.items():
-        wrong = ", ".join(f"{key} {value:g}" for key, value in row["wrong"].items())
+        wrong = ", ".join(f"{key} ({what})" for key, what in row["wrong"].items())
+        masks = ", ".join(f"{kind}s {share}" for kind, share in row["mask_iou"].items())
         share = f"{row['usable']} of {row['objects']}"
-        figures = (share, row["median_percent"], row["worst_percent"], row["mask_iou"], row["certified"], wrong)
+        certified = "yes" if row["certified"] else "no"
+        figures = (share, row["median_percent"], row["worst_percent"], row["joints_right"], masks, certified, wrong)
         lines.append(f"| {name} | {' | '.join(str(figure) for figure in figures)} |")
     return "\n".join(lines)
 
