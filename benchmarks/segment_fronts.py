@@ -25,6 +25,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
@@ -82,18 +83,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def bench(kitchen: Path, folder: Path, clicks: int, pictures: Path | None) -> list[Trial]:
     """Every front of a kitchen, clicked that often."""
-    work = Workspace(folder)
-    capture = work.load_latest("ingest", "scene")
-    if capture is None:
-        read = read_capture(next(kitchen.glob("*.r3d")), work.store(kitchen.name), IngestConfig())
-        work.save("ingest", "scene", read, {"key": "benchmark", "seconds": 0.0})
-        capture = work.load_latest("ingest", "scene")
-    session: Any = open_session(capture, work.cache)
+    session, capture = opened(kitchen, folder)
     rng = np.random.default_rng(zlib.crc32(kitchen.name.encode()))
     trials = [
-        _try(session, front, click)
-        for front in _true_fronts(kitchen / "truth.json", capture.world_from_capture)
-        for click in _clicks(session.scene, front, clicks, rng)
+        try_click(session, front, click)
+        for front in true_fronts(kitchen / "truth.json", capture.world_from_capture)
+        for click in clicks_on(session.scene, front, clicks, rng)
     ]
     for trial in trials:
         if trial.worst_mm > RIGHT_MM:
@@ -104,7 +99,19 @@ def bench(kitchen: Path, folder: Path, clicks: int, pictures: Path | None) -> li
     return trials
 
 
-def _true_fronts(truth: Path, world_from_capture: Rigid3) -> Iterator[TrueFront]:
+def opened(kitchen: Path, folder: Path) -> tuple[Any, Capture]:
+    """A session on the kitchen's recording, and the capture; what was read is kept in `folder`."""
+    work = Workspace(folder)
+    capture = work.load_latest("ingest", "scene")
+    if capture is None:
+        read = read_capture(next(kitchen.glob("*.r3d")), work.store(kitchen.name), IngestConfig())
+        work.save("ingest", "scene", read, {"key": "benchmark", "seconds": 0.0})
+        capture = work.load_latest("ingest", "scene")
+    return open_session(capture, work.cache), capture
+
+
+def true_fronts(truth: Path, world_from_capture: Rigid3) -> Iterator[TrueFront]:
+    """The fronts that a truth.json lists."""
     for entry in json.loads(truth.read_text(encoding="utf-8"))["objects"]:
         if category_of(entry["category"]).kind == "front":
             width, depth, height = entry["dimensions_m"]
@@ -113,7 +120,7 @@ def _true_fronts(truth: Path, world_from_capture: Rigid3) -> Iterator[TrueFront]
             yield TrueFront(entry["name"], entry["category"], face, width, height)
 
 
-def _clicks(scene: Any, front: TrueFront, count: int, rng: np.random.Generator) -> Iterator[PromptPoint]:
+def clicks_on(scene: Any, front: TrueFront, count: int, rng: np.random.Generator) -> Iterator[PromptPoint]:
     """Random points of the face, each in a random frame that sees it; fewer where few are seen."""
     made = 0
     for _ in range(20 * count):
@@ -134,7 +141,8 @@ def _clicks(scene: Any, front: TrueFront, count: int, rng: np.random.Generator) 
             yield PromptPoint(frame=frame.index, x=float(u), y=float(v), label=1)
 
 
-def _try(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
+def try_click(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
+    """What that click gives for that front."""
     try:
         panel = session.find(ObjectPrompt(name=front.name, category=front.category, points=(click,))).panel()
     except R2C2RError:

@@ -64,7 +64,7 @@ def place_for(article: Article, number: int) -> Stage:
 @cache
 def _stage(seed: int, on_worktop: bool, reach: float) -> Stage:
     kitchen, _ = _kitchen(seed)
-    x = (kitchen.run[0] + kitchen.run[1]) / 2
+    x = sum(kitchen.runs[0].ends) / 2
     z = kitchen.worktop_top_m if on_worktop else 0.0
     spot = np.array([x, -0.25 if on_worktop else -kitchen.base_depth_m - 0.5, z])
     height = z + (0.45 if on_worktop else 0.5 + 0.4 * reach)

@@ -1,9 +1,11 @@
 """`r2c2r sample`."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 from r2c2r_core.commands.options import Parsers, add_command, seed, size, whole
+from r2c2r_core.synthetic.choices import PALETTES, SEEDS_OWN, STYLES, Choice
 from r2c2r_core.terminal import show_progress
 
 
@@ -14,6 +16,20 @@ def add(parsers: Parsers) -> None:
     added.add_argument("--seed", type=seed, default=0)
     added.add_argument("--opened", action="store_true", help="a drawer and a door stand open in the later frames")
     add_size(added)
+    added.formatter_class = argparse.RawDescriptionHelpFormatter
+    added.add_argument("--style", choices=STYLES, metavar="NAME", help="how fronts are made, as listed below")
+    added.add_argument("--palette", choices=PALETTES, metavar="NAME", help="their colours, as listed below")
+    added.epilog = "\n\n".join(
+        (
+            _listed("styles", STYLES),
+            _listed("palettes", PALETTES),
+            "With neither, a seed gives the kitchen it always gave: slabs, or frames round a sunk panel.",
+        )
+    )
+
+
+def _listed(title: str, names: Mapping[str, str]) -> str:
+    return "\n".join([f"{title}:", *(f"  {name:<12}{meaning}" for name, meaning in names.items())])
 
 
 def add_size(parser: argparse.ArgumentParser) -> None:
@@ -24,15 +40,21 @@ def add_size(parser: argparse.ArgumentParser) -> None:
 
 def sample(options: argparse.Namespace) -> int:
     """Write a synthetic kitchen recording with exact truth."""
-    write_recording(options.out, seed=options.seed, frames=options.frames, size=options.size, opened=options.opened)
+    choice = Choice(style=options.style, palette=options.palette)
+    write_recording(
+        options.out, seed=options.seed, frames=options.frames, size=options.size, opened=options.opened, choice=choice
+    )
     return 0
 
 
-def write_recording(out: Path, *, frames: int, size: tuple[int, int], seed: int = 0, opened: bool = False) -> None:
+def write_recording(
+    out: Path, *, frames: int, size: tuple[int, int], seed: int = 0, opened: bool = False, choice: Choice = SEEDS_OWN
+) -> None:
     """The recording, its truth and its prompts; their paths are printed."""
     from r2c2r_core.disk import explained_io
     from r2c2r_core.synthetic.stage import write_sample
 
     with show_progress() as progress, explained_io(out):
-        paths = write_sample(out, seed=seed, frames=frames, size=size, opened=opened, progress=progress.for_stage("sample"))
+        work = progress.for_stage("sample")
+        paths = write_sample(out, seed=seed, frames=frames, size=size, opened=opened, choice=choice, progress=work)
     print(f"{paths.scan}  {paths.truth}  {paths.prompts}")

@@ -30,6 +30,7 @@ class LitScene:
     normal_of_patch: np.ndarray  # (patches, 3): mean outward normal
     flat_patch: np.ndarray  # (patches,) bool
     reflectance_of_patch: np.ndarray  # (patches,) mean albedo, which decides what the depth sensor gets back
+    pane_faces: np.ndarray  # (faces,) which belong to clear glass
     face_normals: np.ndarray  # (m, 3) outward
     face_offsets: np.ndarray  # (m,) of the faces' planes
     emitters: tuple["Emitter", ...]
@@ -49,7 +50,8 @@ def light_scene(patches: list[Patch], rng: np.random.Generator) -> LitScene:
     """Paint, light and pack all patches."""
     tiles = [paint_tile(*_tile_size(patch), patch.paint, rng) for patch in patches]
     albedo = np.array([tile.reshape(-1, 3).mean(axis=0) for tile in tiles])
-    light = bake_light(patches, albedo, rng)
+    panes = np.array([patch.paint.kind == "glass" for patch in patches])
+    light = _light_through(patches, panes, albedo, rng)
     emitters = np.array([patch.paint.kind == "emitter" for patch in patches])
     exposure = _exposure(patches, albedo, light)
     lit = [
@@ -80,10 +82,20 @@ def light_scene(patches: list[Patch], rng: np.random.Generator) -> LitScene:
         normal_of_patch=np.array([_normal(patch) for patch in patches]),
         flat_patch=np.array([_is_flat(patch) for patch in patches]),
         reflectance_of_patch=albedo.mean(axis=1),
+        pane_faces=panes[mesh.patch_of_vertex[mesh.faces[:, 0]]],
         face_normals=normals,
         face_offsets=np.einsum("ij,ij->i", normals, first),
         emitters=tuple(_emitter(patch) for patch in patches if patch.paint.kind == "emitter"),
     )
+
+
+def _light_through(patches: list[Patch], panes: np.ndarray, albedo: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
+    """The light on every patch; panes stop none of it and have none of their own."""
+    solid = np.flatnonzero(~panes)
+    light = [np.ones((1, 1, 3), np.float32)] * len(patches)
+    for index, grid in zip(solid, bake_light([patches[i] for i in solid], albedo[solid], rng), strict=True):
+        light[index] = grid
+    return light
 
 
 def _emitter(patch: Patch) -> Emitter:

@@ -5,10 +5,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Furniture, Handle, Kitchen, Leaf, Paint
+from r2c2r_core.synthetic.fronts import handle_patches, leaf_patches
+from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Carcass, Furniture, Kitchen, Paint, Run
 from r2c2r_core.synthetic.opening import holds_opened, hollow, opened_front
-from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, tube, turned
-from r2c2r_core.synthetic.props import prop_patches, sink_bounds, window_frame
+from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, turned
+from r2c2r_core.synthetic.props import crockery, prop_patches, sink_bounds, window_frame
 
 _SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
 
@@ -16,17 +17,28 @@ _SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
 def build_kitchen(kitchen: Kitchen, opened: Mapping[str, float] = MappingProxyType({})) -> list[Patch]:
     """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background); `opened` as in opening.py."""
     ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
-    patches = [*_room(kitchen), *_base_body(kitchen, opened), *_upper_body(kitchen)]
-    for furniture in kitchen.base:
-        patches += _furniture(kitchen, furniture, kitchen.style.base_front, ids[furniture.name], opened.get(furniture.name))
-    for furniture in kitchen.upper:
-        patches += _furniture(kitchen, furniture, kitchen.style.wall_front, ids[furniture.name])
+    patches = _room(kitchen)
+    for run in kitchen.runs:
+        patches += _run(kitchen, run, ids, opened)
     patches += _fridge(kitchen, ids[kitchen.fridge.name])
     patches += _microwave(kitchen, ids[kitchen.microwave.name])
-    for prop in kitchen.props:
-        patches += prop_patches(kitchen, prop)
+    for run in kitchen.runs:
+        for prop in run.props:
+            patches += prop_patches(kitchen, prop)
     for bottle in kitchen.bottles:
         patches += _bottle(kitchen, bottle, ids.get(bottle.name, 0))
+    return patches
+
+
+def _run(kitchen: Kitchen, run: Run, ids: Mapping[str, int], opened: Mapping[str, float]) -> list[Patch]:
+    style = kitchen.style
+    patches = [*_base_body(kitchen, run, opened), *_upper_body(kitchen, run)]
+    for board in run.boards:
+        patches += box(board.low, board.high, board.paint, lumel_m=0.01)
+    for furniture in run.base:
+        patches += _furniture(kitchen, furniture, style.base_front, ids[furniture.name], opened.get(furniture.name))
+    for furniture in run.upper:
+        patches += _furniture(kitchen, furniture, style.wall_front, ids[furniture.name])
     return patches
 
 
@@ -44,8 +56,9 @@ def _room(kitchen: Kitchen) -> list[Patch]:
         quad(np.array([x1, y1, ceiling]), -dy, -dz, style.wall, lumel_m=0.06),
     ]
     patches += _lights(kitchen)
-    splash_top = min((c.z for c in kitchen.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
-    left, right = kitchen.run
+    run = kitchen.runs[0]
+    splash_top = min((c.z for c in run.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
+    left, right = run.ends
     patches += box(
         (left, -0.009, kitchen.worktop_top_m), (right, -0.0005, splash_top), style.splash, faces="front left right top"
     )
@@ -79,10 +92,10 @@ def _lights(kitchen: Kitchen) -> list[Patch]:
     return [lamp_quad, window, *window_frame(window)]
 
 
-def _base_body(kitchen: Kitchen, opened: Mapping[str, float]) -> list[Patch]:
-    style, left, right = kitchen.style, *kitchen.run
+def _base_body(kitchen: Kitchen, run: Run, opened: Mapping[str, float]) -> list[Patch]:
+    style, left, right = kitchen.style, *run.ends
     patches: list[Patch] = []
-    for carcass in kitchen.base_carcasses:
+    for carcass in run.base_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
         if holds_opened(carcass.x, carcass.width_m, kitchen, opened):
@@ -93,7 +106,7 @@ def _base_body(kitchen: Kitchen, opened: Mapping[str, float]) -> list[Patch]:
     overhang = 0.018
     top, bottom = kitchen.worktop_top_m, kitchen.worktop_top_m - kitchen.worktop_thickness_m
     patches += box((left, front - overhang, bottom), (right, 0.0, top), style.worktop, faces="front left right bottom")
-    patches += _worktop_surface(kitchen, front - overhang)
+    patches += _worktop_surface(kitchen, run, front - overhang)
     patches += box(
         (left + 0.005, front + 0.06, 0.0),
         (right - 0.005, front + 0.076, kitchen.plinth_m),
@@ -103,11 +116,11 @@ def _base_body(kitchen: Kitchen, opened: Mapping[str, float]) -> list[Patch]:
     return patches
 
 
-def _worktop_surface(kitchen: Kitchen, front: float) -> list[Patch]:
+def _worktop_surface(kitchen: Kitchen, run: Run, front: float) -> list[Patch]:
     """The top, with a hole where the sink is."""
-    left, right = kitchen.run
+    left, right = run.ends
     top = kitchen.worktop_top_m
-    sink = next((p for p in kitchen.props if p.kind == "sink"), None)
+    sink = next((p for p in run.props if p.kind == "sink"), None)
     pieces = [(left, right, front, 0.0)]
     if sink is not None:
         x0, x1, y0, y1 = sink_bounds(sink)
@@ -118,13 +131,37 @@ def _worktop_surface(kitchen: Kitchen, front: float) -> list[Patch]:
     ]
 
 
-def _upper_body(kitchen: Kitchen) -> list[Patch]:
+def _upper_body(kitchen: Kitchen, run: Run) -> list[Patch]:
     patches: list[Patch] = []
-    for carcass in kitchen.upper_carcasses:
+    for carcass in run.upper_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
-        patches += box(low, high, kitchen.style.carcass, faces="front left right top bottom")
+        if carcass.glazed:
+            patches += box(low, high, kitchen.style.carcass, faces="left right top bottom") + _glazed(carcass, kitchen)
+        else:
+            patches += box(low, high, kitchen.style.carcass, faces="front left right top bottom")
     return patches
+
+
+def _glazed(carcass: Carcass, kitchen: Kitchen) -> list[Patch]:
+    """What is seen through panes: boards of 16 mm, and cups and plates on two shelves."""
+    inside, wall = kitchen.style.carcass, 0.016
+    x0, x1 = carcass.x + wall, carcass.x + carcass.width_m - wall
+    z0, z1 = carcass.z + wall, carcass.z + carcass.height_m - wall
+    low, high = (x0, -carcass.depth_m, z0), (x1, -0.01, z1)
+    patches = hollow(low, high, inside)
+    for edge_low, edge_high in (
+        ((carcass.x, carcass.z), (x0, carcass.z + carcass.height_m)),
+        ((x1, carcass.z), (carcass.x + carcass.width_m, carcass.z + carcass.height_m)),
+        ((x0, carcass.z), (x1, z0)),
+        ((x0, z1), (x1, carcass.z + carcass.height_m)),
+    ):
+        edge = (edge_low[0], -carcass.depth_m, edge_low[1]), (edge_high[0], -carcass.depth_m + 0.001, edge_high[1])
+        patches += box(*edge, inside, faces="front")
+    levels = [z0, z0 + (z1 - z0) / 3, z0 + 2 * (z1 - z0) / 3]
+    for level in levels[1:]:
+        patches += box((x0, -carcass.depth_m + 0.02, level - wall), (x1, -0.01, level), inside, faces="front top bottom")
+    return [*patches, *(cup for level in levels for cup in crockery(x0, x1, -carcass.depth_m / 2, level))]
 
 
 def _furniture(
@@ -134,8 +171,7 @@ def _furniture(
     face = -furniture.depth_m
     patches: list[Patch] = []
     for leaf in furniture.leaves:
-        patches += _front_panel(leaf, face, style.front_thickness_m, paint, style.shaker, object_id)
-        patches += handle_patches(leaf.handle, np.array([leaf.x, face, leaf.z]), style.handle, object_id)
+        patches += leaf_patches(leaf, face, style.front_thickness_m, paint, style.handle, object_id)
     if opening is not None:
         patches = opened_front(furniture, patches, opening, style.front_thickness_m, style.carcass, object_id)
     first, last = furniture.leaves[0], furniture.leaves[-1]
@@ -149,62 +185,6 @@ def _furniture(
         x = last.x + last.width_m + edge
         patches += box((x - 0.0005, back, low), (x, 0.0, high), style.carcass, faces="right", object_id=object_id)
     return patches
-
-
-def _front_panel(leaf: Leaf, face_y: float, thickness: float, paint: Paint, shaker: bool, object_id: int) -> list[Patch]:
-    """A slab, or a frame of four rails round a recessed panel. `face_y` is the outer face."""
-    x0, x1, z0, z1 = leaf.x, leaf.x + leaf.width_m, leaf.z, leaf.z + leaf.height_m
-    rail = min(0.065, 0.25 * leaf.height_m)
-    if not shaker or leaf.height_m < 0.2:
-        return box(
-            (x0, face_y, z0), (x1, face_y + thickness, z1), paint, faces="front left right top bottom", object_id=object_id
-        )
-    patches = []
-    for low, high in (
-        ((x0, z0), (x0 + rail, z1)),
-        ((x1 - rail, z0), (x1, z1)),
-        ((x0 + rail, z1 - rail), (x1 - rail, z1)),
-        ((x0 + rail, z0), (x1 - rail, z0 + rail)),
-    ):
-        patches += box(
-            (low[0], face_y, low[1]),
-            (high[0], face_y + thickness, high[1]),
-            paint,
-            faces="front left right top bottom",
-            object_id=object_id,
-        )
-    recess = face_y + 0.007
-    inner_low, inner_high = (x0 + rail, recess, z0 + rail), (x1 - rail, recess + 0.006, z1 - rail)
-    return patches + box(inner_low, inner_high, paint, faces="front", object_id=object_id)
-
-
-def handle_patches(handle: Handle, corner: np.ndarray, paint: Paint, object_id: int) -> list[Patch]:
-    """A handle as real geometry; `corner` is the front's lower left corner on its outer face (facing -Y)."""
-    along = np.array([0.0, 0.0, 1.0]) if handle.vertical else np.array([1.0, 0.0, 0.0])
-    out = np.array([0.0, -1.0, 0.0])
-    centre = corner + np.array([handle.x, 0.0, handle.z])
-    half, radius = handle.length_m / 2, handle.thickness_m / 2
-    share = {"object_id": object_id, "is_handle": True}
-    if handle.kind == "knob":
-        stem = np.array([centre + out * 0.0, centre + out * (handle.reach_m - 0.012)])
-        head = np.array([centre + out * (handle.reach_m - 0.012), centre + out * handle.reach_m])
-        return [tube(stem, 0.007, paint, **share), tube(head, radius, paint, **share)]  # type: ignore[arg-type]
-    axis = centre + out * (handle.reach_m - radius)
-    if handle.kind == "bow":
-        turn = np.linspace(0, np.pi, 15)[:, None]
-        curve = centre - along * half * np.cos(turn) + out * (handle.reach_m - radius) * np.sin(turn) ** 0.6
-        return [tube(curve, radius, paint, **share)]  # type: ignore[arg-type]
-    posts = [
-        tube(np.array([foot, foot + out * (handle.reach_m - radius)]), radius * 0.7, paint, **share)  # type: ignore[arg-type]
-        for foot in (centre - along * (half - 0.02), centre + along * (half - 0.02))
-    ]
-    if handle.kind == "bar":
-        rod = tube(np.linspace(axis - along * half, axis + along * half, 5), radius, paint, **share)  # type: ignore[arg-type]
-        return [*posts, rod]
-    spread = along * half + np.array([1.0, 0.0, 1.0]) * (1 - np.abs(along)) * radius
-    low, high = axis - spread - np.array([0, 0.004, 0]), axis + spread + np.array([0, 0.004, 0])
-    bar = box(_triple(low), _triple(high), paint, object_id=object_id, is_handle=True, lumel_m=0.01)
-    return [*posts, *bar]
 
 
 def _fridge(kitchen: Kitchen, object_id: int) -> list[Patch]:
@@ -278,7 +258,3 @@ def _appliance_handle(thing: Appliance) -> Paint:
 def _contrast(colour: tuple[float, float, float], light: float = 0.6, dark: float = 0.12) -> tuple[float, float, float]:
     tone = light if sum(colour) / 3 < 0.35 else dark
     return (tone, tone, tone)
-
-
-def _triple(values: np.ndarray) -> tuple[float, float, float]:
-    return (float(values[0]), float(values[1]), float(values[2]))

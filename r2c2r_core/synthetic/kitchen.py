@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Hinge = Literal["left", "right"]
-HandleKind = Literal["bar", "flat", "bow", "knob"]
+HandleKind = Literal["bar", "flat", "bow", "knob", "cup"]
+Filling = Literal["panel", "glass", "frosted"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,16 +37,26 @@ class Handle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """Four rails round what fills a front: a sunk panel, clear glass, or glass that nothing is seen through."""
+
+    rail_m: float
+    recess_m: float
+    filling: Filling = "panel"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Leaf:
-    """One moving front panel, in the kitchen frame."""
+    """One moving front panel, in the frame of its run."""
 
     x: float  # left edge
     z: float  # bottom edge
     width_m: float
     height_m: float
     hinge: Hinge | None  # None: a drawer
-    handle: Handle
+    handle: Handle | None
     open_limit: float  # rad, or metres for a drawer
+    frame: Frame | None = None  # None: a slab
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +80,16 @@ class Carcass:
     width_m: float
     height_m: float
     depth_m: float  # without the front panel
+    glazed: bool = False  # open behind panes, with shelves of crockery
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Board:
+    """A fixed part that is nobody's object: a face frame, a channel, a filler, an end panel."""
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    paint: Paint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +140,19 @@ class Prop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """Units in a row. Its frame: x along it, the back at y = 0, fronts facing -Y, z up from the floor."""
+
+    base: tuple[Furniture, ...]
+    upper: tuple[Furniture, ...]
+    base_carcasses: tuple[Carcass, ...]
+    upper_carcasses: tuple[Carcass, ...]
+    ends: tuple[float, float]  # x of the worktop's ends
+    boards: tuple[Board, ...] = ()
+    props: tuple[Prop, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
     """What all units of one kitchen share."""
 
@@ -131,7 +165,6 @@ class Style:
     wall: Paint
     floor: Paint
     handle: Paint
-    shaker: bool
     gap_m: float
     front_thickness_m: float
     daylight: float  # share of the light that comes through the window
@@ -142,11 +175,7 @@ class Kitchen:
     """Everything the builder needs."""
 
     style: Style
-    base: tuple[Furniture, ...]
-    upper: tuple[Furniture, ...]
-    base_carcasses: tuple[Carcass, ...]
-    upper_carcasses: tuple[Carcass, ...]
-    run: tuple[float, float]  # x of the worktop's ends
+    runs: tuple[Run, ...]  # the first stands along the back wall
     plinth_m: float
     worktop_top_m: float
     worktop_thickness_m: float
@@ -155,10 +184,19 @@ class Kitchen:
     fridge: Appliance
     microwave: Appliance
     bottles: tuple[Bottle, ...]
-    props: tuple[Prop, ...]
     room: tuple[float, float, float, float, float]  # x_min, x_max, y_min, y_max, ceiling
     window_on_left: bool
     yaw_rad: float  # of the kitchen in the capture frame
+
+    @property
+    def base(self) -> tuple[Furniture, ...]:
+        """The prompted units under the worktops."""
+        return tuple(unit for run in self.runs for unit in run.base)
+
+    @property
+    def upper(self) -> tuple[Furniture, ...]:
+        """The prompted units on the walls."""
+        return tuple(unit for run in self.runs for unit in run.upper)
 
     @property
     def object_names(self) -> tuple[str, ...]:

@@ -1,11 +1,14 @@
 """Which kitchen a seed gives."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from r2c2r_core.synthetic.kitchen import (
     Appliance,
     Bottle,
     Carcass,
+    Frame,
     Furniture,
     Handle,
     HandleKind,
@@ -14,6 +17,7 @@ from r2c2r_core.synthetic.kitchen import (
     Leaf,
     Paint,
     Prop,
+    Run,
     Style,
 )
 from r2c2r_core.synthetic.style import pick_style, rgb
@@ -25,7 +29,7 @@ _STACKS = ((0.25, 0.25, 0.25, 0.25), (0.2, 0.4, 0.4), (1 / 3, 1 / 3, 1 / 3), (0.
 def plan_kitchen(seed: int) -> Kitchen:
     """The kitchen of a seed; every fixture closed."""
     rng = np.random.default_rng([seed, 1])
-    style = pick_style(rng)
+    style, shaker = pick_style(rng)
     worktop_top = float(rng.uniform(0.87, 0.93))
     thickness = float(rng.uniform(0.022, 0.042))
     plinth = float(rng.uniform(0.10, 0.15))
@@ -41,20 +45,24 @@ def plan_kitchen(seed: int) -> Kitchen:
     upper_bottom = worktop_top + float(rng.uniform(0.47, 0.55))
     upper, upper_carcasses = _place_upper(rng, style, handle_kind, right, fridge_left, upper_depth, upper_bottom)
 
-    fridge = _place_fridge(rng, style, right, fridge_left)
+    fridge = place_fridge(rng, right, fridge_left)
     fridge_edge = fridge.size_m[0] + 0.04
     x_min = -(fridge_edge if fridge_left else 0.0) - float(rng.uniform(0.05, 0.9))
     x_max = right + (0.0 if fridge_left else fridge_edge) + float(rng.uniform(0.05, 0.9))
-    microwave = _place_microwave(rng, right, worktop_top)
-    props, bottles = _fill_worktop(rng, right, microwave, base, base_depth)
-    props = (*props, *_hang_on_wall(rng, right, upper))
-    return Kitchen(
-        style=style,
-        base=base,
-        upper=upper,
+    microwave = place_microwave(rng, right, worktop_top)
+    props, bottles = fill_worktop(rng, right, microwave, base, base_depth)
+    props = (*props, *hang_on_wall(rng, right, upper))
+    run = Run(
+        base=_framed(base) if shaker else base,
+        upper=_framed(upper) if shaker else upper,
         base_carcasses=base_carcasses,
         upper_carcasses=upper_carcasses,
-        run=(-0.0 if fridge_left else -0.01, right + (0.01 if fridge_left else 0.0)),
+        ends=(-0.0 if fridge_left else -0.01, right + (0.01 if fridge_left else 0.0)),
+        props=props,
+    )
+    return Kitchen(
+        style=style,
+        runs=(run,),
         plinth_m=plinth,
         worktop_top_m=worktop_top,
         worktop_thickness_m=thickness,
@@ -63,10 +71,25 @@ def plan_kitchen(seed: int) -> Kitchen:
         fridge=fridge,
         microwave=microwave,
         bottles=bottles,
-        props=props,
         room=(x_min, x_max, -float(rng.uniform(3.7, 4.3)), 0.0, float(rng.uniform(2.45, 2.65))),
         window_on_left=not fridge_left,
         yaw_rad=float(rng.uniform(-np.pi, np.pi)),
+    )
+
+
+def _framed(units: tuple[Furniture, ...]) -> tuple[Furniture, ...]:
+    """The units with a frame round a sunk panel on every front that is high enough for one."""
+    return tuple(
+        replace(
+            unit,
+            leaves=tuple(
+                leaf
+                if leaf.height_m < 0.2
+                else replace(leaf, frame=Frame(rail_m=min(0.065, 0.25 * leaf.height_m), recess_m=0.007))
+                for leaf in unit.leaves
+            ),
+        )
+        for unit in units
     )
 
 
@@ -218,7 +241,8 @@ def _place_upper(
     return tuple(furniture), tuple(carcasses)
 
 
-def _place_fridge(rng: np.random.Generator, style: Style, right: float, on_left: bool) -> Appliance:
+def place_fridge(rng: np.random.Generator, right: float, on_left: bool) -> Appliance:
+    """A refrigerator beside a run that ends at `right`."""
     width, depth, height = float(rng.uniform(0.55, 0.68)), float(rng.uniform(0.60, 0.68)), float(rng.uniform(1.45, 1.78))
     space = float(rng.uniform(0.012, 0.03))
     x = -space - width / 2 if on_left else right + space + width / 2
@@ -259,7 +283,8 @@ def _place_fridge(rng: np.random.Generator, style: Style, right: float, on_left:
     )
 
 
-def _place_microwave(rng: np.random.Generator, right: float, worktop_top: float) -> Appliance:
+def place_microwave(rng: np.random.Generator, right: float, worktop_top: float) -> Appliance:
+    """A microwave on the worktop of a run that ends at `right`."""
     width, depth, height = float(rng.uniform(0.44, 0.52)), float(rng.uniform(0.33, 0.40)), float(rng.uniform(0.26, 0.31))
     x = float(rng.uniform(0.45, 0.55)) * right + float(rng.choice((-1.0, 1.0))) * 0.28 * right
     hinge: Hinge = "left" if rng.random() < 0.85 else "right"
@@ -291,7 +316,7 @@ def _place_microwave(rng: np.random.Generator, right: float, worktop_top: float)
     )
 
 
-def _fill_worktop(
+def fill_worktop(
     rng: np.random.Generator, right: float, microwave: Appliance, base: tuple[Furniture, ...], base_depth: float
 ) -> tuple[tuple[Prop, ...], tuple[Bottle, ...]]:
     """Three bottles, and what else fits beside the microwave, none overlapping along the run."""
@@ -340,7 +365,7 @@ def _free_place(rng: np.random.Generator, right: float, taken: list[tuple[float,
     return None
 
 
-def _hang_on_wall(rng: np.random.Generator, right: float, upper: tuple[Furniture, ...]) -> tuple[Prop, ...]:
+def hang_on_wall(rng: np.random.Generator, right: float, upper: tuple[Furniture, ...]) -> tuple[Prop, ...]:
     """A shelf of books beside the wall cabinets where there is room, and sockets."""
     left_end, right_end = upper[0].leaves[0].x, upper[-1].leaves[0].x + upper[-1].leaves[0].width_m
     white = Paint(kind="laminate", colour=(0.80, 0.80, 0.78), texel_m=0.002)

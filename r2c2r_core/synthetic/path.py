@@ -51,7 +51,7 @@ def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, 
 
     A look at the whole, out along the run at standing height, the refrigerator from top to bottom, and back lower and closer.
     """
-    left, right = kitchen.run
+    left, right = kitchen.runs[0].ends
     fridge = kitchen.fridge
     near, far = min(left, fridge.centre[0] - fridge.size_m[0] / 2), max(right, fridge.centre[0] + fridge.size_m[0] / 2)
     start, end = (near, far) if rng.random() < 0.5 else (far, near)

@@ -13,6 +13,7 @@ from r2c2r_core.synthetic.atlas import Emitter, LitScene
 
 _OVERSAMPLE = 2
 _SHINE_STEP = 4
+_PANE_PASSES = 0.86  # of the light, through 4 mm of clear glass and back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,14 +41,28 @@ def render_view(scene: LitScene, camera: Intrinsics, camera_from_kitchen: Rigid3
     at = slice(1, None, _OVERSAMPLE)
     depth = raster.depth_m[at, at]
     patch = np.where(depth > 0, np.rint(raster.attributes[at, at, 2]), -1).astype(np.int32)
+    if scene.pane_faces.any():
+        colour, patch, depth = _through_panes(scene, colour, patch, depth, camera, camera_from_kitchen)
     shine = reflections(scene, patch, depth, camera, camera_from_kitchen)
     return View(colour=np.asarray(cv2.add(colour, shine), dtype=np.uint8), patch=patch, depth_m=depth)
 
 
-def facing_faces(scene: LitScene, camera_from_kitchen: Rigid3) -> Faces:
-    """The faces whose outside the camera may see: everything here is closed, so the others are hidden."""
+def facing_faces(scene: LitScene, camera_from_kitchen: Rigid3, *, panes: bool = False) -> Faces:
+    """The faces whose outside the camera may see, of clear glass or of all else: everything is closed, so no other is seen."""
     eye = camera_from_kitchen.inverse.translation
-    return scene.faces[scene.face_normals @ eye > scene.face_offsets]
+    return scene.faces[(scene.face_normals @ eye > scene.face_offsets) & (scene.pane_faces == panes)]
+
+
+def _through_panes(
+    scene: LitScene, colour: Image, patch: np.ndarray, depth_m: np.ndarray, camera: Intrinsics, camera_from_kitchen: Rigid3
+) -> tuple[Image, np.ndarray, np.ndarray]:
+    """Colour, patch and depth where clear glass stands before what was drawn: dimmed, and of the pane."""
+    facing = facing_faces(scene, camera_from_kitchen, panes=True)
+    panes = rasterize(scene.vertices, facing, scene.attributes, camera, camera_from_kitchen)
+    before = (panes.depth_m > 0) & ((panes.depth_m < depth_m) | (depth_m <= 0))
+    dimmed = np.where(before[..., None], (colour * _PANE_PASSES).astype(np.uint8), colour)
+    owner = np.where(before, np.rint(panes.attributes[..., 2]), patch).astype(np.int32)
+    return dimmed, owner, np.where(before, panes.depth_m, depth_m)
 
 
 def reflections(

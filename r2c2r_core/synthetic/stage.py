@@ -13,12 +13,14 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.synthetic.atlas import LitScene, light_scene
 from r2c2r_core.synthetic.build import build_kitchen
+from r2c2r_core.synthetic.choices import SEEDS_OWN, Choice
 from r2c2r_core.synthetic.layout import plan_kitchen
 from r2c2r_core.synthetic.opening import OPENED_FROM, opened_units
 from r2c2r_core.synthetic.path import SECONDS, Shot, walk
 from r2c2r_core.synthetic.record3d import Record3DWriter
 from r2c2r_core.synthetic.render import photograph, render_view
 from r2c2r_core.synthetic.sensor import scan_depth
+from r2c2r_core.synthetic.styled import plan_styled_kitchen
 from r2c2r_core.synthetic.truth import Sightings, capture_from_kitchen, prompts_document, true_objects, truth_document
 
 _FOCAL_PER_LONG_SIDE = 0.757  # 726.6 px at 960 px: a real iPhone recording
@@ -50,6 +52,7 @@ def write_sample(
     frames: int = 180,
     size: tuple[int, int] = (960, 720),
     opened: bool = False,
+    choice: Choice = SEEDS_OWN,
     progress: Progress = SILENT,
 ) -> SamplePaths:
     """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
@@ -62,7 +65,7 @@ def write_sample(
     out.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(paths.masks, ignore_errors=True)
     progress.at(0.0, "building the kitchen")
-    kitchen = plan_kitchen(seed)
+    kitchen = plan_kitchen(seed) if choice == SEEDS_OWN else plan_styled_kitchen(seed, choice)
     openings = opened_units(kitchen) if opened else {}
     opened_from = round(OPENED_FROM * frames) if openings else frames
     closed = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))

@@ -5,7 +5,8 @@ import numpy as np
 from r2c2r_core.synthetic.kitchen import Paint, Style
 
 
-def pick_style(rng: np.random.Generator) -> Style:
+def pick_style(rng: np.random.Generator) -> tuple[Style, bool]:
+    """A kitchen's paints and measures, and whether its fronts are framed."""
     fronts: list[Paint] = [
         Paint(kind="laminate", colour=(0.82, 0.81, 0.78), gloss=0.25),
         Paint(kind="laminate", colour=(0.76, 0.72, 0.62), gloss=0.15),
@@ -40,7 +41,8 @@ def pick_style(rng: np.random.Generator) -> Style:
         Paint(kind="laminate", colour=(0.02, 0.02, 0.022), gloss=0.3, texel_m=0.002),
         Paint(kind="steel", colour=(0.58, 0.42, 0.18), gloss=0.8, texel_m=0.002),
     ][int(rng.integers(3))]
-    return Style(
+    shaker = bool(rng.random() < 0.3)
+    style = Style(
         base_front=base,
         wall_front=upper,
         carcass=Paint(kind="laminate", colour=(0.70, 0.69, 0.66), texel_m=0.004),
@@ -50,11 +52,11 @@ def pick_style(rng: np.random.Generator) -> Style:
         wall=wall,
         floor=floor,
         handle=metal,
-        shaker=bool(rng.random() < 0.3),
         gap_m=float(rng.uniform(0.002, 0.004)),
         front_thickness_m=float(rng.uniform(0.018, 0.021)),
         daylight=float(rng.uniform(0.3, 0.7)),
     )
+    return style, shaker
 
 
 def rgb(values: object) -> tuple[float, float, float]:

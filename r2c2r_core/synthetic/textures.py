@@ -224,4 +224,5 @@ PAINTERS: dict[str, Painter] = {
     "picture": _picture,
     "plain": _plain,
     "emitter": _plain,
+    "glass": _plain,
 }

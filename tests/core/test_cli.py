@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from r2c2r_core import cli
 from r2c2r_core.cli import main
+from r2c2r_core.synthetic.choices import PALETTES, STYLES
 
 from .ingest.corruptions import Corruption, corrupt_r3d
 from .ingest.tiny import TinyRoom, write_r3d
@@ -46,6 +48,15 @@ def test_help_and_version() -> None:
 def test_wrong_usage_is_two() -> None:
     r2c2r("fly", code=2)
     r2c2r("sample", "x", "--size", "big", code=2)
+
+
+@pytest.mark.parametrize(("option", "names"), [("--style", STYLES), ("--palette", PALETTES)])
+def test_a_sample_explains_its_choices_and_names_them_where_one_is_unknown(option: str, names: dict[str, str]) -> None:
+    said, _ = r2c2r("sample", "--help", code=0)
+    _, refused = r2c2r("sample", "x", option, "baroque", code=2)
+    for name, meaning in names.items():
+        assert name in refused.splitlines()[-1]
+        assert re.search(rf"^  {name} +{re.escape(meaning)}$", said, re.MULTILINE)
 
 
 def test_a_missing_recording_is_named(tmp_path: Path, prompts: Path) -> None:

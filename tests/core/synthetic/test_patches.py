@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from r2c2r_core.synthetic.build import handle_patches
+from r2c2r_core.synthetic.fronts import handle_patches
 from r2c2r_core.synthetic.kitchen import Handle, Paint
 from r2c2r_core.synthetic.mesh import join_patches
 from r2c2r_core.synthetic.patches import LONGEST_EDGE_M, Patch, box, lathe, tube, turned

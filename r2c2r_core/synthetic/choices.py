@@ -1,0 +1,39 @@
+"""What a person may ask of a synthetic kitchen, by name."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+STYLES: Mapping[str, str] = MappingProxyType(
+    {
+        "slab": "flat fronts with a bar, bow or flat handle",
+        "shaker": "a frame of four rails round a sunk panel",
+        "framed": "fronts inset in a face frame, with knobs",
+        "handleless": "channels to reach into over the fronts, no handle",
+        "push": "flat fronts with nothing on them: pushed to open",
+        "glass": "wall cabinets of framed glass, clear or frosted",
+        "cup": "cup pulls on drawers, knobs on doors",
+        "knobs": "a knob on every front, flat or framed",
+    }
+)
+PALETTES: Mapping[str, str] = MappingProxyType(
+    {
+        "painted": "one matt colour",
+        "wood": "veneer with its grain, from ash to walnut",
+        "dark": "black and near it, high gloss: depth sensors get little back",
+        "white": "white on white: fronts, worktop, plinth and wall",
+        "two-tone": "wall cabinets in another colour than the units below",
+    }
+)
+DEFAULT_STYLE = "slab"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What was asked for; with nothing asked the kitchen is the seed's own."""
+
+    style: str | None = None  # of STYLES
+    palette: str | None = None  # of PALETTES
+
+
+SEEDS_OWN = Choice()
