@@ -17,7 +17,7 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
 from r2c2r_core.synthesize.fillers import leave_fillers
 from r2c2r_core.synthesize.runs import align_runs
-from r2c2r_core.synthesize.solve import solved
+from r2c2r_core.synthesize.solve import solved, strain
 from r2c2r_core.synthesize.ties import ties_of
 from r2c2r_core.tuning import param, tuned
 
@@ -35,6 +35,9 @@ class Params:
         0.035, "m", "moved by more, an object is pointed out: more than fillers and errors of measuring explain"
     )
     rounds: int = param(6, "count", "of parting what overlaps", ge=1)
+    outlier: float = param(
+        12.0, "σ", "of measuring, by which an overlap shows that one of the two is not what it was taken for", gt=0
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,11 +47,17 @@ class Layout:
     objects: tuple[MeasuredObject, ...]
     moves_m: dict[str, float]
     warnings: tuple[str, ...]
+    outliers: dict[str, str]  # by object, in one line: what cannot be there beside the others; it moved none of them
 
 
 def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floor_found: bool) -> Layout:
-    """Align the runs, settle what stands, solve for shared lines without overlaps."""
+    """Align the runs, settle what stands, solve for shared lines without overlaps.
+
+    Outliers are not among the layout's objects: they stand as they were measured, and change nothing.
+    """
     params = tuned(Params)
+    outliers = outliers_of(objects)
+    objects = [item for item in objects if item.name not in outliers]
     placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
@@ -59,7 +68,50 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
     warnings += [
         f"{name} was moved by {1000 * by:.0f} mm: check its size and pose" for name, by in moves.items() if by > params.far_m
     ]
-    return Layout(objects=tuple(placed), moves_m=moves, warnings=tuple(warnings))
+    return Layout(objects=tuple(placed), moves_m=moves, warnings=tuple(warnings), outliers=outliers)
+
+
+def with_outliers(layout: Layout, measured: Sequence[MeasuredObject]) -> Layout:
+    """The layout with its outliers among its objects, where they were measured, each with its warning."""
+    kept = [item for item in measured if item.name in layout.outliers]
+    return Layout(
+        objects=(*layout.objects, *kept),
+        moves_m=layout.moves_m | {item.name: 0.0 for item in kept},
+        warnings=(*layout.warnings, *(f"{name}: {why}" for name, why in layout.outliers.items())),
+        outliers={},
+    )
+
+
+def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
+    """Of objects that overlap by more than errors of measuring explain, those that must go for the rest to agree, and why.
+
+    The one in most such overlaps goes first; of equals the one whose size and front are less likely. What a person placed
+    stays.
+    """
+    params, found = tuned(Params), dict[str, str]()
+    clashes = {
+        (objects[i].name, objects[j].name): depth
+        for i, j, depth in overlapping_pairs(objects)
+        if strain(objects, (i, j), params.gap_m) > params.outlier
+    }
+    likely = {item.name: _likely(item) for item in objects}
+    while clashes:
+        names = [name for pair in clashes for name in pair]
+        worst = max(dict.fromkeys(names), key=lambda name: (likely[name] < np.inf, names.count(name), -likely[name]))
+        if likely[worst] == np.inf:
+            break
+        others = {other: depth for pair, depth in clashes.items() if worst in pair for other in pair if other != worst}
+        said = ", ".join(f"{other} by {1000 * depth:.0f} mm" for other, depth in others.items())
+        found[worst] = f"where it was measured it overlaps {said}, and they agree without it; click it again"
+        clashes = {pair: depth for pair, depth in clashes.items() if worst not in pair}
+    return found
+
+
+def _likely(item: MeasuredObject) -> float:
+    """How far a measurement is to be believed; infinitely where a person gave it."""
+    width, _, height = item.dimensions_m
+    fit = item.spec.width.fit(float(width)) * item.spec.height.fit(float(height))
+    return float("inf") if item.fixed_by_person else float(item.confidence * fit)
 
 
 def anchor(item: MeasuredObject) -> Vector3:

@@ -75,6 +75,14 @@ def solved(
     return items
 
 
+def strain(items: Sequence[MeasuredObject], pair: tuple[int, int], gap_m: float) -> float:
+    """By how many standard deviations of measuring two objects overlap, along the axis on which that is least."""
+    faces = np.concatenate([_faces(item) for item in items])
+    sigma = np.concatenate([_measured_sigmas(item) for item in items])
+    row, overlap = _separation(items, pair, faces, sigma, gap_m)
+    return _cost(items, -row, overlap, sigma)
+
+
 def _solved(
     items: Sequence[MeasuredObject], ties: Sequence[Tie], apart: Sequence[tuple[int, int]], gap_m: float
 ) -> list[MeasuredObject]:
@@ -135,6 +143,14 @@ def _sigmas(item: MeasuredObject) -> np.ndarray:
         return np.full(6, params.thing_m)
     if item.spec.stands:
         return np.full(6, params.appliance_m)
+    return _measured_sigmas(item)
+
+
+def _measured_sigmas(item: MeasuredObject) -> np.ndarray:
+    """The same of what is measured, whatever gives way more easily."""
+    params = tuned(Params)
+    if item.spec.opens == "rigid":
+        return np.full(6, params.thing_m)
     edge = params.measured_edge_m if item.front_measured else params.mesh_edge_m
     back = params.unseen_m if _unseen_back(item) else edge
     return np.array([edge, edge, params.plane_m, back, edge, edge])

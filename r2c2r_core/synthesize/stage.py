@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
-from r2c2r_core.synthesize.layout import arrange
+from r2c2r_core.synthesize.layout import arrange, with_outliers
 from r2c2r_core.synthesize.opening import open_all
 from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
 from r2c2r_core.synthesize.slabs import Slab
@@ -33,6 +34,7 @@ from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 from r2c2r_core.tuning import Changes, param, tuned
 
+Outliers = Literal["leave-out", "keep"]
 _WOOD = (0.80, 0.76, 0.70)
 
 
@@ -51,6 +53,9 @@ class SynthesizeConfig:
     box: BoxSearch = setting("upright", "upright, or powell (the paper's): how a box is fitted (benchmarks/boxes.json)")
     surroundings: bool = setting(True, "whether worktops and plinths that the scan shows and nobody clicked are added")
     fixtures: str = setting(CARCASSES.default, "boards, or scene-synthesizer (its extra), the paper's: what makes carcasses")
+    outliers: Outliers = setting(
+        "leave-out", "leave-out, or keep where it was measured: what overlaps others by more than errors of measuring explain"
+    )
     params: Changes = tuned_numbers("synthesize")
 
 
@@ -82,6 +87,9 @@ def build_scene(
         raise StageError("no object could be measured", hint="; ".join(failures.values()))
     progress.at(0.5, "arranging")
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
+    if config.outliers == "keep":
+        layout = with_outliers(layout, measured)
+    failures |= {name: f"synthesize: {name}: left out: {why}" for name, why in layout.outliers.items()}
     hinges = choose_hinges(layout.objects, overrides)
     built: list[SceneObject] = []
     for item in progress.part(0.5, 0.9).each(layout.objects, "building"):

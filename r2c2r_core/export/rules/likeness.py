@@ -19,15 +19,17 @@ def check_likeness(files: BundleFiles) -> Iterator[Finding]:
         return
     try:
         manifest = parse_json(path.read_bytes(), "manifest.json", BundleError, hint="")
-        yield from _contradictions(manifest.get("contradictions", []))
+        present = {item["name"] for item in manifest["objects"]}
+        yield from _contradictions(manifest.get("contradictions", []), present)
         yield from (found for item in manifest["objects"] for joint in item.get("joints", []) for found in _cut_short(joint))
     except (BundleError, KeyError, TypeError, AttributeError):
         return
 
 
-def _contradictions(entries: list[dict[str, Any]]) -> Iterator[Finding]:
+def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterator[Finding]:
+    """Those among objects of the bundle: what was left out of it contradicts nothing there."""
     for entry in entries:
-        if entry["rule"] in LIKENESS_RULES:
+        if entry["rule"] in LIKENESS_RULES and present.issuperset(entry["objects"]):
             yield finding(entry["rule"], ", ".join(entry["objects"]), f"{entry['message']}; {entry['mend']}")
 
 

@@ -5,19 +5,21 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.synthesize import layout as layout_module
 from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
-from r2c2r_core.synthesize.layout import Layout, arrange, overlapping_pairs
+from r2c2r_core.synthesize.layout import Layout, arrange, overlapping_pairs, with_outliers
 from r2c2r_core.synthesize.layout import Params as LayoutParams
 from r2c2r_core.tuning import tuned
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
+NOTHING = ObjectOverride()
+
 
 def arranged(*units: Unit, overrides: dict[str, ObjectOverride] | None = None, manhattan: float = 0.3) -> Layout:
-    rng = np.random.default_rng(0)
-    items: list[MeasuredObject] = []
-    for unit in units:
-        override = (overrides or {}).get(unit.name, ObjectOverride())
-        items.append(measure_object(capture(), *placed_unit(unit, rng), category_of(unit.category), override))
+    items = [placed(unit, (overrides or {}).get(unit.name, ObjectOverride())) for unit in units]
     return arrange(items, manhattan, floor_found=True)
+
+
+def placed(unit: Unit, override: ObjectOverride = NOTHING) -> MeasuredObject:
+    return measure_object(capture(), *placed_unit(unit, np.random.default_rng(0)), category_of(unit.category), override)
 
 
 def run_of_doors(noise_m: float, yaw_noise_rad: float) -> list[Unit]:
@@ -91,10 +93,36 @@ def test_large_overlaps_are_moved_apart_and_the_moves_are_reported() -> None:
 
 def test_a_move_larger_than_measuring_explains_is_told() -> None:
     layout = arranged(
-        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.38, 0, 0.5), (0.5, 0.58, 0.7))
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "refrigerator", (0.5, 0, 0.9), (0.65, 0.62, 1.8))
     )
     assert overlapping_pairs(layout.objects) == []
-    assert ["a was moved by" in layout.warnings[0], "b was moved by" in layout.warnings[1]] == [True, True]
+    assert ["b was moved by" in warning for warning in layout.warnings] == [True]
+
+
+def test_what_cannot_be_there_moves_nothing_and_is_named() -> None:
+    """Three fronts that each took in a part of the run, over two cabinets and a refrigerator that are right."""
+    right = [
+        Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)),
+        Unit("b", "cabinet", (0.503, 0, 0.5), (0.5, 0.58, 0.7)),
+        Unit("cold", "refrigerator", (1.1, 0, 0.9), (0.65, 0.62, 1.8)),
+    ]
+    wrong = Unit("wide", "cabinet", (0.6, 0, 0.5), (1.2, 0.58, 0.7))
+    layout = arranged(*right, wrong, manhattan=0.0)
+    assert [item.name for item in layout.objects] == ["a", "b", "cold"]
+    assert max(layout.moves_m.values()) < 0.005
+    assert list(layout.outliers) == ["wide"]
+    assert "overlaps a by" in layout.outliers["wide"]
+    assert with_outliers(layout, [placed(wrong)]).objects[-1].name == "wide"
+
+
+def test_what_a_person_placed_is_no_outlier() -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = (0.0, 0.0, 0.5)
+    units = [
+        Unit("a", "cabinet", (0.0, 0, 0.5), (0.5, 0.58, 0.7)),
+        Unit("b", "cabinet", (0.2, 0, 0.5), (0.5, 0.58, 0.7)),
+    ]
+    assert list(arranged(*units, overrides={"a": ObjectOverride(pose=pose)}).outliers) == ["b"]
 
 
 def test_what_a_person_placed_stays_and_the_other_gives_way() -> None:
