@@ -204,7 +204,8 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     merge.get_by_role("button", name="Keep what is chosen").click()
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     bea.keyboard.press("Control+z")
-    expect(bea.get_by_text("0 of 1 object accepted")).to_be_visible()
+    for page in people:
+        expect(page.get_by_text("0 of 1 object accepted")).to_be_visible()
     bea.keyboard.press("Control+y")
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     expect(ann.get_by_text("1 of 1 object accepted")).to_be_visible()

@@ -18,6 +18,7 @@ import { forget, keep, keptBy, named } from "../../static/js/lib/kept.js";
 import { nextPage } from "../../static/js/lib/next-page.js";
 import { moved, shiftBetween } from "../../static/js/lib/moved.js";
 import { together } from "../../static/js/lib/together.js";
+import { Answers } from "../../static/js/lib/answers.js";
 import { Newest } from "../../static/js/lib/newest.js";
 import { patiently } from "../../static/js/lib/patience.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
@@ -379,4 +380,23 @@ test("a mask that leaves out a click on it or takes in one off it says so", () =
   assert.deepEqual(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(50.5, 1), click(70.5, 0)])]), []);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(60.5, 1)])])[0].text, /leaves out a click/);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(30.5, 0)])])[0].text, /takes in a click/);
+});
+
+test("an answer that a later one overtook is not taken, and one before a failure is", async () => {
+  const answers = new Answers();
+  const shown = [];
+  const say = [];
+  const taken = [0, 1, 2].map((k) => {
+    const asked = new Promise((resolve, reject) => (say[k] = { resolve, reject }));
+    return answers.take(asked, (answer) => shown.push(answer));
+  });
+  say[2].reject(new Error("the server is away"));
+  await assert.rejects(taken[2], /away/);
+  say[1].resolve("second");
+  await taken[1];
+  say[0].resolve("first");
+  await taken[0];
+  assert.deepEqual(shown, ["second"]);
+  await answers.take(Promise.resolve("fourth"), (answer) => shown.push(answer));
+  assert.deepEqual(shown, ["second", "fourth"]);
 });

@@ -3,6 +3,7 @@
 import { listComments, resolveComment } from "../api.js";
 import { addComment } from "../changes.js";
 import { h, LiveElement, renew } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { ago, counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -16,6 +17,7 @@ export class CommentList extends LiveElement {
   project = "";
   /** @type {Comment[]} */
   #all = [];
+  #answers = new Answers();
   #settled = h("input", { type: "checkbox" });
   #heading = h("h2", {}, "Comments");
   #list = h("ul", { class: "comments" });
@@ -31,9 +33,11 @@ export class CommentList extends LiveElement {
   async load() {
     if (!this.project) return;
     try {
-      this.#all = await listComments(this.project);
-      this.#draw();
-      this.emit("comments", this.open);
+      await this.#answers.take(listComments(this.project), (all) => {
+        this.#all = all;
+        this.#draw();
+        this.emit("comments", this.open);
+      });
     } catch (error) {
       sayError(error);
     }

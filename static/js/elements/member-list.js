@@ -2,6 +2,7 @@
 
 import { getMembers, setMembers } from "../api.js";
 import { h, icon, LiveElement, renew } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { live } from "../live.js";
 import { say, sayError } from "./toasts.js";
 
@@ -9,6 +10,7 @@ import { say, sayError } from "./toasts.js";
 
 export class MemberList extends LiveElement {
   project = "";
+  #answers = new Answers();
   #name = h("input");
   /** @type {Promise<void>} */
   #turn = Promise.resolve();
@@ -20,7 +22,7 @@ export class MemberList extends LiveElement {
 
   async #load() {
     try {
-      this.#draw(await getMembers(this.project, this.signal));
+      await this.#answers.take(getMembers(this.project, this.signal), (now) => this.#draw(now));
     } catch (error) {
       sayError(error);
     }

@@ -2,6 +2,7 @@
 
 import { getObjectPoints } from "../api.js";
 import { h, LiveElement } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { decodePoints, project } from "../lib/points.js";
 import { sayError } from "./toasts.js";
 
@@ -10,6 +11,7 @@ const NONE = "Choose an object to see its points.";
 
 export class ObjectCloud extends LiveElement {
   project = "";
+  #answers = new Answers();
   #canvas = h("canvas", {
     width: 260,
     height: 180,
@@ -64,13 +66,14 @@ export class ObjectCloud extends LiveElement {
     const object = this.#object;
     if (object === null || this.signal.aborted) return;
     try {
-      const found = await getObjectPoints(this.project, object, this.signal);
-      if (object !== this.#object) return;
-      this.#cloud = found.count ? decodePoints(found) : null;
-      this.#text.textContent = found.count
-        ? `${found.size_m.map((side) => (100 * side).toFixed(0)).join(" × ")} cm, from ${found.frames} frames`
-        : "No points yet.";
-      this.#draw();
+      await this.#answers.take(getObjectPoints(this.project, object, this.signal), (found) => {
+        if (object !== this.#object) return;
+        this.#cloud = found.count ? decodePoints(found) : null;
+        this.#text.textContent = found.count
+          ? `${found.size_m.map((side) => (100 * side).toFixed(0)).join(" × ")} cm, from ${found.frames} frames`
+          : "No points yet.";
+        this.#draw();
+      });
     } catch (error) {
       sayError(error);
     }

@@ -5,6 +5,7 @@
 
 import { getPhotos } from "../api.js";
 import { h, LiveElement, renew, segments, slider } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { boxEdges } from "../lib/box-view.js";
 import { sayError } from "./toasts.js";
 
@@ -20,6 +21,7 @@ const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance" };
 
 export class PhotoCheck extends LiveElement {
   project = "";
+  #answers = new Answers();
   #object = -1;
   /** @type {ObjectPhotos | null} */
   #all = null;
@@ -60,11 +62,12 @@ export class PhotoCheck extends LiveElement {
       this.#all = null;
     }
     try {
-      const found = await getPhotos(this.project, object);
-      if (this.#object !== object) return;
-      this.#all = found;
-      if (!found.of.includes(this.#of)) this.#of = found.of.at(-1) ?? "placed";
-      this.#draw();
+      await this.#answers.take(getPhotos(this.project, object), (found) => {
+        if (this.#object !== object) return;
+        this.#all = found;
+        if (!found.of.includes(this.#of)) this.#of = found.of.at(-1) ?? "placed";
+        this.#draw();
+      });
     } catch (error) {
       sayError(error);
     }

@@ -6,6 +6,7 @@
 import { getProposals, restoreProposals } from "../api.js";
 import { confirmProposals, dismissProposals } from "../changes.js";
 import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { counted } from "../lib/format.js";
 import { neighbour, surest } from "../lib/proposals.js";
 import { live } from "../live.js";
@@ -20,6 +21,7 @@ const SOON_MS = 400;
 
 export class ProposalList extends LiveElement {
   project = "";
+  #answers = new Answers();
   /** @type {Proposals} */
   #all = { state: "none", fraction: 0, items: [], dismissed: 0 };
   /** @type {string | null} */
@@ -76,7 +78,7 @@ export class ProposalList extends LiveElement {
   async load() {
     if (!this.project) return;
     try {
-      this.#take(await getProposals(this.project, this.signal));
+      await this.#answers.take(getProposals(this.project, this.signal), (found) => this.#take(found));
     } catch (error) {
       sayError(error);
     }

@@ -2,6 +2,7 @@
 
 import { ApiError, getFigures, getReview, stepReview } from "../api.js";
 import { h, LiveElement } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { ago, duration } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -23,6 +24,7 @@ export function stateChip(state) {
 
 export class ReviewState extends LiveElement {
   project = "";
+  #answers = new Answers();
   #body = h("section", { class: "review-state stack", "aria-label": "State of the review" });
 
   connected() {
@@ -35,8 +37,8 @@ export class ReviewState extends LiveElement {
   async load() {
     if (!this.project) return;
     try {
-      const [status, figures] = await Promise.all([getReview(this.project), getFigures(this.project)]);
-      this.#draw(status, figures);
+      const both = Promise.all([getReview(this.project), getFigures(this.project)]);
+      await this.#answers.take(both, ([status, figures]) => this.#draw(status, figures));
     } catch (error) {
       sayError(error);
     }

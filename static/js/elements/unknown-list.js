@@ -2,16 +2,19 @@
 
 import { adoptUnknown, discardUnknown, leaveUnknown, listUnknown } from "../api.js";
 import { h } from "../dom.js";
+import { Answers } from "../lib/answers.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { say, sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").UnknownFolder} UnknownFolder */
 
 export class UnknownList extends HTMLElement {
+  #answers = new Answers();
+
   /** Ask the server again; hidden while nothing was set aside. */
   async load() {
     try {
-      this.#draw(await listUnknown());
+      await this.#answers.take(listUnknown(), (all) => this.#draw(all));
     } catch (error) {
       sayError(error);
     }

@@ -4,6 +4,7 @@ import { ApiError, checkBundle, compareBundles, getCertificate, getSystem, listB
 import { h, icon, LiveElement } from "../dom.js";
 import { certificateCard } from "../elements/results.js";
 import { say, sayError } from "../elements/toasts.js";
+import { Answers } from "../lib/answers.js";
 import { bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 
@@ -18,6 +19,7 @@ const CONTENT = [
 
 export class DownloadPage extends LiveElement {
   project = "";
+  #answers = new Answers();
   #body = h("div", { class: "page stack" });
 
   connected() {
@@ -28,29 +30,29 @@ export class DownloadPage extends LiveElement {
 
   async #load() {
     try {
-      const [bundles, { formats }] = await Promise.all([listBundles(this.project), getSystem()]);
-      const newest = bundles[0];
-      if (!newest) return this.#empty();
-      const certificate = await getCertificate(this.project).catch((error) => {
-        if (error instanceof ApiError && error.status === 409) return null;
-        throw error;
-      });
-      this.#body.replaceChildren(
-        h(
-          "header",
-          {},
-          h("h1", {}, "Download"),
-          h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
-        ),
-        newest.current
-          ? ""
-          : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
-        h("div", { class: "split" }, this.#choice(newest, formats), certificate ? certificateCard(certificate) : ""),
-        this.#versions(bundles),
-      );
+      await this.#answers.take(everything(this.project), (all) => this.#draw(all));
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /** @param {Awaited<ReturnType<typeof everything>>} all */
+  #draw({ bundles, formats, certificate }) {
+    const newest = bundles[0];
+    if (!newest) return this.#empty();
+    this.#body.replaceChildren(
+      h(
+        "header",
+        {},
+        h("h1", {}, "Download"),
+        h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
+      ),
+      newest.current
+        ? ""
+        : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
+      h("div", { class: "split" }, this.#choice(newest, formats), certificate ? certificateCard(certificate) : ""),
+      this.#versions(bundles),
+    );
   }
 
   #empty() {
@@ -193,6 +195,17 @@ export class DownloadPage extends LiveElement {
       changes,
     );
   }
+}
+
+/** What the page tells; no certificate before the first run is through. @param {string} project */
+async function everything(project) {
+  const [bundles, { formats }] = await Promise.all([listBundles(project), getSystem()]);
+  if (!bundles.length) return { bundles, formats, certificate: null };
+  const certificate = await getCertificate(project).catch((error) => {
+    if (error instanceof ApiError && error.status === 409) return null;
+    throw error;
+  });
+  return { bundles, formats, certificate };
 }
 
 /** @param {string} project */

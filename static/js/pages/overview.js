@@ -8,6 +8,7 @@ import { JobPanel } from "../elements/job-panel.js";
 import { MemberList } from "../elements/member-list.js";
 import { sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
+import { Answers } from "../lib/answers.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 
@@ -18,6 +19,7 @@ const BESIDE = new Set(["unregistered", "colour_focal_length"]); // causes that 
 
 export class OverviewPage extends LiveElement {
   project = "";
+  #answers = new Answers();
   #head = h("header");
   #importing = h("section", { class: "card stack", hidden: true });
   #scan = h("div", { class: "split", hidden: true });
@@ -53,7 +55,7 @@ export class OverviewPage extends LiveElement {
 
   async #load() {
     try {
-      this.#draw(await getProject(this.project, this.signal));
+      await this.#answers.take(getProject(this.project, this.signal), (project) => this.#draw(project));
     } catch (error) {
       sayError(error);
     }

@@ -4,6 +4,7 @@ import { addAccount, changeAccount, changePassword, getSystem, listAccounts, rem
 import { h, icon, LiveElement } from "../dom.js";
 import { AuditRecord } from "../elements/audit-record.js";
 import { say, sayError } from "../elements/toasts.js";
+import { Answers } from "../lib/answers.js";
 import { ago } from "../lib/format.js";
 
 /** @typedef {import("../api-types").AccountInfo} AccountInfo */
@@ -17,6 +18,7 @@ const ROLES = /** @type {const} */ ([
 const SHORTEST = 10;
 
 export class PeoplePage extends LiveElement {
+  #answers = new Answers();
   #own = h("section", { class: "card stack", hidden: true });
   #all = h("section", { class: "card stack", hidden: true });
   #record = h("section", { class: "card stack", hidden: true });
@@ -41,14 +43,15 @@ export class PeoplePage extends LiveElement {
   /** @param {boolean} account whether who looks has an account */
   async #load(account) {
     try {
-      const accounts = await listAccounts();
-      this.#all.replaceChildren(
-        h("h2", {}, "Accounts"),
-        account ? "" : h("p", { class: "muted" }, ALONE),
-        accounts.length ? this.#table(accounts) : h("p", {}, "Nobody has an account yet."),
-        h("h3", {}, "Add somebody"),
-        h("dl", { class: "facts" }, ...ROLES.flatMap(([name, may]) => [h("dt", {}, name), h("dd", {}, may)])),
-        this.#addForm(() => this.#load(account)),
+      await this.#answers.take(listAccounts(), (accounts) =>
+        this.#all.replaceChildren(
+          h("h2", {}, "Accounts"),
+          account ? "" : h("p", { class: "muted" }, ALONE),
+          accounts.length ? this.#table(accounts) : h("p", {}, "Nobody has an account yet."),
+          h("h3", {}, "Add somebody"),
+          h("dl", { class: "facts" }, ...ROLES.flatMap(([name, may]) => [h("dt", {}, name), h("dd", {}, may)])),
+          this.#addForm(() => this.#load(account)),
+        ),
       );
     } catch (error) {
       sayError(error);

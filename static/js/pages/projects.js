@@ -16,6 +16,7 @@ import { FolderDialog } from "../elements/folder-dialog.js";
 import { stateChip as stateOf } from "../elements/review-state.js";
 import { say, sayError } from "../elements/toasts.js";
 import { UnknownList } from "../elements/unknown-list.js";
+import { Answers } from "../lib/answers.js";
 import { ago, bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { go } from "../router.js";
@@ -23,6 +24,7 @@ import { go } from "../router.js";
 /** @typedef {import("../api-types").ProjectSummary} Project */
 
 export class ProjectsPage extends LiveElement {
+  #answers = new Answers();
   #cards = h("ul", { class: "cards" });
   #upload = h("div", { class: "card", hidden: true });
   #stopped = h("ul", { class: "cards stopped", "aria-label": "Uploads that stopped" });
@@ -83,9 +85,10 @@ export class ProjectsPage extends LiveElement {
 
   async #load() {
     try {
-      const projects = await listProjects(this.signal);
-      this.#cards.replaceChildren(
-        ...(projects.length ? projects.map((project) => this.#card(project)) : [this.#empty()]),
+      await this.#answers.take(listProjects(this.signal), (projects) =>
+        this.#cards.replaceChildren(
+          ...(projects.length ? projects.map((project) => this.#card(project)) : [this.#empty()]),
+        ),
       );
     } catch (error) {
       sayError(error);

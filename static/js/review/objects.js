@@ -5,6 +5,7 @@
 
 import { getCertificate, getScene, listCandidates } from "../api.js";
 import { sayError } from "../elements/toasts.js";
+import { Answers } from "../lib/answers.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Certificate} Certificate */
@@ -25,21 +26,24 @@ export class ReviewObjects extends EventTarget {
   certificate = null;
   /** Objects that were accepted here and are not stored yet, with the candidate. @type {Map<number, string>} */
   #accepting = new Map();
+  #answers = new Answers();
 
   /** @param {number} [first] the object to look at when none is */
   async load(first = this.object) {
     try {
       const orNone = (/** @type {unknown} */ _) => null; // there is no scene or certificate before the first run
-      const [groups, scene, certificate] = await Promise.all([
+      const all = Promise.all([
         listCandidates(this.project),
         getScene(this.project).catch(orNone),
         getCertificate(this.project).catch(orNone),
       ]);
-      this.groups = groups.map((group) => this.#asSaid(group));
-      this.items = scene?.items ?? [];
-      this.certificate = certificate;
-      if (!this.group) this.choose((groups.find(({ object }) => object === first) ?? groups[0])?.object ?? NONE);
-      this.#say("change");
+      await this.#answers.take(all, ([groups, scene, certificate]) => {
+        this.groups = groups.map((group) => this.#asSaid(group));
+        this.items = scene?.items ?? [];
+        this.certificate = certificate;
+        if (!this.group) this.choose((groups.find(({ object }) => object === first) ?? groups[0])?.object ?? NONE);
+        this.#say("change");
+      });
     } catch (error) {
       sayError(error);
     }
