@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from app.errors import Forbidden, NoSpace
+from app.errors import Forbidden, NoSpace, NotFound
+from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import EnvironmentProblem
+from r2c2r_core.workspace import replace_file
 
 _RECEIVED = "receiving-"
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
@@ -93,6 +95,21 @@ class ProjectFiles:
     def requests(self) -> Path:
         """What its jobs were given, a folder each."""
         return self.root / "requests"
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write a file below the project's folder; raises NotFound where the project was deleted meanwhile.
+
+        A folder that came back after its deletion would be in the way of whoever adopts a copy of the project.
+        """
+        folder = self.root
+        with explained_io(path):
+            try:
+                for name in path.parent.resolve().relative_to(self.root.resolve()).parts:
+                    folder /= name
+                    folder.mkdir(exist_ok=True)
+                replace_file(path, content)
+            except FileNotFoundError as error:
+                raise NotFound(f"{self.root.name}: the project was deleted", hint="see the list of projects") from error
 
     @property
     def frames(self) -> Path:
@@ -184,12 +201,14 @@ def folder_bytes(folder: Path) -> int:
 
 
 def delete_folder(folder: Path) -> int:
-    """Delete the folder and say how many bytes that was."""
+    """Delete the folder, at once for whoever writes to it, and say how many bytes that was."""
     freed = folder_bytes(folder)
     if folder.is_symlink():
         folder.unlink()
     elif folder.exists():
-        shutil.rmtree(folder)
+        going = free_name(folder.parent, f".{folder.name}.deleted")
+        folder.rename(going)
+        shutil.rmtree(going)
     return freed
 
 

@@ -38,13 +38,11 @@ _UNREADABLE = (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile)
 
 
 class Workspace:
-    """The folder of one reconstruction."""
+    """The folder of one reconstruction, made by what is first written to it: who only looks makes none."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
         self.computed: list[str] = []  # "stage/name" of what this process computed rather than found
-        with explained_io(root):
-            (root / "nouns").mkdir(parents=True, exist_ok=True)
 
     def store(self, key: str) -> Path:
         """Folder of the normalised frames that were read with this key."""
@@ -143,7 +141,10 @@ class Workspace:
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
         """Hold the workspace against a second run; raises EnvironmentProblem when one is at work."""
-        with (self.root / ".lock").open("w") as handle:
+        with explained_io(self.root):
+            self.root.mkdir(parents=True, exist_ok=True)
+            lock = (self.root / ".lock").open("w")
+        with lock as handle:
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
@@ -193,14 +194,19 @@ def write_atomically(path: Path, content: bytes) -> None:
 
     Threads and processes may write the same file at once: the last one stays.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.tmp")
     with explained_io(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            temporary.write_bytes(content)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        replace_file(path, content)
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file into a folder that is there, as write_atomically does; raises OSError."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.tmp")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _plain(value: Any) -> Any:

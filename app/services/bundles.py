@@ -24,7 +24,6 @@ from app.services.media import kept_file
 from app.services.scenes import manifest
 from r2c2r_core.errors import InputError
 from r2c2r_core.export.writers.table import formats as known_formats
-from r2c2r_core.workspace import write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +66,7 @@ def part(context: Context, project_id: str, version: int, formats: frozenset[str
         files = context.files(queries.project_row(session, project_id))
     key = "-".join(sorted(formats))
     target = files.previews / f"bundle-v{version}" / f"{key}.zip"
-    kept_file(target, lambda: _with_formats(whole.path, formats))
+    kept_file(files, target, lambda: _with_formats(whole.path, formats))
     return BundleFile(target, whole.file_name.replace(".zip", f"-{key}.zip"), f"{whole.sha256}-{key}")
 
 
@@ -126,7 +125,7 @@ def member(context: Context, project_id: str, name: str) -> Path:
                 content = archive.read(_inside(archive, name))
         except (KeyError, FileNotFoundError) as error:
             raise NotFound(f"the bundle has no {name}") from error
-        write_atomically(target, content)
+        files.write(target, content)
     return target
 
 

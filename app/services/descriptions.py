@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 from sqlalchemy import Engine
 from sqlmodel import select
@@ -15,10 +16,10 @@ from sqlmodel import select
 from app.db.description import changed, describe, read_description, written
 from app.db.engine import reading
 from app.db.tables import Project
+from app.errors import NotFound
 from app.files import ProjectFiles, free_name, project_files
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
-from r2c2r_core.workspace import write_atomically
 
 _log = logging.getLogger(__name__)
 
@@ -106,8 +107,8 @@ class Descriptions:
                 return
             files = project_files(self._settings.data_dir, project_id, row.work_path)
             description = describe(session, row, files)
-        if files.root.is_dir():
-            write_atomically(files.description, written(description))
+        with suppress(NotFound):
+            files.write(files.description, written(description))
 
 
 def _described(files: ProjectFiles) -> float | None:

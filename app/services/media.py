@@ -15,7 +15,6 @@ from app.services import projects, views
 from app.services.candidates import candidate_mesh, generate_key
 from app.services.context import Context
 from r2c2r_core.ingest.store import depth_path, rgb_path
-from r2c2r_core.workspace import write_atomically
 
 WIDTHS = (160, 320, 480, 960, 1920)
 _DEPTH_WIDTH = 640  # pixels of a depth picture
@@ -33,7 +32,7 @@ def frame(context: Context, project_id: str, index: int, width: int | None) -> P
     kept = next((w for w in WIDTHS if w >= width), size[0])
     if kept >= size[0]:
         return stored
-    return kept_file(files.previews / "frames" / str(kept) / f"{index:06d}.jpg", lambda: _shrink(stored, kept))
+    return kept_file(files, files.previews / "frames" / str(kept) / f"{index:06d}.jpg", lambda: _shrink(stored, kept))
 
 
 def depth(context: Context, project_id: str, index: int) -> Path:
@@ -44,7 +43,7 @@ def depth(context: Context, project_id: str, index: int) -> Path:
     if not stored.is_file():
         raise NotFound(f"frame {index} has no depth image")
     return kept_file(
-        files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored, _shrink(colour, _DEPTH_WIDTH))
+        files, files.previews / "depth" / f"{index:06d}.png", lambda: _colour_depth(stored, _shrink(colour, _DEPTH_WIDTH))
     )
 
 
@@ -69,7 +68,7 @@ def candidate_glb(context: Context, project_id: str, object_id: int, candidate: 
     files, name = _object_files(context, project_id, object_id)
     key = generate_key(files, name)
     target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.glb")
-    return kept_file(target, lambda: _glb(files, name, candidate))
+    return kept_file(files, target, lambda: _glb(files, name, candidate))
 
 
 def candidate_png(context: Context, project_id: str, object_id: int, candidate: str) -> Path:
@@ -77,7 +76,7 @@ def candidate_png(context: Context, project_id: str, object_id: int, candidate: 
     files, name = _object_files(context, project_id, object_id)
     key = generate_key(files, name)
     target = inside(files.previews, "candidates", str(object_id), f"{candidate}-{key}.png")
-    return kept_file(target, lambda: _picture(files, name, candidate))
+    return kept_file(files, target, lambda: _picture(files, name, candidate))
 
 
 def _files(context: Context, project_id: str) -> ProjectFiles:
@@ -101,13 +100,13 @@ def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int
     raise NotFound(f"the recording has no frame {index}")
 
 
-def kept_file(target: Path, make: Callable[[], bytes]) -> Path:
-    """The file, made if it is not there; two who ask at once make it once."""
+def kept_file(files: ProjectFiles, target: Path, make: Callable[[], bytes]) -> Path:
+    """The project's file, made if it is not there; two who ask at once make it once."""
     if target.is_file():
         return target
     with _LOCKS[hash(target) % len(_LOCKS)]:
         if not target.is_file():
-            write_atomically(target, make())
+            files.write(target, make())
     return target
 
 

@@ -70,7 +70,7 @@ def overlay(
         name = queries.object_row(session, project_id, object_id, deleted=True).name
         files = context.files(project)
     target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name)}.png"
-    return media.kept_file(target, lambda: _drawn(files, name, index, of, look))
+    return media.kept_file(files, target, lambda: _drawn(files, name, index, of, look))
 
 
 def point_under(context: Context, project_id: str, object_id: int, index: int, x: float, y: float) -> list[float] | None:

@@ -12,7 +12,7 @@ from app.files import ProjectFiles
 from r2c2r_core import workspace
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.workspace import Workspace, noun_path, write_atomically
+from r2c2r_core.workspace import Workspace, noun_path
 
 T = TypeVar("T")
 
@@ -54,7 +54,7 @@ class KeptFacts:
         """Write what was read anew; a full disk keeps nobody from what was read."""
         if self._new:
             with contextlib.suppress(R2C2RError, OSError):
-                write_atomically(self._files.kept_facts, json.dumps({"version": FACTS_VERSION, "facts": self._kept}).encode())
+                self._files.write(self._files.kept_facts, json.dumps({"version": FACTS_VERSION, "facts": self._kept}).encode())
 
     def _read(self, path: Path, stage: str, name: str, told: Callable[[Any], T]) -> T | None:
         found = path.stat()

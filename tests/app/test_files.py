@@ -1,12 +1,16 @@
-"""Sizes of folders that others write to."""
+"""Folders that others write to while they are measured and deleted."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from app.files import folder_bytes
+from app.errors import NotFound
+from app.files import delete_folder, folder_bytes, project_files
+from app.services.media import kept_file
+from r2c2r_core.workspace import Workspace
 
 
 def test_a_file_that_vanishes_while_a_folder_is_measured_counts_nothing(
@@ -21,3 +25,38 @@ def test_a_file_that_vanishes_while_a_folder_is_measured_counts_nothing(
 
     monkeypatch.setattr("app.files.os.walk", listed_too_early)
     assert folder_bytes(tmp_path) == 5
+
+
+def test_what_is_made_for_a_project_does_not_bring_its_folder_back_after_a_deletion(tmp_path: Path) -> None:
+    files = project_files(tmp_path, "0123456789ab")
+    files.root.mkdir(parents=True)
+    files.write(files.previews / "frames" / "160" / "000003.jpg", b"there")
+
+    def deleted_meanwhile() -> bytes:
+        assert delete_folder(files.root) == 5
+        return b"made"
+
+    with pytest.raises(NotFound, match="was deleted"):
+        kept_file(files, files.previews / "scan.png", deleted_meanwhile)
+    assert list((tmp_path / "projects").iterdir()) == []
+
+
+def test_a_folder_that_is_written_to_while_it_is_deleted_goes_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = project_files(tmp_path, "0123456789ab")
+    files.root.mkdir(parents=True)
+    files.write(files.description, b"{}")
+    delete = shutil.rmtree
+
+    def written_meanwhile(folder: Path) -> None:
+        with pytest.raises(NotFound):
+            files.write(files.description, b"{}")
+        delete(folder)
+
+    monkeypatch.setattr("app.files.shutil.rmtree", written_meanwhile)
+    delete_folder(files.root)
+    assert list((tmp_path / "projects").iterdir()) == []
+
+
+def test_looking_into_a_workspace_that_is_gone_makes_none(tmp_path: Path) -> None:
+    assert Workspace(tmp_path / "projects" / "0123456789ab" / "work").load_latest("export", "scene") is None
+    assert list(tmp_path.iterdir()) == []

@@ -139,7 +139,7 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: 
     ann.get_by_role("link", name="Run on 2 objects").wait_for()
     project = ann.url.rsplit("/", 1)[1]
     files = project_files(server.data, project)
-    while not files.description.exists():
+    while not (files.description.exists() and "mug_1" in files.description.read_text()):  # written a little after it is so
         ann.wait_for_timeout(50)
     shutil.copytree(files.root, server.data / "unknown" / project)
     address = f"{server.address}/api/projects/{project}"
