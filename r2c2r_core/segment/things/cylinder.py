@@ -7,7 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.silhouettes import colours_of, hull_view, small_mask
+from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline
 from r2c2r_core.segment.things.thing import Thing, ThingConfig
 from r2c2r_core.tuning import param, tuned
 
@@ -66,15 +66,13 @@ def _cylinder(centre: Vector3, base: float, width: float, height: float, support
 
 def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
     """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
-    mask, share = small_mask(thing, scene, frame, 0.015)
-    view = hull_view(thing, scene, frame, pad_m=tuned(Params).wanders_m + 0.03)
-    if share < 0.9 or view is None or not mask.any():
+    crop, mask, share = crop_outline(thing, scene, frame, 0.015)
+    if crop is None or share < 0.9 or not mask.any():
         return None
-    hull, _, area, scale = view
-    found, drawn = np.argwhere(mask[area]), np.argwhere(hull)
-    if found.min() < 2 or (found.max(axis=0) > np.array(hull.shape) - 3).any():
+    found, drawn = np.argwhere(mask), np.argwhere(crop.hull)
+    if found.min() < 2 or (found.max(axis=0) > np.array(mask.shape) - 3).any():
         return None
     grown = found.std(axis=0) / np.maximum(drawn.std(axis=0), 1e-6)
     low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
-    sideways = frame.world_from_camera.rotation[:, 0] * float(found[:, 1].mean() - drawn[:, 1].mean()) / scale
+    sideways = frame.world_from_camera.rotation[:, 0] * float(found[:, 1].mean() - drawn[:, 1].mean()) / crop.scale
     return float((high - low)[0] * grown[1]), float((high - low)[2] * grown[0]), float(sideways[0]), float(sideways[1])

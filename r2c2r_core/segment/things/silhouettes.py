@@ -1,16 +1,17 @@
 """Silhouettes of small things: a hull rendered into a frame, shifted by that frame's pose error, snapped to colour edges."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Mask, Pixels, Points, Vector3
-from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
+from r2c2r_core.geometry.camera import Intrinsics, project, unproject
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.occlusion import colour_gradient
+from r2c2r_core.segment.occlusion import colour_gradient, refine_border
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
+from r2c2r_core.segment.things.pixel_cut import Params as CutParams
 from r2c2r_core.segment.things.thing import Thing
 from r2c2r_core.tuning import param, tuned
 
@@ -19,6 +20,15 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """How a small thing's outline is drawn."""
 
+    longest_px: int = param(
+        320,
+        "px",
+        "of the crop an outline is looked for in: a larger one is shrunk, and only its border drawn at the photo's resolution",
+        source="a handle 1200 px wide takes the time of one of 320 px; VGA crops are not shrunk",
+        ge=32,
+    )
+    around_m: float = param(0.03, "m", "about the hull, beyond the pose error, that a crop shows: what is not the thing")
+    border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
     sure_odds: float = param(9.0, "log", "of a pixel that is known")
     on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
     pose_error_m: float = param(0.04, "m", "of the height of a support between frames, at most")
@@ -26,28 +36,71 @@ class Params:
     attached_odds: float = param(3.2, "log", "of such a place: depth and colour together may add it")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Crop:
+    """The part of a photo around a hull at the resolution its outline is looked for in; masks (h, w) of that size."""
+
+    area: tuple[slice, slice]  # rows and columns of the photo
+    camera: Intrinsics  # of the crop
+    scale: float  # pixels a metre, at the thing
+    hull: Mask  # its projection
+    hidden: Mask  # where something stands before it
+
+    @property
+    def shrink(self) -> float:
+        """Pixels of the photo along one of the crop."""
+        return (self.area[1].stop - self.area[1].start) / self.camera.width
+
+    def rgb(self, photo: Image) -> Image:
+        """The crop of the whole photo."""
+        part = photo[self.area]
+        size = (self.camera.width, self.camera.height)
+        return part if part.shape[1::-1] == size else np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
 def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None) -> tuple[Mask, float]:
     """The visible pixels of a small thing: where its hull, this frame's depth and its colours say, cut along colour edges."""
+    mask = np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool)
+    crop, outline, share = crop_outline(thing, scene, frame, band_m)
+    if crop is not None:
+        mask[crop.area] = _at_full(outline, crop, scene.rgb(frame.index)[crop.area])
+    return mask, share
+
+
+def crop_outline(
+    thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None
+) -> tuple[Crop, Mask, float] | tuple[None, Mask, float]:
+    """The crop around a small thing, its visible pixels there, and the share of it that shows; no crop where nothing does."""
     params = tuned(Params)
-    camera = frame.rgb_camera
-    empty = np.zeros((camera.height, camera.width), bool)
-    view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
-    if view is None:
-        return empty, 0.0
-    hull, hidden, area, scale = view
-    share = 1 - float((hull & hidden).sum() / max(hull.sum(), 1))
+    nothing: Mask = np.zeros((1, 1), bool)
+    crop = hull_crop(thing, scene, frame)
+    if crop is None:
+        return None, nothing, 0.0
+    share = 1 - float((crop.hull & crop.hidden).sum() / max(crop.hull.sum(), 1))
     if share < 0.08:
-        return empty, 0.0
-    rgb = scene.rgb(frame.index)[area]
-    odds = seen_odds(thing, scene, frame, area)
-    hull = _moved(hull, _best_shift(hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale)))
+        return None, nothing, 0.0
+    scale = crop.scale
+    rgb = crop.rgb(scene.rgb(frame.index))
+    odds = seen_odds(thing, scene, frame, crop)
+    shift = _best_shift(crop.hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale))
+    hull = _moved(crop.hull, shift)
     odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), params.attached_m * scale)
-    odds[hidden] = -params.sure_odds
+    odds[crop.hidden] = -params.sure_odds
     for click in thing.clicks:
         if click.frame == frame.index:
-            _mark(odds, click.x - area[1].start, click.y - area[0].start, 0.004 * scale, click.label)
-    empty[area] = _held_by(cut_pixels(rgb, odds), hull) & ~hidden
-    return empty, share
+            x, y = (click.x - crop.area[1].start) / crop.shrink, (click.y - crop.area[0].start) / crop.shrink
+            _mark(odds, x, y, 0.004 * scale, click.label)
+    return crop, _held_by(cut_pixels(rgb, odds), hull) & ~crop.hidden, share
+
+
+def _at_full(outline: Mask, crop: Crop, photo: Image) -> Mask:
+    """A crop's mask at the photo's resolution, its border on the photo's own edges."""
+    height, width = photo.shape[:2]
+    if outline.shape == (height, width):
+        return outline
+    grown = cv2.resize(outline.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR) > 0.5
+    cell = max(height, width) / min(tuned(CutParams).largest_px, max(outline.shape))
+    return refine_border(photo, np.asarray(grown), max(2, round(tuned(Params).border_cells * cell)))
 
 
 def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: int) -> None:
@@ -58,11 +111,11 @@ def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: i
     odds[near] = params.sure_odds if label else -params.sure_odds
 
 
-def seen_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
+def seen_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarray:
     """Log-odds of each pixel of a crop by what the frame itself shows there: depth above the support, and colour."""
-    odds = _depth_odds(thing, scene, frame, area)
+    odds = _depth_odds(thing, scene, frame, crop)
     if thing.colours is not None:
-        odds = odds + thing.colours.odds(cv2.cvtColor(scene.rgb(frame.index)[area], cv2.COLOR_RGB2LAB))
+        odds = odds + thing.colours.odds(cv2.cvtColor(crop.rgb(scene.rgb(frame.index)), cv2.COLOR_RGB2LAB))
     return odds
 
 
@@ -70,16 +123,14 @@ def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) ->
     """Colours on the thing against those around it, from where views are sure."""
     samples = []
     for frame in views:
-        view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.04)
-        mask, share = small_mask(thing, scene, frame, band_m)
-        if view is None or share < 0.8 or not mask.any():
+        crop, mask, share = crop_outline(thing, scene, frame, band_m)
+        if crop is None or share < 0.8 or not mask.any():
             continue
-        _, hidden, area, scale = view
-        lab = cv2.cvtColor(scene.rgb(frame.index)[area], cv2.COLOR_RGB2LAB)
-        odds = _depth_odds(thing, scene, frame, area)
-        inner = cv2.erode(mask[area].astype(np.uint8), _round(0.25 * band_m * scale)) > 0
-        outer = cv2.dilate(mask[area].astype(np.uint8), _round(0.5 * band_m * scale)) > 0
-        samples.append((lab, inner & (odds > -0.5), ~outer & ~hidden & (odds < 0.5)))
+        lab = cv2.cvtColor(crop.rgb(scene.rgb(frame.index)), cv2.COLOR_RGB2LAB)
+        odds = _depth_odds(thing, scene, frame, crop)
+        inner = cv2.erode(mask.astype(np.uint8), _round(0.25 * band_m * crop.scale)) > 0
+        outer = cv2.dilate(mask.astype(np.uint8), _round(0.5 * band_m * crop.scale)) > 0
+        samples.append((lab, inner & (odds > -0.5), ~outer & ~crop.hidden & (odds < 0.5)))
     return learn_colours(samples) if samples else None
 
 
@@ -117,11 +168,11 @@ def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
     """How far the hull's outline lies from the colour edges it belongs to, metres, in the middle of the frames."""
     shifts = []
     for frame in views:
-        view = hull_view(thing, scene, frame, pad_m=thing.pose_error_m + 0.03)
-        if view is not None:
-            hull, _, area, scale = view
-            gradient, odds = colour_gradient(scene.rgb(frame.index)[area]), seen_odds(thing, scene, frame, area)
-            shifts.append(float(np.hypot(*_best_shift(hull, odds, gradient, round(thing.pose_error_m * scale)))) / scale)
+        crop = hull_crop(thing, scene, frame)
+        if crop is not None:
+            gradient, odds = colour_gradient(crop.rgb(scene.rgb(frame.index))), seen_odds(thing, scene, frame, crop)
+            moved = _best_shift(crop.hull, odds, gradient, round(thing.pose_error_m * crop.scale))
+            shifts.append(float(np.hypot(*moved)) / crop.scale)
     return float(np.median(shifts)) if shifts else 0.0
 
 
@@ -130,8 +181,8 @@ def raised(points: Points, lift_m: float) -> Points:
     return points + np.array([0.0, 0.0, lift_m])
 
 
-def hull_view(thing: Thing, scene: Scene, frame: Frame, pad_m: float) -> tuple[Mask, Mask, tuple[slice, slice], float] | None:
-    """The hull's projection and the occluders in the crop around it, the crop, and pixels a metre."""
+def hull_crop(thing: Thing, scene: Scene, frame: Frame) -> Crop | None:
+    """The crop around the hull, with what is about it; None where the frame does not show it, or from too near."""
     camera = frame.rgb_camera
     offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
     local = frame.world_from_camera.inverse.apply(raised(thing.vertices, offset))
@@ -139,39 +190,43 @@ def hull_view(thing: Thing, scene: Scene, frame: Frame, pad_m: float) -> tuple[M
         return None
     uv = project(local, camera)
     scale = camera.fx / float(np.median(local[:, 2]))
-    pad = pad_m * scale + 6
+    pad = (thing.pose_error_m + tuned(Params).around_m) * scale + 6
     left, top = int(max(uv[:, 0].min() - pad, 0)), int(max(uv[:, 1].min() - pad, 0))
     right, bottom = int(min(uv[:, 0].max() + pad, camera.width)), int(min(uv[:, 1].max() + pad, camera.height))
     if right - left < 6 or bottom - top < 6:
         return None
-    hull = _splat(uv - [left, top], (bottom - top, right - left), thing.spacing_m * scale)
+    area = (slice(top, bottom), slice(left, right))
+    small = shrunk(camera, area)
+    shrink = (right - left) / small.width
+    hull = splat(project(local, small), (small.height, small.width), thing.spacing_m * scale / shrink)
     if hull.sum() < 8:
         return None
-    area = (slice(top, bottom), slice(left, right))
-    return hull > 0, occluders(thing, scene, frame, area), area, scale
+    return Crop(area, small, scale / shrink, hull > 0, _occluders(thing, scene, frame, area, small))
 
 
-def occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice] | None = None) -> Mask:
-    """Colour pixels (all, or of an area) where something stands clearly nearer than the thing."""
+def shrunk(camera: Intrinsics, area: tuple[slice, slice]) -> Intrinsics:
+    """The camera of an area of a photo, no larger than an outline needs."""
+    rows, columns = area
+    width, height = columns.stop - columns.start, rows.stop - rows.start
+    part = replace(camera, cx=camera.cx - columns.start, cy=camera.cy - rows.start, width=width, height=height)
+    shrink = max(1.0, max(width, height) / tuned(Params).longest_px)
+    return part if shrink == 1.0 else part.resized(max(round(width / shrink), 4), max(round(height / shrink), 4))
+
+
+def _occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice], camera: Intrinsics) -> Mask:
+    """Pixels of a crop where something stands clearly nearer than the thing."""
     nearest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].min())
-    depth = scene.filled_depth(frame.index)
-    return _at_colour(scene.noise.occluded(depth, nearest, 0.03), frame, area)
-
-
-def _at_colour(flags: Mask, frame: Frame, area: tuple[slice, slice] | None) -> Mask:
-    """Flags of depth pixels at the colour pixels that they lie under."""
-    width, height = frame.rgb_camera.width, frame.rgb_camera.height
-    rows, columns = area or (slice(0, height), slice(0, width))
-    row = np.arange(rows.start, rows.stop) * flags.shape[0] // height
-    column = np.arange(columns.start, columns.stop) * flags.shape[1] // width
+    flags = scene.noise.occluded(scene.filled_depth(frame.index), nearest, 0.03)
+    row = _depth_index(area[0], camera.height, frame.rgb_camera.height, flags.shape[0])
+    column = _depth_index(area[1], camera.width, frame.rgb_camera.width, flags.shape[1])
     return flags[row[:, None], column]
 
 
-def _depth_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice]) -> np.ndarray:
+def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarray:
     """Log-odds by depth: above the support and about where the thing stands, or else on the support, behind, or unknown (0)."""
     camera, depth = frame.depth_camera, scene.depth(frame.index)
-    rows = _depth_index(area[0], frame.rgb_camera.height, camera.height)
-    columns = _depth_index(area[1], frame.rgb_camera.width, camera.width)
+    rows = _depth_index(crop.area[0], crop.camera.height, frame.rgb_camera.height, camera.height)
+    columns = _depth_index(crop.area[1], crop.camera.width, frame.rgb_camera.width, camera.width)
     first_row, first_column = int(rows[0]), int(columns[0])
     patch = depth[first_row : rows[-1] + 1, first_column : columns[-1] + 1]
     v, u = np.mgrid[first_row : first_row + patch.shape[0], first_column : first_column + patch.shape[1]] + 0.5
@@ -187,15 +242,16 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, sli
         standing = ((points[..., :2] > low[:2]) & (points[..., :2] < high[:2])).all(axis=-1)
         on_support = points[..., 2] < thing.support_z_m + offset + tuned(Params).on_support_m
         verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # the foot of it is as low
-    coarse = max(frame.rgb_camera.width / camera.width, 1.0)
+    coarse = max(frame.rgb_camera.width / camera.width / crop.shrink, 1.0)
     odds = np.where(patch > 0, verdict, 0.0) * (2.0 / np.sqrt(coarse))
     at = np.ix_(rows - first_row, columns - first_column)
     return np.asarray(cv2.blur(odds[at].astype(np.float32), (2 * round(coarse) + 1,) * 2))
 
 
-def _depth_index(span: slice, colour_size: int, depth_size: int) -> np.ndarray:
-    """The depth row or column of each colour one."""
-    return ((np.arange(span.start, span.stop) + 0.5) * depth_size / colour_size).astype(int)
+def _depth_index(span: slice, cells: int, colour_size: int, depth_size: int) -> np.ndarray:
+    """The depth row or column under the middle of each of the cells that a span of colour pixels is cut into."""
+    at = span.start + (np.arange(cells) + 0.5) * (span.stop - span.start) / cells
+    return (at * depth_size / colour_size).astype(int)
 
 
 def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
@@ -225,7 +281,7 @@ def _round(radius_px: float) -> np.ndarray:
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
 
 
-def _splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
+def splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
     """The filled outline of points that are about `spacing_px` apart."""
     height, width = shape
     pad = int(spacing_px) + 2

@@ -12,7 +12,7 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.cylinder import Params as CylinderParams
 from r2c2r_core.segment.things.cylinder import upright_shape
-from r2c2r_core.segment.things.silhouettes import colours_of, occluders, raised, small_mask, support_offset, usual_shift
+from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline, raised, support_offset, usual_shift
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, support_height
 from r2c2r_core.segment.things.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 from r2c2r_core.segment.viewpoints import best_views
@@ -158,7 +158,7 @@ def _too_wide(thing: Thing, config: ThingConfig) -> bool:
 def _lost(thing: Thing, scene: Scene, views: list[Frame], positives: Points) -> bool:
     """Whether the hull left a click, or shows in too few of the frames that see the clicks."""
     away = [_from_hull(thing, point, views) for point in positives]
-    shown = [bool(small_mask(thing, scene, frame)[0].any()) for frame in views[::2]]
+    shown = [bool(crop_outline(thing, scene, frame)[1].any()) for frame in views[::2]]
     return max(away) > 0.02 or float(np.mean(shown)) < 0.7
 
 
@@ -286,14 +286,17 @@ def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Fr
     centres = voxels.centres
     inside, seen = np.zeros(len(centres)), np.zeros(len(centres))
     for frame in views:
-        mask, _ = small_mask(thing, scene, frame, band_m)
-        if not mask.any():
+        crop, mask, _ = crop_outline(thing, scene, frame, band_m)
+        if crop is None or not mask.any():
             continue
         offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
-        uv = project(frame.world_from_camera.inverse.apply(raised(centres, offset)), frame.rgb_camera)
-        in_mask, valid = sample_nearest(mask, uv)
-        hidden, _ = sample_nearest(occluders(thing, scene, frame), uv)
-        valid &= ~hidden | in_mask
+        local = frame.world_from_camera.inverse.apply(raised(centres, offset))
+        uv = project(local, crop.camera)
+        outlined, in_crop = sample_nearest(mask, uv)
+        hidden, _ = sample_nearest(crop.hidden, uv)
+        in_mask = outlined & in_crop
+        _, valid = sample_nearest(scene.rgb(frame.index), project(local, frame.rgb_camera))
+        valid &= ~(hidden & in_crop) | in_mask
         seen += valid
         inside += valid & in_mask
     share = inside / np.maximum(seen, 1)
