@@ -48,6 +48,7 @@ def _thing(
     open_vessel: bool = False,
     on_floor: bool = False,
     on_legs: bool = False,
+    flat_top: bool = False,
 ) -> Category:
     """A loose thing, as deep as wide."""
     across = Size(*width, _OWN)
@@ -65,6 +66,7 @@ def _thing(
         round=round,
         open_vessel=open_vessel,
         on_legs=on_legs,
+        flat_top=flat_top,
     )
 
 
@@ -389,9 +391,9 @@ _THINGS = (
         on_floor=True,
         on_legs=True,
     ),
-    _thing("stool", (0.28, 0.38, 0.6), (0.3, 0.65, 1.0), "barstool", "footstool", on_floor=True, on_legs=True),
-    _thing("table", (0.4, 1.2, 2.0), (0.4, 0.75, 1.1), on_floor=True, on_legs=True),
-    _thing("desk", (0.6, 1.2, 2.0), (0.6, 0.74, 1.1), on_floor=True, on_legs=True),
+    _thing("stool", (0.28, 0.38, 0.6), (0.3, 0.65, 1.0), "barstool", "footstool", on_floor=True, on_legs=True, flat_top=True),
+    _thing("table", (0.4, 1.2, 2.0), (0.4, 0.75, 1.1), on_floor=True, on_legs=True, flat_top=True),
+    _thing("desk", (0.6, 1.2, 2.0), (0.6, 0.74, 1.1), on_floor=True, on_legs=True, flat_top=True),
     _thing("bench", (0.6, 1.2, 2.0), (0.35, 0.45, 1.0), "workbench", on_floor=True, on_legs=True),
     _thing("sofa", (0.8, 1.8, 2.0), (0.6, 0.85, 1.0), "couch", on_floor=True),
 )

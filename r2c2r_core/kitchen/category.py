@@ -79,6 +79,7 @@ class Category:
     round: bool = False  # a body of revolution
     open_vessel: bool = False  # hollow and open upwards
     on_legs: bool = False  # a level slab on posts
+    flat_top: bool = False  # that slab is its highest part: what rises above stands on it
     wider: tuple[float, str] | None = None  # from this width (metres) on it is that category
 
     @property

@@ -16,7 +16,9 @@ from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, find_front, seen_sides
 from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
-from r2c2r_core.segment.things.found import FoundThing
+from r2c2r_core.segment.things.found import FoundStanding, FoundThing
+from r2c2r_core.segment.things.standing import find_standing
+from r2c2r_core.segment.things.standing_mask import standing_colours
 from r2c2r_core.segment.things.thing import ThingConfig, find_thing, sized_as
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
 from r2c2r_core.tuning import param, tuned
@@ -120,9 +122,15 @@ def _assumed_depth(front: Front, prompt: ObjectPrompt) -> str:
 
 def _thing(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, hits: Hits, negatives: Points
-) -> FoundThing | None:
+) -> FoundThing | FoundStanding | None:
     config = sized_as(category)
     positives = _on_thing(prepared, hits, config)
+    if config.on_floor and category.kind == "thing":
+        standing = find_standing(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
+        if standing is not None:
+            colours = standing_colours(standing, prepared.scene, prepared.scene.frames)
+            coloured = replace(standing, thing=replace(standing.thing, colours=colours))
+            return FoundStanding(coloured, prepared.scene)
     if config.radius_m < tuned(Params).small_m:
         small = find_small(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
         if small is not None:

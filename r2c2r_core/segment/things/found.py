@@ -12,6 +12,8 @@ from r2c2r_core.segment.found import View
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.silhouettes import small_mask
+from r2c2r_core.segment.things.standing import Standing
+from r2c2r_core.segment.things.standing_mask import standing_mask
 from r2c2r_core.segment.things.thing import Thing, thing_mask
 from r2c2r_core.tuning import param, tuned
 
@@ -52,3 +54,27 @@ class FoundThing:
         return box_of(
             self.thing.points, self.thing.support_z_m, room.manhattan_yaw_rad, centres.mean(axis=0), round_thing=self.round
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundStanding:
+    """What stands on the floor, whole."""
+
+    standing: Standing
+    scene: Scene
+    kind: Kind = "thing"
+    warnings: tuple[str, ...] = ()
+
+    def see(self, frame: Frame) -> View:
+        """Its pixels."""
+        mask, share = standing_mask(self.standing, self.scene, frame)
+        sample = self.standing.thing.vertices[:: max(1, len(self.standing.thing.vertices) // 50)]
+        return View(mask, expected_iou(mask, share, frame, sample, tuned(Params).border_m))
+
+    def panel(self) -> FrontPanel | None:
+        """None: things have no front panel."""
+        return None
+
+    def box(self) -> ThingBox | None:
+        """Its box on the floor."""
+        return FoundThing(self.standing.thing, self.scene).box()

@@ -57,7 +57,7 @@ def build_graph(vertices: Points, faces: Faces, colours: Colours, size_m: float)
     rgb = sum(colours[faces[:, k]].astype(np.uint16) for k in range(3)) // 3
     face_lab = cv2.cvtColor(np.asarray(rgb, np.uint8)[None], cv2.COLOR_RGB2LAB)[0].astype(np.float32)
     lab = np.stack([np.bincount(member, area * face_lab[:, k], count) / safe for k in range(3)], axis=1)
-    return VoxelGraph(positions, normals, lab, weight, _touching(unique, span), member, size_m)
+    return VoxelGraph(positions, normals, lab, weight, touching(unique, span), member, size_m)
 
 
 def cut(
@@ -144,7 +144,8 @@ def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("nk,nk->n", first, second))
 
 
-def _touching(unique: np.ndarray, span: np.ndarray) -> np.ndarray:
+def touching(unique: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """Pairs of the cells, given by sorted flat numbers in a grid of `span`, that touch (26 neighbours)."""
     offsets = [(dx * span[1] + dy) * span[2] + dz for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)]
     pairs = []
     for offset in sorted(int(o) for o in offsets if o > 0):

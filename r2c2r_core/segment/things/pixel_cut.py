@@ -43,10 +43,10 @@ def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
     return ColourModel(np.clip(odds, -params.most_odds, params.most_odds).astype(np.float32))
 
 
-def cut_pixels(rgb: Image, odds: np.ndarray) -> Mask:
+def cut_pixels(rgb: Image, odds: np.ndarray, largest_px: int | None = None) -> Mask:
     """The mask of least cost: log-odds of being the thing (h, w) for each pixel, and borders that prefer colour edges."""
     height, width = odds.shape
-    shrink = max(1.0, max(height, width) / tuned(Params).largest_px)
+    shrink = max(1.0, max(height, width) / (largest_px or tuned(Params).largest_px))
     size = (max(4, round(width / shrink)), max(4, round(height / shrink)))
     small_odds = cv2.resize(odds.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     small_rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)

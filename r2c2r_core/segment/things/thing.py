@@ -45,6 +45,8 @@ class ThingConfig:
     width_m: float | None = None  # across, about, where the name says it
     round: bool = False  # as deep as wide
     on_floor: bool = False
+    flat_top: bool = False
+    tallest_m: float = 1.1
 
 
 def sized_as(category: Category) -> ThingConfig:
@@ -54,6 +56,8 @@ def sized_as(category: Category) -> ThingConfig:
         width_m=category.width.usual if category.round else None,
         round=category.round,
         on_floor=category.on_floor,
+        flat_top=category.flat_top,
+        tallest_m=category.height.high,
     )
 
 

@@ -23,6 +23,10 @@ DRAWERS = {
     "drawer_mid": (1.409, 0.45, 0.36, 0.297),
     "drawer_low": (1.409, 0.45, 0.12, 0.237),
 }
+Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
+Named = tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]
+TABLE: Corners = ((-0.6, -0.35, 0.0), (0.6, 0.35, 0.73))
+CHAIR: Corners = ((0.05, -0.80, 0.0), (0.47, -0.42, 0.90))
 POST = (0.62, 0.72)  # x range of a post that stands before door_b
 
 
@@ -58,16 +62,24 @@ def kitchen(
 
     Or door_c is swung open on its left edge; the carcass then begins further back.
     """
+    poses = [look_at(np.array([x, y, z]), np.array(target)) for x, y, z, target in _path()]
+    states = [(drawn_out_m, swung_rad) if step >= from_step else (0.0, 0.0) for step in range(len(poses))]
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
+    return _filmed("boxes", poses, [_shapes(*state, bool(swung_rad)) for state in states], (wall,))
+
+
+def _filmed(
+    name: str, poses: list[Rigid3], scenes: list[tuple[Shapes, list[str]]], walls: tuple[Wall, ...]
+) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """What the scene, one a pose, looks like from each pose, and the true mask of each named thing."""
     colours: dict[int, np.ndarray] = {}
     depths: dict[int, np.ndarray] = {}
-    truth: dict[str, dict[int, np.ndarray]] = {name: {} for name in (*DOORS, *DRAWERS, "carton")}
+    truth: dict[str, dict[int, np.ndarray]] = {named: {} for named in scenes[0][1]}
     frames = []
     rgb_camera = Intrinsics(fx=400.0, fy=400.0, cx=WIDTH / 2, cy=HEIGHT / 2, width=WIDTH, height=HEIGHT)
     depth_camera = rgb_camera.resized(WIDTH // 2, HEIGHT // 2)
     rng = np.random.default_rng(5)
-    for index, (x, y, z, target) in enumerate(_path()):
-        pose = look_at(np.array([x, y, z]), np.array(target))
-        shapes, names = _shapes(*((drawn_out_m, swung_rad) if index >= from_step else (0.0, 0.0)), bool(swung_rad))
+    for index, (pose, (shapes, names)) in enumerate(zip(poses, scenes, strict=True)):
         fine = rgb_camera.resized(2 * WIDTH, 2 * HEIGHT)
         picture = rasterize(shapes.vertices, shapes.faces, shapes.colours, fine, pose.inverse)
         small = cv2.resize(picture.attributes, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
@@ -76,8 +88,8 @@ def kitchen(
         depths[10 * index] = np.where(seen > 0, seen + rng.normal(0, 0.002, seen.shape), 0).astype(np.float32)
         exact = rasterize(shapes.vertices, shapes.faces, np.repeat(shapes.ids[:, None], 3, 1), rgb_camera, pose.inverse)
         label = np.round(exact.attributes[..., 0]).astype(int)
-        for number, name in enumerate(names, 1):
-            truth[name][10 * index] = label == number
+        for number, named in enumerate(names, 1):
+            truth[named][10 * index] = label == number
         frames.append(
             Frame(
                 index=10 * index,
@@ -90,19 +102,41 @@ def kitchen(
         )
     views = [DepthView(depths[f.index], depth_camera, f.world_from_camera, _shrunk(colours[f.index])) for f in frames]
     fused = fuse_depth(views, 0.012, depth_max_m=5.0)
-    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
     capture = Capture(
-        name="boxes",
+        name=name,
         sha256="test",
         format="test",
         frames=tuple(frames),
         world_from_capture=Rigid3(),
-        room=Room(up_source="file", floor_found=True, manhattan_yaw_rad=0.0, walls=(wall,)),
+        room=Room(up_source="file", floor_found=True, manhattan_yaw_rad=0.0, walls=walls),
         surface=SceneSurface(vertices_world=fused.vertices, faces=fused.faces, colours=fused.colours, voxel_m=0.012),
         images=Pixels(colours, depths),
         notices=(),
     )
     return capture, truth
+
+
+def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """A table with a carton on it and a chair drawn up to it, seen from all around, and their true masks."""
+    boxes: list[Named] = [((-2.5, -2.5, -0.02), (2.5, 2.5, 0.0), (120, 100, 80), None)]
+    boxes += [((*TABLE[0][:2], TABLE[1][2] - 0.03), TABLE[1], (190, 150, 90), "table")]
+    boxes += _legs(TABLE, 0.05, TABLE[1][2] - 0.03, (190, 150, 90), "table")
+    boxes += [((-0.1, -0.05, TABLE[1][2]), (0.02, 0.05, TABLE[1][2] + 0.2), (60, 90, 170), "carton")]
+    (left, near, _), (right, far, top) = CHAIR
+    boxes += [((left, near, 0.42), (right, far, 0.45), (60, 60, 64), "chair")]
+    boxes += [((left, near, 0.45), (right, near + 0.03, top), (60, 60, 64), "chair")]
+    boxes += _legs(CHAIR, 0.04, 0.42, (60, 60, 64), "chair")
+    ring = [(2.0 * np.cos(a), 2.0 * np.sin(a), 1.5 + 0.2 * np.cos(3 * a)) for a in np.arange(16) / 16 * 2 * np.pi]
+    poses = [look_at(np.array(eye), np.array([0.0, -0.2, 0.45])) for eye in ring]
+    return _filmed("dining", poses, [_packed(boxes, ["table", "carton", "chair"])] * len(poses), ())
+
+
+def _legs(box: Corners, width: float, height: float, colour: tuple[int, int, int], name: str) -> list[Named]:
+    """Four posts in the corners of a box."""
+    (left, near, _), (right, far, _) = box
+    return [
+        ((x, y, 0.0), (x + width, y + width, height), colour, name) for x in (left, right - width) for y in (near, far - width)
+    ]
 
 
 def click_on(capture: Capture, point_world: tuple[float, float, float], frame_index: int, label: int = 1) -> PromptPoint:
@@ -134,7 +168,7 @@ def _path() -> list[tuple[float, float, float, tuple[float, float, float]]]:
 
 
 def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes, list[str]]:
-    boxes: list[tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]] = [
+    boxes: list[Named] = [
         ((-1.5, 0.0, 0.0), (3.5, 0.02, 2.4), (200, 202, 198), None),  # wall
         ((-1.5, -3.5, -0.02), (3.5, 0.0, 0.0), (120, 100, 80), None),  # floor
         ((0.0, FRONT_Y + (0.3 if hollow else 0.02), 0.12), (1.859, 0.0, 0.86), (25, 24, 22), None),  # carcass, dark in the gaps
@@ -160,6 +194,11 @@ def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes,
             )
         )
     boxes.append(((1.0, -0.36, 0.90), (1.12, -0.26, 1.10), (60, 90, 170), "carton"))
+    return _packed(boxes, names, swung_rad)
+
+
+def _packed(boxes: list[Named], names: list[str], swung_rad: float = 0.0) -> tuple[Shapes, list[str]]:
+    """Coloured boxes as triangles, those of a name with its number in `names`."""
     vertices, faces, attributes = [], [], []
     count = 0
     for low, high, colour, name in boxes:

@@ -1,0 +1,131 @@
+"""Surface voxels straight from depth images: what the fused surface loses, as thin legs and sheets seen from both sides."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Points, Vector3
+from r2c2r_core.geometry.camera import depth_points, project
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.silhouettes import raised, support_offset
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth points are surface."""
+
+    frames: int = param(40, "count", "whose depth is used", ge=2)
+    most_rows: int = param(240, "px", "of a depth image that are used: finer ones show no more at a voxel's size", ge=16)
+    least_hits: int = param(2, "count", "of frames that must see surface in a voxel", ge=1)
+    agreed: float = param(
+        0.2, "share", "of the frames that look there, which must: sensors smear thin things over what is behind them"
+    )
+    edge_step: float = param(
+        0.06, "ratio", "of a step within 3x3 pixels to the depth, where depth mixes", source="backends.md 2.7"
+    )
+    through_m: float = param(0.03, "m", "behind a voxel beyond the noise, from where the sensor looked through it")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthCloud:
+    """Voxels (n) in which depth images agree on surface: mean position, mean Lab colour, and the frames that hit them."""
+
+    origin: Vector3
+    size_m: float
+    cells: np.ndarray  # (n, 3) int
+    positions: Points
+    lab: np.ndarray  # (n, 3) float
+    hits: np.ndarray  # (n,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Region:
+    """An upright box of the world, and the height of a level surface in it, by which frames are set right."""
+
+    low: Vector3
+    high: Vector3
+    level_z_m: float | None
+
+    def holds(self, points: Points) -> np.ndarray:
+        """Which points lie in it."""
+        return np.asarray(((points > self.low) & (points < self.high)).all(axis=-1))
+
+    def lift(self, scene: Scene, frame: Frame) -> float:
+        """How much too high the frame shows it."""
+        middle = (self.low + self.high) / 2
+        return support_offset(scene, frame, self.level_z_m, np.array([middle[0], middle[1], self.level_z_m or 0.0]))
+
+
+def gather_cloud(scene: Scene, region: Region, size_m: float) -> DepthCloud:
+    """The surface voxels of a region."""
+    params = tuned(Params)
+    views = _views_of(scene, region, params.frames)
+    keys, sums = [], []
+    shape = np.ceil((region.high - region.low) / size_m).astype(int) + 1
+    for frame in views:
+        points, lab = _points_in(scene, frame, region)
+        flat = np.ravel_multi_index(tuple(np.floor((points - region.low) / size_m).astype(int).T), tuple(shape))
+        unique, member = np.unique(flat, return_inverse=True)
+        columns = [np.bincount(member, values, len(unique)) for values in (*points.T, *lab.T)]
+        count = np.bincount(member, minlength=len(unique))
+        keys.append(unique)
+        sums.append(np.column_stack([*(column / count for column in columns), np.ones(len(unique))]))
+    if not keys:
+        return DepthCloud(region.low, size_m, np.zeros((0, 3), int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+    unique, member = np.unique(np.concatenate(keys), return_inverse=True)
+    rows = np.concatenate(sums)
+    total = np.column_stack([np.bincount(member, rows[:, k], len(unique)) for k in range(7)])
+    hits = total[:, 6]
+    mean = total[:, :6] / hits[:, None]
+    cells = np.column_stack(np.unravel_index(unique, tuple(shape)))
+    through = _seen_through(scene, views, region, mean[:, :3])
+    kept = (hits >= params.least_hits) & (hits >= params.agreed * (hits + through))
+    return DepthCloud(region.low, size_m, cells[kept], mean[kept, :3], mean[kept, 3:], hits[kept])
+
+
+def clean_depth(depth: DepthMetres) -> DepthMetres:
+    """Depth without the pixels at its steps, where it mixes what is near with what is behind; 0 there."""
+    near = cv2.erode(np.where(depth > 0, depth, 99.0).astype(np.float32), np.ones((3, 3), np.uint8))
+    far = cv2.dilate(depth, np.ones((3, 3), np.uint8))
+    return np.where((depth > 0) & (far - near < tuned(Params).edge_step * near), depth, 0.0).astype(np.float32)
+
+
+def _points_in(scene: Scene, frame: Frame, region: Region) -> tuple[Points, np.ndarray]:
+    """World points (n, 3) of a frame's depth in the region, and their Lab colours."""
+    camera = frame.depth_camera
+    step = max(1, round(camera.height / tuned(Params).most_rows))
+    depth = clean_depth(scene.depth(frame.index))[::step, ::step]
+    world = frame.world_from_camera.apply(depth_points(scene.depth(frame.index), camera)[::step, ::step].reshape(-1, 3))
+    world = raised(world, -region.lift(scene, frame))
+    inside = region.holds(world) & (depth.ravel() > 0)
+    small = cv2.resize(scene.rgb(frame.index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)[::step, ::step]
+    lab = cv2.cvtColor(np.ascontiguousarray(small), cv2.COLOR_RGB2LAB).reshape(-1, 3)
+    return world[inside], lab[inside].astype(np.float32)
+
+
+def _seen_through(scene: Scene, views: list[Frame], region: Region, points: Points) -> np.ndarray:
+    """How many frames measured something clearly behind each point."""
+    count = np.zeros(len(points))
+    for frame in views:
+        lifted = raised(points, region.lift(scene, frame))
+        z, seen, _ = look_up(lifted, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        count += scene.noise.seen_through(seen, z, tuned(Params).through_m)
+    return count
+
+
+def _views_of(scene: Scene, region: Region, most: int) -> list[Frame]:
+    """Frames that look at the region's middle: of as many stretches of the recording, the sharpest of each."""
+    middle = (region.low + region.high) / 2
+    seeing = []
+    for frame, local in zip(scene.frames, scene.seen_from_all(middle), strict=True):
+        if local[2] < 0.2:
+            continue
+        u, v = project(local, frame.rgb_camera)
+        if 0 < u < frame.rgb_camera.width and 0 < v < frame.rgb_camera.height:
+            seeing.append(frame)
+    groups = np.array_split(np.arange(len(seeing)), min(most, len(seeing))) if seeing else []
+    return [max((seeing[i] for i in group), key=lambda frame: frame.sharpness) for group in groups]

@@ -1,0 +1,118 @@
+"""The pixels of what stands on the floor: each depth pixel by what its point lies on, colours where depth fails, one cut."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask
+from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_through
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.occlusion import refine_border
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.depth_cloud import clean_depth
+from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
+from r2c2r_core.segment.things.silhouettes import raised, shrunk, splat
+from r2c2r_core.segment.things.standing import OFF, ON, UNKNOWN, Standing
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How the outline of a standing thing is drawn."""
+
+    around_m: float = param(0.08, "m", "about the thing, that a crop shows")
+    cut_px: int = param(220, "px", "of the longer side of what is cut: legs are thin", ge=32)
+    depth_odds: float = param(2.5, "log", "of a depth pixel on the thing or off it")
+    voxel_odds: float = param(2.0, "log", "of a pixel that the thing's voxels cover, or do not")
+    far_odds: float = param(6.0, "log", "of a pixel farther from the voxels than `around_m`")
+    model_frames: int = param(12, "count", "that colours are learned from", ge=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Crop:
+    area: tuple[slice, slice]
+    camera: Intrinsics
+    scale: float
+    voxels: Mask  # that the thing's voxels cover
+    on: Mask  # depth on the thing
+    off: Mask  # depth on something else
+    hidden: Mask  # depth on something before it
+    rgb: np.ndarray
+
+
+def standing_colours(found: Standing, scene: Scene, frames: tuple[Frame, ...]) -> ColourModel | None:
+    """Colours on the thing against those around it, where voxels and depth agree."""
+    seeing = [crop for frame in frames if (crop := _crop_of(found, scene, frame)) is not None]
+    step = max(1, len(seeing) // tuned(Params).model_frames)
+    samples = []
+    for crop in seeing[::step]:
+        near = cv2.dilate(crop.voxels.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+        samples.append((cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB), crop.on & crop.voxels, ~near & ~crop.hidden))
+    return learn_colours(samples) if samples else None
+
+
+def standing_mask(found: Standing, scene: Scene, frame: Frame) -> tuple[Mask, float]:
+    """The thing's visible pixels in a frame, and the share of its voxels that nothing hides."""
+    params = tuned(Params)
+    mask = np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool)
+    crop = _crop_of(found, scene, frame)
+    if crop is None:
+        return mask, 0.0
+    share = 1 - float((crop.voxels & crop.hidden).sum() / max(crop.voxels.sum(), 1))
+    odds = params.depth_odds * (crop.on.astype(np.float32) - crop.off.astype(np.float32))
+    odds = cv2.blur(odds, (3, 3))
+    outside = cv2.distanceTransform((~crop.voxels).astype(np.uint8), cv2.DIST_L2, 5)
+    odds += np.where(crop.voxels, params.voxel_odds, -params.voxel_odds * np.minimum(outside / (0.02 * crop.scale + 1), 1.5))
+    if found.thing.colours is not None:
+        odds += found.thing.colours.odds(cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB))
+    odds[outside > params.around_m * crop.scale] = -params.far_odds
+    odds[crop.hidden & ~crop.on] -= params.far_odds
+    small = cut_pixels(crop.rgb, odds, params.cut_px)
+    photo = scene.rgb(frame.index)[crop.area]
+    height, width = photo.shape[:2]
+    grown = np.asarray(cv2.resize(small.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR) > 0.5)
+    cell = max(height, width) / min(params.cut_px, max(small.shape))
+    mask[crop.area] = refine_border(photo, grown, max(1, round(0.6 * cell))) if cell > 1.5 else grown
+    return mask, share
+
+
+def _crop_of(found: Standing, scene: Scene, frame: Frame) -> _Crop | None:
+    params = tuned(Params)
+    camera = frame.rgb_camera
+    lift = found.region.lift(scene, frame)
+    local = frame.world_from_camera.inverse.apply(raised(found.thing.vertices, lift))
+    local = local[local[:, 2] > 0.15]
+    if len(local) < 0.3 * len(found.thing.vertices):
+        return None
+    uv = project(local, camera)
+    inside = ((uv >= 0) & (uv < [camera.width, camera.height])).all(axis=1)
+    if inside.sum() < 20:
+        return None
+    uv, local = uv[inside], local[inside]
+    scale = camera.fx / float(np.median(local[:, 2]))
+    pad = params.around_m * scale + 6
+    left, top = (int(v) for v in np.maximum(uv.min(axis=0) - pad, 0))
+    right, bottom = (int(v) for v in np.minimum(uv.max(axis=0) + pad, [camera.width, camera.height]))
+    if right - left < 8 or bottom - top < 8:
+        return None
+    area = (slice(top, bottom), slice(left, right))
+    small = shrunk(camera, area)
+    shrink = (right - left) / small.width
+    voxels = splat(project(local, small), (small.height, small.width), found.size_m * scale / shrink) > 0
+    label, nearer = _depth_labels(found, scene, frame, small, lift)
+    part = scene.rgb(frame.index)[area]
+    rgb = cv2.resize(part, (small.width, small.height), interpolation=cv2.INTER_AREA)
+    return _Crop(area, small, scale / shrink, voxels, label == ON, label == OFF, nearer, np.asarray(rgb))
+
+
+def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsics, lift: float) -> tuple[np.ndarray, Mask]:
+    """What each pixel of a crop's depth lies on, and where that is something before the thing."""
+    depth = clean_depth(scene.depth(frame.index))
+    world = raised(frame.world_from_camera.apply(depth_points(depth, frame.depth_camera).reshape(-1, 3)), -lift)
+    label = np.where(depth.ravel() > 0, found.label_of(world), UNKNOWN).reshape(depth.shape).astype(np.uint8)
+    nearest = float(np.quantile(frame.world_from_camera.inverse.apply(found.thing.vertices)[:, 2], 0.02))
+    nearer = (label == OFF) & scene.noise.occluded(depth, nearest, 0.05)
+    label, inside = sample_through(label, frame.depth_camera, camera)
+    nearer, _ = sample_through(nearer, frame.depth_camera, camera)
+    return np.where(inside, label, UNKNOWN), inside & nearer
