@@ -24,6 +24,19 @@ def apart(stage: str, name: str, failures: dict[str, str]) -> Iterator[None]:
         record(stage, name, error, failures)
 
 
+@contextmanager
+def spared(what: str, said: list[str]) -> Iterator[None]:
+    """A step that all go through, at the place of one of them: what it may end in is said there, and the rest goes on.
+
+    `said` gets one line, "what: why".
+    """
+    try:
+        yield
+    except OBJECT_FAILS as error:
+        said.append(f"{what}: {_in_words(error)}")
+        _log.warning("%s", said[-1], exc_info=None if isinstance(error, R2C2RError) else error)
+
+
 def record(stage: str, name: str, error: Exception, failures: dict[str, str], where: str = "") -> None:
     """One line for a person; the traceback of what nobody foresaw (`where`, from another process) goes to the log."""
     failures[name] = failure_line(stage, name, error)
@@ -37,5 +50,9 @@ def failure_line(stage: str, name: str, error: Exception) -> str:
     """One line for a person."""
     if isinstance(error, R2C2RError):
         return f"{stage}: {error}"
+    return f"{stage}: {name}: {_in_words(error)}; see the log, or leave it out"
+
+
+def _in_words(error: Exception) -> str:
     said = (str(error).strip() or "no message").splitlines()[0]
-    return f"{stage}: {name}: {type(error).__name__}: {said}; see the log, or leave it out"
+    return said if isinstance(error, R2C2RError) else f"{type(error).__name__}: {said}"

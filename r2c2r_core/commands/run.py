@@ -116,6 +116,8 @@ def write_bundle(
         print("nothing changed: every stage was reused")
     print(_summary(outcome.reconstruction))
     print(", ".join(f"{stage} {taken:.1f} s" for stage, taken in outcome.seconds.items()))
+    for line in outcome.reconstruction.scene.warnings:
+        print(shown(f"r2c2r: {line}"), file=sys.stderr)
     for name, reason in outcome.failures.items():
         print(shown(f"r2c2r: {name} is not in the bundle: {reason}"), file=sys.stderr)
     print(f"{destination}: certificate {'passed' if outcome.certificate.passed else 'FAILED'}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.failing import spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.walls import depths_in
@@ -47,12 +48,14 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
     obstacles = gathered(objects)
     result = []
     for index, item in enumerate(objects):
-        joints, warnings = [], []
+        joints, warnings = [], list[str]()
         for joint in item.joints:
             if joint.name in kept:
                 joints.append(joint)
                 continue
-            free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
+            free, blocker = joint.upper, None
+            with spared(f"how far {joint.name} opens was not looked at", warnings):
+                free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
             if blocker is None:
                 joints.append(joint)
                 continue
@@ -163,10 +166,11 @@ def gathered(objects: Sequence[SceneObject]) -> Obstacles:
         for link_index, link in enumerate(item.links):
             if item.movable or not link.boxes:
                 continue
-            boxes = link_boxes(item, link)
-            parts.append(boxes)
-            owner += [index] * len(boxes.centres)
-            number += [link_index] * len(boxes.centres)
+            with spared(f"{link.name} stands in nobody's way", []):
+                boxes = link_boxes(item, link)
+                parts.append(boxes)
+                owner += [index] * len(boxes.centres)
+                number += [link_index] * len(boxes.centres)
     if not parts:
         return Obstacles(
             boxes=Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3))), owner=np.zeros(0, int), link=np.zeros(0, int)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from r2c2r_core.failing import spared
 from r2c2r_core.kitchen.fillers import FrontBox, missing_filler
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import trimmed
@@ -19,16 +20,23 @@ class Params:
 
 def leave_fillers(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
     """The objects, side edges of fronts drawn back from the front plane of a perpendicular run they run into."""
-    params = tuned(Params)
     result = []
     for item in objects:
-        for sign in (-1.0, 1.0):
-            for other in objects:
-                excess = _excess(item, sign, other)
-                if 0 < excess <= min(params.most_m, params.most_share * item.dimensions_m[0]):
-                    item = _drawn_in(item, sign, excess, other.name)
-        result.append(item)
+        said: list[str] = []
+        with spared("no filler was looked for beside it", said):
+            item = _without_fillers(item, objects)
+        result.append(replace(item, warnings=(*item.warnings, *said)))
     return result
+
+
+def _without_fillers(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> MeasuredObject:
+    params = tuned(Params)
+    for sign in (-1.0, 1.0):
+        for other in objects:
+            excess = _excess(item, sign, other)
+            if 0 < excess <= min(params.most_m, params.most_share * item.dimensions_m[0]):
+                item = _drawn_in(item, sign, excess, other.name)
+    return item
 
 
 def _excess(item: MeasuredObject, sign: float, other: MeasuredObject) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.calibration import FITTED, calibrated
+from r2c2r_core.failing import spared
 from r2c2r_core.model.inputs import HingeSide, Overrides
 from r2c2r_core.model.scene import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -55,7 +56,11 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         if item.spec.opens not in ("side", "bottom"):
             continue
         asked = overrides.of(item.name).hinge
-        seen = handle_hinge(item) if item.spec.opens == "side" else None
+        said, seen = list[str](), None
+        with spared("its handle was not looked at", said):
+            seen = handle_hinge(item) if item.spec.opens == "side" else None
+        if said:
+            seen = _by_category(item, said[0])
         if asked is not None:
             hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person", confidence=1.0)
         elif item.swung is not None and item.spec.opens == "side":
@@ -70,7 +75,11 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         else:
             undecided.append(item)
     for item in sorted(undecided, key=lambda o: _along(o, o)):
-        hinges[item.name] = _from_neighbours(item, objects, hinges)
+        said = []
+        with spared("what stands beside it told no side", said):
+            hinges[item.name] = _from_neighbours(item, objects, hinges)
+        if said:
+            hinges[item.name] = _by_category(item, said[0])
     return hinges
 
 
@@ -110,8 +119,12 @@ def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hi
         return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=params.in_pairs)
     if left is None and right is not None and _side(right, hinges) is None:
         return Hinge(side="left", source="inferred", reason=f"opens as a pair with {right.name}", confidence=params.in_pairs)
+    return _by_category(item, "nothing in the scan tells the side")
+
+
+def _by_category(item: MeasuredObject, reason: str) -> Hinge:
     assert item.spec.hinge is not None  # of every category with a single door
-    return Hinge(side=item.spec.hinge, source="default", reason="nothing in the scan tells the side", confidence=0.5)
+    return Hinge(side=item.spec.hinge, source="default", reason=reason, confidence=0.5)
 
 
 def _paired(

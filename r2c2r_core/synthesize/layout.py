@@ -7,11 +7,12 @@ bounded by what measuring can be wrong by; how far each object moved is reported
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.failing import OBJECT_FAILS, spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
@@ -55,12 +56,14 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
 
     Outliers are not among the layout's objects: they stand as they were measured, and change nothing.
     """
-    params = tuned(Params)
-    outliers = outliers_of(objects)
+    params, outliers, unseen = tuned(Params), dict[str, str](), list[str]()
+    with spared("what cannot be there was not looked for", unseen):
+        outliers = outliers_of(objects)
     objects = [item for item in objects if item.name not in outliers]
     placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
+    warnings = [*unseen, *warnings]
     moves = {
         before.name: float(np.linalg.norm(anchor(after) - anchor(before)))
         for before, after in zip(objects, placed, strict=True)
@@ -122,9 +125,16 @@ def anchor(item: MeasuredObject) -> Vector3:
 
 def settled(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_found: bool) -> MeasuredObject:
     """The object lowered or raised onto its support: the top of an object below it, the scanned surface, or the floor."""
-    params = tuned(Params)
     if not item.spec.stands or item.fixed_by_person:
         return item
+    said: list[str] = []
+    with spared("it was not put on what carries it", said):
+        return _on_support(item, others, floor_found=floor_found)
+    return replace(item, warnings=(*item.warnings, *said))
+
+
+def _on_support(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_found: bool) -> MeasuredObject:
+    params = tuned(Params)
     bottom = item.world_from_object.translation[2] - item.dimensions_m[2] / 2
     tops = [_top(other) for other in others if other is not item and _carries(other, item)]
     if floor_found:
@@ -143,13 +153,14 @@ def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject
     items, warnings = list(objects), []
     try:
         items = _solved_in_rounds(objects)
-    except (np.linalg.LinAlgError, ArithmeticError) as error:  # one bad box must not cost the kitchen
+    except OBJECT_FAILS as error:  # one bad box must not cost the kitchen
         _log.warning("the layout was not solved", exc_info=error)
         warnings.append(f"the layout was not solved ({error}): everything stands where it was measured; check sizes and poses")
-    for first, second, depth in overlapping_pairs(items):
-        if depth > params.gap_m:
-            names = f"{items[first].name} and {items[second].name}"
-            warnings.append(f"{names} still overlap by {1000 * (depth - params.gap_m):.0f} mm: correct a size or a pose")
+    with spared("what overlaps was not looked for", warnings):
+        for first, second, depth in overlapping_pairs(items):
+            if depth > params.gap_m:
+                names = f"{items[first].name} and {items[second].name}"
+                warnings.append(f"{names} still overlap by {1000 * (depth - params.gap_m):.0f} mm: correct a size or a pose")
     return items, warnings
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2c2r_core.failing import spared
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.scene import SceneObject
@@ -54,8 +55,14 @@ def open_all(
         told = hinge is None or hinge.source == "person" or hinge.by_handle or hinge.side not in _OTHER
         if hinge is None or told or _travel(opened[index]) > params.blocked_rad:
             continue
-        reason = f"hung on the {hinge.side} it could not open"
-        turned = rebuild(item.name, Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=params.opens))
+        reason, said = f"hung on the {hinge.side} it could not open", list[str]()
+        other = Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=params.opens)
+        with spared("it was not tried on its other side", said):
+            turned = rebuild(item.name, other)
+        if said:
+            opened[index] = replace(opened[index], warnings=(*opened[index].warnings, *said))
+            fixtures[index] = replace(item, warnings=(*item.warnings, *said))
+            continue
         trial = [*fixtures[:index], turned, *fixtures[index + 1 :]]
         tried = open_freely(trial, walls, kept)
         others_lose = any(

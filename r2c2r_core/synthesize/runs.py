@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.failing import spared
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation, rotation_about_z
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
@@ -52,22 +53,33 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
     turned = [i for i, o in enumerate(items) if o.spec.opens != "rigid" and not o.fixed_by_person]
     known: list[float] = []
     for line in _directions(items, [i for i in turned if not items[i].spec.stands]):
-        yaw = _run_yaw(items, line, manhattan_yaw_rad)
-        known.append(yaw)
+        said: list[str] = []
+        with spared("its run was not straightened", said):
+            yaw = _run_yaw(items, line, manhattan_yaw_rad)
+            items = _straightened(items, line, yaw)
+            known.append(yaw)
         for i in line.members:
-            items[i] = _facing(items[i], yaw)
-        outward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-        for plane in _planes(items, [i for i in line.members if built_in(items[i])], outward):
-            offset = weighted_median(
-                np.array([items[i].front_centre @ outward for i in plane]), np.array([weight(items[i]) for i in plane])
-            )
-            for i in plane:
-                items[i] = moved(items[i], outward * (offset - items[i].front_centre @ outward))
+            items[i] = replace(items[i], warnings=(*items[i].warnings, *said))
     known += [manhattan_yaw_rad + quarter * np.pi / 2 for quarter in range(4)]
     for i in (i for i in turned if items[i].spec.stands):
         nearest = next((yaw for yaw in known if abs(_wrapped(yaw - _yaw(items[i]))) < params.parallel_rad), None)
         items[i] = items[i] if nearest is None else _facing(items[i], nearest)
     return tuple(items)
+
+
+def _straightened(objects: Sequence[MeasuredObject], line: _Line, yaw_rad: float) -> list[MeasuredObject]:
+    """All objects, those of the line turned to face `yaw_rad`, and the built-in ones of a plane moved onto it."""
+    items = list(objects)
+    for i in line.members:
+        items[i] = _facing(items[i], yaw_rad)
+    outward = np.array([np.cos(yaw_rad), np.sin(yaw_rad), 0.0])
+    for plane in _planes(items, [i for i in line.members if built_in(items[i])], outward):
+        offset = weighted_median(
+            np.array([items[i].front_centre @ outward for i in plane]), np.array([weight(items[i]) for i in plane])
+        )
+        for i in plane:
+            items[i] = moved(items[i], outward * (offset - items[i].front_centre @ outward))
+    return items
 
 
 def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[_Line]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.failing import spared
 from r2c2r_core.geometry.least_change import least_change
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -70,8 +71,11 @@ def solved(
         place = {item: k for k, item in enumerate(group)}
         own_ties = [_renumbered(tie, place) for tie in ties if tie.first.item in place]
         own_pairs = [(place[a], place[b]) for a, b in apart if a in place]
-        for item, found in zip(group, _solved([items[k] for k in group], own_ties, own_pairs, gap_m), strict=True):
-            items[item] = found
+        said, found = list[str](), [items[k] for k in group]
+        with spared("it was not fitted to its neighbours", said):
+            found = _solved(found, own_ties, own_pairs, gap_m)
+        for k, item in zip(group, found, strict=True):
+            items[k] = replace(item, warnings=(*item.warnings, *said))
     return items
 
 

@@ -108,13 +108,14 @@ def build_scene(
 
     kept = frozenset(name for item in built for name in _uppers_said(item, overrides.of(item.name)))
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
-    made = surroundings_of(capture, list(arranged.values())) if config.surroundings else []
-    opened += standing_clear(opened, made, _painted, capture.room.walls, kept)
+    said: list[str] = []
+    made = surroundings_of(capture, list(arranged.values()), said) if config.surroundings else []
+    opened += standing_clear(opened, made, _painted, capture.room.walls, kept, said)
     return ArticulatedScene(
         name=capture.name,
         objects=tuple(opened),
         layout_moves_m=layout.moves_m,
-        warnings=layout.warnings,
+        warnings=(*layout.warnings, *said),
         failures=failures,
     )
 

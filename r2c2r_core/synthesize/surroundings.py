@@ -6,6 +6,7 @@ from itertools import count
 
 import numpy as np
 
+from r2c2r_core.failing import apart, spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
@@ -16,6 +17,7 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.facets import facets_of
 from r2c2r_core.synthesize.plinths import plinth_runs, plinths
 from r2c2r_core.synthesize.slabs import Slab
+from r2c2r_core.synthesize.unit_runs import UnitRun
 from r2c2r_core.synthesize.worktops import runs_of, worktop
 from r2c2r_core.tuning import param, tuned
 
@@ -57,18 +59,23 @@ class Surrounding:
         )
 
 
-def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject]) -> list[Surrounding]:
+def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: list[str]) -> list[Surrounding]:
     """Counters over the runs of base units and plinths below them; none where a person clicked one.
 
-    None without a floor either: by their height above it base units are known.
+    None without a floor either: by their height above it base units are known. `said` gets a line for every run where one
+    could not be made.
     """
     if not capture.room.floor_found:
         return []
-    facets, counters, boards = facets_of(capture.surface), list[Slab](), list[Slab]()
-    for run in runs_of(objects):
-        counters += worktop(capture, facets, run, objects, counters)
-    for run in plinth_runs(objects):
-        boards += plinths(facets, run, objects, boards)
+    counters, boards = list[Slab](), list[Slab]()
+    with spared("no worktop or plinth was looked for", said):
+        facets = facets_of(capture.surface)
+        for run in runs_of(objects):
+            with spared(f"no worktop was made over {_names(run)}", said):
+                counters += worktop(capture, facets, run, objects, counters)
+        for run in plinth_runs(objects):
+            with spared(f"no plinth was made below {_names(run)}", said):
+                boards += plinths(facets, run, objects, boards)
     names = {item.name for item in objects}
     return [*_named("counter", counters, names), *_named("plinth", boards, names)]
 
@@ -79,17 +86,27 @@ def standing_clear(
     build: Callable[[MeasuredObject, Slab], SceneObject],
     walls: Sequence[Wall],
     kept: frozenset[str],
+    said: list[str],
 ) -> list[SceneObject]:
-    """The surroundings, built, that touch nothing and shorten no joint; a counter that would tries it without overhang."""
-    standing = [build(item.measured(item.slab), item.slab) for item in made]
-    if _clear(opened, standing, walls, kept):  # nearly always: one look at every joint instead of one a piece
-        return standing
-    standing = []
+    """The surroundings, built, that touch nothing and shorten no joint; a counter that would tries it without overhang.
+
+    `said` gets a line for every one that could not be built.
+    """
+    with apart("synthesize", "worktops and plinths", {}):  # else piece by piece
+        standing = [build(item.measured(item.slab), item.slab) for item in made]
+        if _clear(opened, standing, walls, kept):  # nearly always: one look at every joint instead of one a piece
+            return standing
+    clear: list[SceneObject] = []
     for item in made:
-        slabs = (item.slab,) if item.slab.flush_m is None else (item.slab, item.slab.flush)
-        pieces = (build(item.measured(slab), slab) for slab in slabs)
-        standing += [piece for piece in pieces if _clear(opened, [piece], walls, kept)][:1]
-    return standing
+        with spared(f"{item.name} is left out", said):
+            slabs = (item.slab,) if item.slab.flush_m is None else (item.slab, item.slab.flush)
+            pieces = (build(item.measured(slab), slab) for slab in slabs)
+            clear += [piece for piece in pieces if _clear(opened, [piece], walls, kept)][:1]
+    return clear
+
+
+def _names(run: UnitRun) -> str:
+    return ", ".join(unit.name for unit in run.units)
 
 
 def _clear(opened: Sequence[SceneObject], pieces: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> bool:

@@ -1,0 +1,131 @@
+"""What fails in a step that all objects go through stays with the one it failed for, and is said in one line."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.model.scene import ArticulatedScene
+from r2c2r_core.synthesize import clearance, fillers, joints, layout, opening, runs, solve, stage, surroundings
+from tests.core.synthesize.kitchen_units import Handle, Unit
+from tests.core.synthesize.test_build_scene import built, the
+
+RUN = [
+    Unit("cab_l", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=Handle(0.24, 0.2)),
+    Unit("cab_r", "cabinet", (0.602, 0.004, 0.5), (0.6, 0.58, 0.7), handle=Handle(-0.24, 0.2)),
+]
+ALONE = Unit("far", "cabinet", (0, 3.0, 0.5), (0.6, 0.58, 0.7), yaw=1.0, handle=Handle(0.24, 0.2))
+MUG = Unit("mug", "mug", (0.335, 3.0, 0.05), (0.1, 0.1, 0.1), kind="thing")
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, when: Callable[..., bool]) -> None:
+    """The module's function fails where it is called with what `when` says."""
+    real = getattr(module, name)
+
+    def fails(*inputs: Any, **settings: Any) -> Any:
+        if when(*inputs):
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return real(*inputs, **settings)
+
+    monkeypatch.setattr(module, name, fails)
+
+
+def named(scene: ArticulatedScene, what: str) -> set[str]:
+    """Who carries a warning about it, each with the reason."""
+    lines = {item.name: [line for line in item.warnings if what in line] for item in scene.objects}
+    assert all("LinAlgError: SVD did not converge" in line for found in lines.values() for line in found)
+    return {name for name, found in lines.items() if found}
+
+
+def test_a_run_that_cannot_be_straightened_leaves_the_others_straight(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, runs, "_run_yaw", lambda items, line, *_: items[line.members[0]].name == "far")
+    assert named(built(*RUN, ALONE), "its run was not straightened") == {"far"}
+
+
+def test_an_object_whose_fillers_cannot_be_told_keeps_its_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, fillers, "_excess", lambda item, *_: item.name == "cab_r")
+    assert named(built(*RUN), "no filler was looked for beside it") == {"cab_r"}
+
+
+def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, layout, "_carries", lambda _, item: item.name == "mug")
+    assert named(built(*RUN, MUG), "it was not put on what carries it") == {"mug"}
+
+
+def test_neighbours_that_cannot_be_fitted_stay_as_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = [
+        Unit("other_l", "cabinet", (0, 3, 0.5), (0.6, 0.58, 0.7)),
+        Unit("other_r", "cabinet", (0.602, 3, 0.5), (0.6, 0.58, 0.7)),
+    ]
+    failing(monkeypatch, solve, "_solved", lambda items, *_: items[0].name == "other_l")
+    assert named(built(*RUN, *pair), "it was not fitted to its neighbours") == {"other_l", "other_r"}
+
+
+@pytest.mark.parametrize("step", ["outliers_of", "overlapping_pairs"])
+def test_overlaps_that_cannot_be_found_are_said(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, layout, step, lambda *_: True)
+    scene = built(*RUN)
+    assert {"cab_l", "cab_r"} <= {item.name for item in scene.objects}
+    assert any("LinAlgError: SVD did not converge" in line for line in scene.warnings)
+
+
+@pytest.mark.parametrize("step", ["handle_hinge", "_from_neighbours"])
+def test_a_door_whose_side_cannot_be_told_is_hung_as_its_category(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, joints, step, lambda item, *_: item.name == "bare")
+    bare = Unit("bare", "cabinet", (0, 3, 0.5), (0.6, 0.58, 0.7))
+    scene = built(*RUN, bare)
+    assert named(scene, "hinge on the left by default") == {"bare"}
+    assert len(the(scene, "cab_l").joints) == 1
+
+
+def test_a_joint_whose_way_cannot_be_told_opens_as_its_category(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, clearance, "free_travel", lambda item, *_: item.name == "cab_r")
+    scene = built(*RUN)
+    assert named(scene, "how far cab_r_door_joint opens was not looked at") == {"cab_r"}
+
+
+def test_boxes_that_cannot_be_made_are_in_nobodys_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, clearance, "link_boxes", lambda item, _: item.name == "counter")
+    scene = built(*RUN, Unit("counter", "counter", (0.3, 0, 0.915), (1.3, 0.62, 0.04), kind="thing"))
+    assert {"cab_l", "cab_r", "counter"} <= {item.name for item in scene.objects}
+
+
+def test_a_door_that_cannot_be_hung_otherwise_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    build = stage._fixture
+    monkeypatch.setattr(opening, "_travel", lambda _: 0.0)  # as if nothing opened
+    turned: list[str] = []
+
+    def built_once(item: Any, hinge: Any, *further: Any) -> Any:
+        if hinge is not None and "could not open" in hinge.reason:
+            turned.append(item.name)
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return build(item, hinge, *further)
+
+    monkeypatch.setattr(stage, "_fixture", built_once)
+    scene = built(Unit("bare", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7)), ALONE)
+    assert turned == ["bare"]
+    assert named(scene, "it was not tried on its other side") == {"bare"}
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        ("facets_of", "no worktop or plinth was looked for"),
+        ("worktop", "no worktop was made over cab_l, cab_r"),
+        ("plinths", "no plinth was made below cab_l, cab_r"),
+    ],
+)
+def test_a_worktop_or_plinth_that_cannot_be_made_is_left_out(step: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, surroundings, step, lambda *_: True)
+    scene = built(*RUN)
+    assert {"cab_l", "cab_r"} <= {item.name for item in scene.objects}
+    assert f"{said}: LinAlgError: SVD did not converge" in scene.warnings
+
+
+@pytest.mark.parametrize("step", ["_painted", "_clear"])
+def test_a_plinth_that_cannot_be_built_is_left_out(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, stage if step == "_painted" else surroundings, step, lambda *_: True)
+    scene = built(*RUN)
+    assert {item.name for item in scene.objects} == {"cab_l", "cab_r"}
+    assert "plinth_1 is left out: LinAlgError: SVD did not converge" in scene.warnings
