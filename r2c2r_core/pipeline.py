@@ -137,6 +137,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
         work.forget("export", "scene")
     known = Kept(result, content_key(fitted.key, run.failures))
     certificate = run.one("export", write_bundle, known, aside(work.bundle), config.export)
+    run.failures |= certificate.value.left_out
     return result, certificate.value
 
 

@@ -2,6 +2,8 @@
 
 import json
 import os
+import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,23 +13,26 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.disk import explained_io
+from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.archive import building_folder, opened_bundle, replace_folder, write_zip
 from r2c2r_core.export.certify import certificate_to_json, certify
 from r2c2r_core.export.manifest import manifest_of, with_blockers
 from r2c2r_core.export.pictures import write_pictures
-from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.plan import Plan, plan_bundle
 from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.review import review_html
-from r2c2r_core.export.scan_fit import scan_fits
+from r2c2r_core.export.scan_fit import ScanFit, scan_fits
 from r2c2r_core.export.seal import check_seal, checksums
 from r2c2r_core.export.support import supported
-from r2c2r_core.export.writers.meshes import write_meshes
+from r2c2r_core.export.writers.meshes import write_body
 from r2c2r_core.export.writers.table import write_formats
+from r2c2r_core.failing import apart
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import Certificate
+from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting
 
@@ -59,25 +64,33 @@ def write_bundle(
     None leaves it to SOURCE_DATE_EPOCH, or out. Raises ExportFailed on a scene without objects and EnvironmentProblem on a
     full disk.
     """
-    plan = supported(plan_bundle(reconstruction.scene))
     with building_folder(destination) as scratch:
         folder = scratch / "bundle"
         folder.mkdir()
         progress.at(0.0, "writing meshes")
-        write_meshes(plan, folder, config.texture_max_px)
+        plan, lost = _with_meshes(reconstruction.scene, folder, config.texture_max_px)
+        reconstruction = replace(
+            reconstruction, scene=_without(reconstruction.scene, lost), failures=reconstruction.failures | lost
+        )
         write_formats(plan, folder, progress=progress.part(0.05, 0.1))
-        fits = scan_fits(reconstruction, plan, progress=progress.part(0.1, 0.2))
+        fits, pictures = dict[str, ScanFit](), dict[str, str]()
+        with apart("export", "the fit to the scan", {}):
+            fits = scan_fits(reconstruction, plan, progress=progress.part(0.1, 0.2))
         manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build(), fits)
         _write_json(folder / "manifest.json", manifest)
         (folder / "README.txt").write_text(readme_text(plan))
         progress.at(0.2, "drawing the preview")
-        (folder / "preview.png").write_bytes(preview_png(plan, _filmed_from(reconstruction.capture)))
-        pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4)) if config.pictures else {}
+        with apart("export", "preview.png", {}):  # the certificate says that it is missing
+            (folder / "preview.png").write_bytes(preview_png(plan, _filmed_from(reconstruction.capture)))
+        with apart("export", "pictures", {}):
+            if config.pictures:
+                pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4))
         certificate = certify(folder, progress=progress.part(0.4, 0.9))
         manifest = with_blockers(manifest, plan, certificate.joints)
         _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
-        review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
-        (folder / "review.html").write_text(review, encoding="utf-8")
+        with apart("export", "review.html", {}):
+            review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
+            (folder / "review.html").write_text(review, encoding="utf-8")
         _write_json(folder / "manifest.json", manifest | {"files": checksums(folder)})  # last: it vouches for the others
         progress.at(0.9, "packing")
         write_zip(folder, scratch / "bundle.zip")
@@ -85,7 +98,30 @@ def write_bundle(
         if config.keep_folder:
             replace_folder(folder, destination.with_suffix(""))
     progress.at(1.0, "certified bundle" if certificate.passed else "bundle written, its certificate failed")
-    return certificate
+    return replace(certificate, left_out=lost)
+
+
+def _with_meshes(scene: ArticulatedScene, folder: Path, texture_max_px: int) -> tuple[Plan, dict[str, str]]:
+    """The meshes written: what the bundle holds, and what is left out because it cannot be written, with a line each."""
+    lost: dict[str, str] = {}
+    for item in scene.objects:
+        with apart("export", item.name, lost):
+            plan_bundle(replace(scene, objects=(item,)))
+    plan = plan_bundle(_without(scene, lost))
+    for item in scene.objects:
+        with apart("export", item.name, lost):
+            for body in plan.of(item.name):
+                write_body(body, folder, texture_max_px)
+    for name in lost:
+        shutil.rmtree(folder / "meshes" / name, ignore_errors=True)
+    return supported(replace(plan, bodies=tuple(body for body in plan.bodies if body.object_name not in lost))), lost
+
+
+def _without(scene: ArticulatedScene, lost: Mapping[str, str]) -> ArticulatedScene:
+    left = tuple(item for item in scene.objects if item.name not in lost)
+    if scene.objects and not left:
+        raise ExportFailed("no object can be written", hint="; ".join(lost.values()))
+    return replace(scene, objects=left)
 
 
 def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:

@@ -5,13 +5,14 @@ that is no object of the scene would drop to the floor in the first second. The 
 for the surface; the manifest says so.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.export.plan import WORLD, Body, Plan, collider_corners_world
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.materials import CHIPBOARD
 from r2c2r_core.model.scene import Box, Inertial, Link
@@ -25,21 +26,27 @@ _SHARE = 0.3  # of the foot's corners
 
 def supported(plan: Plan) -> Plan:
     """The plan with every free thing standing on what carries it, or on a plate where nothing does and one has room."""
-    bodies, plates = {body.name: body for body in plan.bodies}, []
+    bodies, plates = {body.name: body for body in plan.bodies}, list[Body]()
     lowest_first = sorted((b for b in plan.bodies if b.free and _colliders(b).size), key=lambda b: _colliders(b)[:, 2].min())
     for name in [body.name for body in lowest_first]:
-        thing = bodies[name]
-        points = _colliders(thing)
-        others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
-        under_m = _carried_at(points, others, plan.floor_z_m)
-        if under_m is not None:
-            lift = under_m + _GAP_M - float(points[:, 2].min())
-            bodies |= {body.name: _lifted(body, lift) for body in bodies.values() if body.object_name == thing.object_name}
-            continue
-        plate = _plate(thing, points)
-        if not _in_the_way(plate, [c for b in bodies.values() if _moves(b) for c in collider_corners_world(b)]):
-            plates.append(plate)
+        with apart("export", name, {}):  # it stays where it is
+            carried, plate = _support(bodies[name], bodies, plan.floor_z_m)
+            bodies |= carried
+            plates += plate
     return replace(plan, bodies=(*bodies.values(), *plates))
+
+
+def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple[dict[str, Body], list[Body]]:
+    """The bodies of a thing on what carries it, or the plate that does where there is room for one."""
+    points = _colliders(thing)
+    others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
+    under_m = _carried_at(points, others, floor_z_m)
+    if under_m is not None:
+        lift = under_m + _GAP_M - float(points[:, 2].min())
+        return {body.name: _lifted(body, lift) for body in bodies.values() if body.object_name == thing.object_name}, []
+    plate = _plate(thing, points)
+    in_the_way = _in_the_way(plate, [c for b in bodies.values() if _moves(b) for c in collider_corners_world(b)])
+    return {}, [] if in_the_way else [plate]
 
 
 def _carried_at(points: Points, others: Sequence[Points], floor_z_m: float) -> float | None:

@@ -1,6 +1,6 @@
 """What was checked, and what was measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 
@@ -65,6 +65,7 @@ class Certificate:
     realtime_factor: float  # simulated seconds per second of one processor core
     things: tuple[ThingResult, ...] = ()
     together_penetration_m: float = float("nan")  # deepest overlap when all joints open at once
+    left_out: dict[str, str] = field(default_factory=dict)  # objects that could not be written, with one line each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

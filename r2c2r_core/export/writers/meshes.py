@@ -14,16 +14,21 @@ from r2c2r_core.model.mesh import TexturedMesh
 def write_meshes(plan: Plan, folder: Path, texture_max_px: int) -> None:
     """Write every body's meshes under `folder`; basenames are unique in the bundle, scale is baked in."""
     for body in plan.bodies:
-        if body.visual_file is not None or body.collision_files:
-            (folder / body.folder).mkdir(parents=True, exist_ok=True)
-        if body.link.visual is not None and body.visual_file is not None and body.texture_file is not None:
-            _write_visual(folder / body.visual_file, body.link.visual, Path(body.texture_file).name)
-            texture = folder / body.texture_file
-            if not texture.exists():
-                texture.write_bytes(png_bytes(_bounded(body.link.visual.texture, texture_max_px)))
-        for piece, name in zip(body.link.pieces, body.collision_files, strict=True):
-            vertices, faces = convex_hull(piece.vertices_link, f"{body.name}: collider {piece.name}")
-            (folder / name).write_text(_obj_lines(vertices, faces))
+        write_body(body, folder, texture_max_px)
+
+
+def write_body(body: Body, folder: Path, texture_max_px: int) -> None:
+    """Write the meshes of one body; raises ExportFailed on a collider that no engine can use."""
+    if body.visual_file is not None or body.collision_files:
+        (folder / body.folder).mkdir(parents=True, exist_ok=True)
+    if body.link.visual is not None and body.visual_file is not None and body.texture_file is not None:
+        _write_visual(folder / body.visual_file, body.link.visual, Path(body.texture_file).name)
+        texture = folder / body.texture_file
+        if not texture.exists():
+            texture.write_bytes(png_bytes(_bounded(body.link.visual.texture, texture_max_px)))
+    for piece, name in zip(body.link.pieces, body.collision_files, strict=True):
+        vertices, faces = convex_hull(piece.vertices_link, f"{body.name}: collider {piece.name}")
+        (folder / name).write_text(_obj_lines(vertices, faces))
 
 
 def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:

@@ -113,7 +113,7 @@ def test_a_kitchen_that_falls_short_is_written_with_its_failed_certificate(tmp_p
         assert b"failed" in archive.read("report.html")
 
 
-@pytest.mark.parametrize("victim", ["write_meshes", "preview_png", "certify", "write_zip"])
+@pytest.mark.parametrize("victim", ["write_body", "preview_png", "certify", "write_zip"])
 def test_a_full_disk_leaves_the_old_bundle_and_nothing_half_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_preview: None, victim: str
 ) -> None:

@@ -1,0 +1,80 @@
+"""What fails for one object while the bundle is written leaves that one out, and the rest is certified."""
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.export import plan as planning
+from r2c2r_core.export import stage, support
+from r2c2r_core.export.stage import ExportConfig, write_bundle
+from r2c2r_core.model.report import Certificate
+from tests.core.export.kitchen import CREATED, reconstruction
+
+QUICK = ExportConfig(pictures=False, texture_max_px=64)
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is judged here is what is in the bundle, not how it moves."""
+    judged = Certificate(
+        passed=True, findings=(), loaders=(), joints=(), rest_penetration_m=0.0, drift_m=0.0, realtime_factor=1.0
+    )
+    monkeypatch.setattr(stage, "certify", lambda folder, progress: judged)
+    monkeypatch.setattr(stage, "preview_png", lambda *_: b"")
+
+
+def names(path: Path) -> set[str]:
+    with zipfile.ZipFile(path) as archive:
+        return set(archive.namelist())
+
+
+@pytest.mark.parametrize("step", ["plan", "meshes"])
+def test_an_object_that_cannot_be_written_is_left_out_by_name(
+    step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, name = (planning, "_bodies_of") if step == "plan" else (stage, "write_body")
+    real = getattr(module, name)
+
+    def fails(item: Any, *further: Any) -> Any:
+        result = real(item, *further)
+        if "bottle_1" in (getattr(item, "name", ""), getattr(item, "object_name", "")):
+            raise cv2.error("(-215) empty")
+        return result
+
+    monkeypatch.setattr(module, name, fails)
+    certificate = write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED)
+    assert set(certificate.left_out) == {"bottle_1"}
+    assert certificate.left_out["bottle_1"].startswith("export: bottle_1: error: ")
+    found = names(tmp_path / "b.zip")
+    assert not [path for path in found if path.startswith("meshes/bottle_1/")]
+    with zipfile.ZipFile(tmp_path / "b.zip") as archive:
+        urdf = archive.read("scene.urdf").decode()
+        assert "bottle_1" not in urdf
+        assert "cabinet_1" in urdf
+        assert "bottle_1" in archive.read("report.json").decode()
+
+
+def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: Any) -> None:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(support, "_carried_at", fails)
+    assert write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED).left_out == {}
+
+
+@pytest.mark.parametrize(("step", "file"), [("scan_fits", ""), ("preview_png", "preview.png"), ("review_html", "review.html")])
+def test_evidence_that_cannot_be_made_is_missing_and_the_scene_is_there(
+    step: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any, **__: Any) -> None:
+        raise cv2.error("(-215) empty")
+
+    monkeypatch.setattr(stage, step, fails)
+    write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED)
+    found = names(tmp_path / "b.zip")
+    assert "scene.urdf" in found
+    assert file not in found
