@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from r2c2r_core.commands.options import Parsers, add_command, seed, size, whole
-from r2c2r_core.synthetic.choices import PALETTES, SEEDS_OWN, STYLES, Choice
+from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, SEEDS_OWN, STYLES, Choice
 from r2c2r_core.terminal import show_progress
 
 
@@ -19,11 +19,13 @@ def add(parsers: Parsers) -> None:
     added.formatter_class = argparse.RawDescriptionHelpFormatter
     added.add_argument("--style", choices=STYLES, metavar="NAME", help="how fronts are made, as listed below")
     added.add_argument("--palette", choices=PALETTES, metavar="NAME", help="their colours, as listed below")
+    added.add_argument("--layout", choices=LAYOUTS, metavar="NAME", help="where its units stand, as listed below")
     added.epilog = "\n\n".join(
         (
             _listed("styles", STYLES),
             _listed("palettes", PALETTES),
-            "With neither, a seed gives the kitchen it always gave: slabs, or frames round a sunk panel.",
+            _listed("layouts", LAYOUTS),
+            "With none of them, a seed gives the kitchen it always gave: slabs, or frames round a sunk panel.",
         )
     )
 
@@ -40,7 +42,7 @@ def add_size(parser: argparse.ArgumentParser) -> None:
 
 def sample(options: argparse.Namespace) -> int:
     """Write a synthetic kitchen recording with exact truth."""
-    choice = Choice(style=options.style, palette=options.palette)
+    choice = Choice(style=options.style, palette=options.palette, layout=options.layout)
     write_recording(
         options.out, seed=options.seed, frames=options.frames, size=options.size, opened=options.opened, choice=choice
     )

@@ -1,14 +1,16 @@
 """Kitchen → surfaces: fronts, carcasses, handles, appliances, bottles and the room."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
+from r2c2r_core.synthetic.fixed import fixed_patches
 from r2c2r_core.synthetic.fronts import handle_patches, leaf_patches
-from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Carcass, Furniture, Kitchen, Paint, Run
+from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Carcass, Furniture, Handle, Kitchen, Paint, Run
 from r2c2r_core.synthetic.opening import holds_opened, hollow, opened_front
-from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, turned
+from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, shifted, turned
 from r2c2r_core.synthetic.props import crockery, prop_patches, sink_bounds, window_frame
 
 _SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
@@ -18,13 +20,17 @@ def build_kitchen(kitchen: Kitchen, opened: Mapping[str, float] = MappingProxyTy
     """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background); `opened` as in opening.py."""
     ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
     patches = _room(kitchen)
-    for run in kitchen.runs:
-        patches += _run(kitchen, run, ids, opened)
+    for number, run in enumerate(kitchen.runs):
+        own = _run(kitchen, run, ids, opened)
+        if number and run.has_wall:
+            own += _splashback(kitchen, run)
+        patches += _posed(own, run)
     patches += _fridge(kitchen, ids[kitchen.fridge.name])
-    patches += _microwave(kitchen, ids[kitchen.microwave.name])
+    if kitchen.microwave is not None:
+        patches += _microwave(kitchen, kitchen.microwave, ids[kitchen.microwave.name])
     for run in kitchen.runs:
         for prop in run.props:
-            patches += prop_patches(kitchen, prop)
+            patches += _posed(prop_patches(kitchen, prop), run)
     for bottle in kitchen.bottles:
         patches += _bottle(kitchen, bottle, ids.get(bottle.name, 0))
     return patches
@@ -39,6 +45,8 @@ def _run(kitchen: Kitchen, run: Run, ids: Mapping[str, int], opened: Mapping[str
         patches += _furniture(kitchen, furniture, style.base_front, ids[furniture.name], opened.get(furniture.name))
     for furniture in run.upper:
         patches += _furniture(kitchen, furniture, style.wall_front, ids[furniture.name])
+    for thing in run.fixed:
+        patches += fixed_patches(thing, style, ids[thing.name])
     return patches
 
 
@@ -56,17 +64,29 @@ def _room(kitchen: Kitchen) -> list[Patch]:
         quad(np.array([x1, y1, ceiling]), -dy, -dz, style.wall, lumel_m=0.06),
     ]
     patches += _lights(kitchen)
-    run = kitchen.runs[0]
-    splash_top = min((c.z for c in run.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
-    left, right = run.ends
-    patches += box(
-        (left, -0.009, kitchen.worktop_top_m), (right, -0.0005, splash_top), style.splash, faces="front left right top"
-    )
+    patches += _splashback(kitchen, kitchen.runs[0])
     skirting = Paint(kind="laminate", colour=(0.78, 0.78, 0.76), texel_m=0.004)
     patches += box((x0, -0.015, 0.0), (x1, 0.0, 0.08), skirting, faces="front top")
     patches += box((x0, y0, 0.0), (x0 + 0.015, y1, 0.08), skirting, faces="right top")
     patches += box((x1 - 0.015, y0, 0.0), (x1, y1, 0.08), skirting, faces="left top")
     return patches
+
+
+def _splashback(kitchen: Kitchen, run: Run) -> list[Patch]:
+    """On the wall behind a run, from the worktop to the wall cabinets."""
+    top = min((c.z for c in run.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
+    left, right = run.ends
+    low, high = (left, -0.009, kitchen.worktop_top_m), (right, -0.0005, top)
+    return box(low, high, kitchen.style.splash, faces="front left right top")
+
+
+def _posed(patches: list[Patch], run: Run) -> list[Patch]:
+    """From the run's frame into the kitchen's."""
+    return (
+        shifted(turned(patches, run.yaw_rad, (0.0, 0.0)), np.array([*run.place, 0.0]))
+        if run.yaw_rad or any(run.place)
+        else patches
+    )
 
 
 def _lights(kitchen: Kitchen) -> list[Patch]:
@@ -98,7 +118,7 @@ def _base_body(kitchen: Kitchen, run: Run, opened: Mapping[str, float]) -> list[
     for carcass in run.base_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
-        if holds_opened(carcass.x, carcass.width_m, kitchen, opened):
+        if holds_opened(carcass, run, opened):
             patches += box(low, high, style.carcass, faces="left right") + hollow(low, high, style.carcass)
         else:
             patches += box(low, high, style.carcass, faces="front left right")
@@ -192,19 +212,40 @@ def _fridge(kitchen: Kitchen, object_id: int) -> list[Patch]:
     x0, x1, y0, y1, _, z1 = _bounds(fridge)
     z0 = 0.018  # above its feet
     seal = y0 + fridge.door_thickness_m
-    patches = box((x0, y0, z0), (x1, seal, z1), fridge.door, object_id=object_id)
+    patches = []
+    for left, right, low, high in _fridge_fronts(fridge, x0, x1, z0, z1):
+        patches += box((left, y0, low), (right, seal, high), fridge.door, object_id=object_id)
     patches += box(
         (x0 + 0.008, seal, z0), (x1 - 0.008, seal + 0.012, z1 - 0.008), _SHADOW, faces="left right top", object_id=object_id
     )
     patches += box((x0, seal + 0.012, z0), (x1, y1, z1), fridge.body, object_id=object_id)
     foot = Paint(kind="plain", colour=(0.03, 0.03, 0.03), texel_m=0.004)
     patches += box((x0 + 0.02, y0 + 0.07, 0.0), (x1 - 0.02, y1, z0), foot, faces="front left right", object_id=object_id)
-    return patches + handle_patches(fridge.handle, np.array([x0, y0, 0.0]), _appliance_handle(fridge), object_id)
+    for handle in _fridge_handles(fridge):
+        patches += handle_patches(handle, np.array([x0, y0, 0.0]), _appliance_handle(fridge), object_id)
+    return patches
 
 
-def _microwave(kitchen: Kitchen, object_id: int) -> list[Patch]:
+def _fridge_fronts(fridge: Appliance, x0: float, x1: float, z0: float, z1: float) -> list[tuple[float, float, float, float]]:
+    """Left, right, bottom and top of its door, or of its two doors and the drawer under them."""
+    if not fridge.drawer_m:
+        return [(x0, x1, z0, z1)]
+    middle, top = (x0 + x1) / 2, z0 + fridge.drawer_m
+    doors = [(x0, middle - 0.002, top + 0.002, z1), (middle + 0.002, x1, top + 0.002, z1)]
+    return [*doors, (x0, x1, z0, top - 0.002)]
+
+
+def _fridge_handles(fridge: Appliance) -> list[Handle]:
+    """Its handle; of french doors one beside the middle on either side, and one along the drawer's upper edge."""
+    if not fridge.drawer_m:
+        return [fridge.handle]
+    middle = fridge.size_m[0] / 2
+    doors = [replace(fridge.handle, x=middle + side) for side in (-0.05, 0.05)]
+    return [*doors, replace(fridge.handle, vertical=False, x=middle, z=fridge.drawer_m - 0.06)]
+
+
+def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int) -> list[Patch]:
     """Door on the hinge side, control panel beside it; turned by its yaw on the worktop."""
-    oven = kitchen.microwave
     x0, x1, y0, y1, z0, z1 = _bounds(oven)
     z0 += 0.012  # above its feet
     split = y0 + oven.door_thickness_m

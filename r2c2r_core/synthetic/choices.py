@@ -25,7 +25,15 @@ PALETTES: Mapping[str, str] = MappingProxyType(
         "two-tone": "wall cabinets in another colour than the units below",
     }
 )
-DEFAULT_STYLE = "slab"
+LAYOUTS: Mapping[str, str] = MappingProxyType(
+    {
+        "straight": "one run along a wall",
+        "l": "round a blind corner, with a tall unit of oven and microwave, a dishwasher and a hob under its hood",
+        "galley": "two runs face to face, with sliding doors, an open shelf and a refrigerator of french doors",
+        "island": "one run, and an island before it with fronts on both sides",
+    }
+)
+DEFAULT_STYLE, DEFAULT_LAYOUT = "slab", "straight"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +42,7 @@ class Choice:
 
     style: str | None = None  # of STYLES
     palette: str | None = None  # of PALETTES
+    layout: str | None = None  # of LAYOUTS
 
 
 SEEDS_OWN = Choice()

@@ -9,12 +9,13 @@ _PANEL_M, _PANE_M = 0.006, 0.004
 _OPEN_SIDES = "front left right top bottom"
 _CUP_STEPS = 9
 _CLEAR = Paint(kind="glass", colour=(0.75, 0.80, 0.78), gloss=0.95, texel_m=0.02)
+_EDGE = Paint(kind="laminate", colour=(0.06, 0.06, 0.06), gloss=0.3, texel_m=0.002)
 _FROSTED = Paint(kind="laminate", colour=(0.62, 0.68, 0.67), gloss=0.35, texel_m=0.002)
 
 
 def leaf_patches(leaf: Leaf, face_y: float, thickness: float, paint: Paint, metal: Paint, object_id: int) -> list[Patch]:
     """A front and its handle; `face_y` is the outer face, in the frame of the run."""
-    front = _slab(leaf, face_y, thickness, paint, object_id)
+    front = _slab(leaf, face_y, thickness, paint if leaf.look is None else {"front": leaf.look, "": _EDGE}, object_id)
     if leaf.frame is not None:
         front = _framed(leaf, leaf.frame, face_y, thickness, paint, object_id)
     if leaf.handle is None:
@@ -22,7 +23,7 @@ def leaf_patches(leaf: Leaf, face_y: float, thickness: float, paint: Paint, meta
     return front + handle_patches(leaf.handle, np.array([leaf.x, face_y, leaf.z]), metal, object_id)
 
 
-def _slab(leaf: Leaf, face_y: float, thickness: float, paint: Paint, object_id: int) -> list[Patch]:
+def _slab(leaf: Leaf, face_y: float, thickness: float, paint: Paint | dict[str, Paint], object_id: int) -> list[Patch]:
     low, high = (leaf.x, face_y, leaf.z), (leaf.x + leaf.width_m, face_y + thickness, leaf.z + leaf.height_m)
     return box(low, high, paint, faces=_OPEN_SIDES, object_id=object_id)
 
@@ -62,6 +63,10 @@ def handle_patches(handle: Handle, corner: np.ndarray, paint: Paint, object_id: 
     centre = corner + np.array([handle.x, 0.0, handle.z])
     half, radius = handle.length_m / 2, handle.thickness_m / 2
     share = {"object_id": object_id, "is_handle": True}
+    if handle.kind == "finger":
+        side = along * half + (1 - along) * radius * [1.0, 0.0, 1.0]
+        dark = Paint(kind="laminate", colour=(0.10, 0.10, 0.10), gloss=0.4, texel_m=0.002)
+        return box(_triple(centre - side + out * handle.reach_m), _triple(centre + side), dark, lumel_m=0.01, **share)  # type: ignore[arg-type]
     if handle.kind == "cup":
         return _cup(handle, centre, paint, object_id)
     if handle.kind == "knob":

@@ -6,8 +6,13 @@ Kitchen frame: metres, +Z up, floor z = 0, back wall at y = 0, fronts face -Y, +
 from dataclasses import dataclass
 from typing import Literal
 
-Hinge = Literal["left", "right"]
-HandleKind = Literal["bar", "flat", "bow", "knob", "cup"]
+import numpy as np
+
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+
+Hinge = Literal["left", "right", "bottom"]
+Way = Literal["left", "right"]
+HandleKind = Literal["bar", "flat", "bow", "knob", "cup", "finger"]
 Filling = Literal["panel", "glass", "frosted"]
 
 
@@ -53,10 +58,12 @@ class Leaf:
     z: float  # bottom edge
     width_m: float
     height_m: float
-    hinge: Hinge | None  # None: a drawer
+    hinge: Hinge | None  # None: it slides
     handle: Handle | None
-    open_limit: float  # rad, or metres for a drawer
+    open_limit: float  # rad, or metres where it slides
+    slides: Way | None = None  # along the run; without it, and without a hinge, it is a drawer
     frame: Frame | None = None  # None: a slab
+    look: Paint | None = None  # of an appliance's front; None: as its run's fronts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,8 +100,18 @@ class Board:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Fixed:
+    """A prompted object of a run that does not open: an open shelf, a hood. Its box."""
+
+    name: str
+    category: str
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Appliance:
-    """A free-standing box with one hinged door."""
+    """A free-standing box with one hinged door, or with two of them over a drawer (french doors)."""
 
     name: str
     category: str
@@ -103,6 +120,7 @@ class Appliance:
     yaw_rad: float
     hinge: Hinge
     handle: Handle
+    drawer_m: float = 0.0  # height of a freezer drawer under two doors; 0: one door over the whole front
     door_thickness_m: float
     door_width_m: float  # narrower than the appliance where a control panel stands beside it
     open_limit: float
@@ -141,15 +159,27 @@ class Prop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """Units in a row. Its frame: x along it, the back at y = 0, fronts facing -Y, z up from the floor."""
+    """Units in a row. Its frame: x along it, the back at y = 0, fronts facing -Y, z up from the floor.
+
+    The first run's frame is the kitchen's.
+    """
 
     base: tuple[Furniture, ...]
     upper: tuple[Furniture, ...]
     base_carcasses: tuple[Carcass, ...]
     upper_carcasses: tuple[Carcass, ...]
     ends: tuple[float, float]  # x of the worktop's ends
+    fixed: tuple[Fixed, ...] = ()
     boards: tuple[Board, ...] = ()
     props: tuple[Prop, ...] = ()
+    place: tuple[float, float] = (0.0, 0.0)  # of its origin in the kitchen
+    yaw_rad: float = 0.0
+    has_wall: bool = True  # behind it, with a splashback
+
+    @property
+    def kitchen_from_run(self) -> Rigid3:
+        """Its pose."""
+        return Rigid3(rotation_about_z(self.yaw_rad), np.array([*self.place, 0.0]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,7 +212,7 @@ class Kitchen:
     base_depth_m: float  # outer face of the fronts to the wall
     upper_depth_m: float
     fridge: Appliance
-    microwave: Appliance
+    microwave: Appliance | None  # on the worktop
     bottles: tuple[Bottle, ...]
     room: tuple[float, float, float, float, float]  # x_min, x_max, y_min, y_max, ceiling
     window_on_left: bool
@@ -202,5 +232,7 @@ class Kitchen:
     def object_names(self) -> tuple[str, ...]:
         """The prompted objects; instance ids are 1 + their position."""
         furniture = [f.name for f in (*self.base, *self.upper)]
+        fixed = [thing.name for run in self.runs for thing in run.fixed]
         bottles = [b.name for b in self.bottles if b.prompted]
-        return (*furniture, self.fridge.name, self.microwave.name, *bottles)
+        machines = [self.fridge.name, *([self.microwave.name] if self.microwave is not None else [])]
+        return (*furniture, *fixed, *machines, *bottles)

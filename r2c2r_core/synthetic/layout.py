@@ -317,15 +317,16 @@ def place_microwave(rng: np.random.Generator, right: float, worktop_top: float) 
 
 
 def fill_worktop(
-    rng: np.random.Generator, right: float, microwave: Appliance, base: tuple[Furniture, ...], base_depth: float
+    rng: np.random.Generator, right: float, microwave: Appliance | None, base: tuple[Furniture, ...], base_depth: float
 ) -> tuple[tuple[Prop, ...], tuple[Bottle, ...]]:
     """Three bottles, and what else fits beside the microwave, none overlapping along the run."""
-    taken = [(microwave.centre[0], microwave.size_m[0] / 2 + 0.05)]
+    stays = [] if microwave is None else [(microwave.centre[0], microwave.size_m[0] / 2 + 0.05)]
+    taken = list(stays)
     props: list[Prop] = []
     steel = Paint(kind="steel", colour=(0.50, 0.51, 0.52), gloss=0.6, texel_m=0.002)
     doors = [f.leaves[0].x + f.leaves[-1].width_m * len(f.leaves) / 2 for f in base if f.category != "drawer"]
     sink_x = float(rng.choice(doors))
-    if right > 1.85 and abs(sink_x - microwave.centre[0]) > 0.56 and 0.3 < sink_x < right - 0.3:
+    if right > 1.85 and all(abs(sink_x - x) > 0.56 for x, _ in stays) and 0.3 < sink_x < right - 0.3:
         props.append(Prop(kind="sink", x=sink_x, y=-base_depth / 2 - 0.02, width_m=0.44, paint=steel))
         taken.append((sink_x, 0.27))
     black = Paint(kind="hob", colour=(0.012, 0.012, 0.013), accent=(0.12, 0.12, 0.12), gloss=0.9)
@@ -338,7 +339,7 @@ def fill_worktop(
     while len(bottles) < 3:
         x = _free_place(rng, right, taken, 0.065)
         if x is None:  # too full: the sink and the hob give way
-            props, bottles, taken = [], [], taken[:1]
+            props, bottles, taken = [], [], list(stays)
             continue
         bottles.append(_pick_bottle(rng, f"bottle_{len(bottles) + 1}", x, base_depth))
     for kind, half in (("kettle", 0.09), ("board", 0.14), ("jar", 0.055), ("plant", 0.075)):

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from r2c2r_core.synthetic.kitchen import Furniture, Kitchen, Leaf, Paint
+from r2c2r_core.synthetic.kitchen import Carcass, Furniture, Kitchen, Leaf, Paint, Run
 from r2c2r_core.synthetic.patches import Patch, box, shifted, turned
 
 OPENED_FROM = 0.55  # of the recording: on the way back along the run
@@ -42,10 +42,10 @@ def hollow(low: tuple[float, float, float], high: tuple[float, float, float], in
     return box(high, low, inside, faces="front left right top bottom")  # corners swapped: each wall faces inwards
 
 
-def holds_opened(x: float, width_m: float, kitchen: Kitchen, opened: Mapping[str, float]) -> bool:
-    """Whether a carcass that spans x..x+width stands behind an opened front."""
-    middles = [f.leaves[0].x + f.leaves[0].width_m / 2 for f in kitchen.base if f.name in opened]
-    return any(x < middle < x + width_m for middle in middles)
+def holds_opened(carcass: Carcass, run: Run, opened: Mapping[str, float]) -> bool:
+    """Whether a carcass of the run stands behind an opened front."""
+    middles = [f.leaves[0].x + f.leaves[0].width_m / 2 for f in run.base if f.name in opened]
+    return any(carcass.x < middle < carcass.x + carcass.width_m for middle in middles)
 
 
 def _tray(leaf: Leaf, front_y: float, back_y: float, inside: Paint, object_id: int) -> list[Patch]:

@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthetic.kitchen import Kitchen
+from r2c2r_core.synthetic.rounds import round_poses
 
 SECONDS = 18.0
 _STEPS = 7  # knots on each way along the run
@@ -27,7 +28,8 @@ class Shot:
 def walk(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> list[Shot]:
     """Along the run and back, looking up and down at the fronts from both sides."""
     times = np.linspace(0.0, SECONDS, frames)
-    knots, eyes, targets = _key_poses(kitchen, rng)
+    eyes, targets = _key_poses(kitchen, rng) if len(kitchen.runs) == 1 else round_poses(kitchen, rng)
+    knots = _knots(eyes, targets)
     eye = Akima1DInterpolator(knots, eyes, method="makima")(times / SECONDS)
     target = Akima1DInterpolator(knots, targets, method="makima")(times / SECONDS)
     eye += _tremor(rng, times, 3, 0.35) * 0.012 + _tremor(rng, times, 3, 0.08) * 0.0015
@@ -46,8 +48,15 @@ def walk(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> list[Shot]:
     ]
 
 
-def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Knot times 0..1, eye positions and points looked at.
+def _knots(positions: np.ndarray, aims: np.ndarray) -> np.ndarray:
+    """Times 0..1 of the poses, for an even pace of walking and looking."""
+    pace = np.linalg.norm(np.diff(positions, axis=0), axis=1) + 0.6 * np.linalg.norm(np.diff(aims, axis=0), axis=1) + 0.2
+    knots = np.concatenate([[0.0], np.cumsum(pace)])
+    return np.asarray(knots / knots[-1])
+
+
+def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Eye positions and points looked at along a single run.
 
     A look at the whole, out along the run at standing height, the refrigerator from top to bottom, and back lower and closer.
     """
@@ -75,10 +84,7 @@ def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, 
     positions = np.array(eyes)
     positions[:, 0] = positions[:, 0].clip(room[0] + 0.45, room[1] - 0.45)
     positions[:, 1] = positions[:, 1].clip(room[2] + 0.5, -1.5)
-    aims = np.array(targets)
-    pace = np.linalg.norm(np.diff(positions, axis=0), axis=1) + 0.6 * np.linalg.norm(np.diff(aims, axis=0), axis=1) + 0.2
-    knots = np.concatenate([[0.0], np.cumsum(pace)])
-    return knots / knots[-1], positions, aims
+    return positions, np.array(targets)
 
 
 def _tremor(rng: np.random.Generator, times: np.ndarray, columns: int, period_s: float) -> np.ndarray:

@@ -4,61 +4,71 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.synthetic.choices import DEFAULT_STYLE, Choice
-from r2c2r_core.synthetic.kitchen import Furniture, Kitchen, Run, Style
+from r2c2r_core.synthetic.choices import DEFAULT_LAYOUT, DEFAULT_STYLE, Choice
+from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Run
 from r2c2r_core.synthetic.layout import fill_worktop, hang_on_wall, place_fridge, place_microwave
-from r2c2r_core.synthetic.looks import Look, pick_look
+from r2c2r_core.synthetic.looks import pick_look
 from r2c2r_core.synthetic.palettes import repaint
 from r2c2r_core.synthetic.style import pick_style
-from r2c2r_core.synthetic.units import Place, Unit, UnitKind, named, plan_unit
+from r2c2r_core.synthetic.units import Unit, UnitKind
+from r2c2r_core.synthetic.wings import (
+    AnyKind,
+    Kit,
+    Measures,
+    corner_wing,
+    island,
+    named,
+    opposite_wing,
+    plan_corner,
+    plan_row,
+    plan_upper_row,
+    right_end,
+    standing,
+)
+
+Room = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measures:
-    """Heights and depths that all units of a kitchen share, metres."""
+class _Rest:
+    """The further runs of a layout, and how far the room must reach for them."""
 
-    plinth: float
-    bottom: float
-    top: float  # of the carcasses
-    worktop_top: float
-    worktop_thickness: float
-    depth: float
-    upper_bottom: float
-    upper_top: float
-    upper_depth: float
+    wings: tuple[Run, ...] = ()
+    x_max: float | None = None  # a wall there; None: anywhere beyond the main run
+    y_min: float | None = None
 
 
 def plan_styled_kitchen(seed: int, choice: Choice) -> Kitchen:
-    """The kitchen of a seed, made as chosen; what was not chosen is the seed's own, and slabs."""
-    rng = np.random.default_rng([seed, 9])
+    """The kitchen of a seed, made as chosen; what was not chosen is the seed's own, slabs, and one straight run."""
+    rng, layout = np.random.default_rng([seed, 9]), choice.layout or DEFAULT_LAYOUT
     paints, _ = pick_style(rng)
     if choice.palette is not None:
         paints = repaint(paints, choice.palette, rng)
     look, measures = pick_look(choice.style or DEFAULT_STYLE, rng), _pick_measures(rng)
-    counts: dict[str, int] = {}
-    base = named(_plan_row(_base_kinds(rng), measures, paints, look, rng), counts)
-    right = base[-1].carcass.x + base[-1].carcass.width_m
-    fridge_left = bool(rng.random() < 0.5)
-    upper = named(_plan_upper_row(right, measures, paints, look, rng), counts)
+    kit = Kit(measures=measures, style=paints, look=look)
+    base = plan_row(_base_kinds(rng), kit, rng)
+    rest = _Rest()
+    if layout == "l":
+        base, rest = _with_corner(base, kit, np.random.default_rng([seed, 10]))
+    right = right_end(base)
+    fridge_left = bool(rng.random() < 0.5) or layout == "l"
+    upper = plan_upper_row(0.0, right, _upper_kinds(rng), kit, rng)
     fridge = place_fridge(rng, right, fridge_left)
-    microwave = place_microwave(rng, right, measures.worktop_top)
+    if layout == "galley":
+        fridge = _with_french_doors(fridge, np.random.default_rng([seed, 11]))
+    microwave = None if layout == "l" else place_microwave(rng, right, measures.worktop_top)
     lower_units, upper_units = _shown_ends(base), _shown_ends(upper)
     props, bottles = fill_worktop(rng, right, microwave, lower_units, measures.depth)
-    run = Run(
-        base=lower_units,
-        upper=upper_units,
-        base_carcasses=tuple(unit.carcass for unit in base),
-        upper_carcasses=tuple(unit.carcass for unit in upper),
-        ends=(0.0 if fridge_left else -0.01, right + (0.01 if fridge_left else 0.0)),
-        boards=tuple(board for unit in (*base, *upper) for board in unit.boards),
-        props=(*props, *hang_on_wall(rng, right, upper_units)),
-    )
-    beside = fridge.size_m[0] + 0.04
-    x_min = -(beside if fridge_left else 0.0) - float(rng.uniform(0.05, 0.9))
-    x_max = right + (0.0 if fridge_left else beside) + float(rng.uniform(0.05, 0.9))
+    if layout in ("l", "island"):
+        props = tuple(prop for prop in props if prop.kind != "hob")  # it is on the other run
+    main = standing(base, upper, (0.0 if fridge_left else -0.01, right + (0.01 if fridge_left and layout != "l" else 0.0)))
+    main = replace(main, base=lower_units, upper=upper_units, props=(*props, *hang_on_wall(rng, right, upper_units)))
+    if layout in ("galley", "island"):
+        rest = _across(layout, right, kit, np.random.default_rng([seed, 10]))
+    room = _pick_room(right, fridge, fridge_left, rest, rng)
     return Kitchen(
         style=paints,
-        runs=(run,),
+        runs=named((main, *rest.wings)),
         plinth_m=measures.plinth,
         worktop_top_m=measures.worktop_top,
         worktop_thickness_m=measures.worktop_thickness,
@@ -67,8 +77,8 @@ def plan_styled_kitchen(seed: int, choice: Choice) -> Kitchen:
         fridge=fridge,
         microwave=microwave,
         bottles=bottles,
-        room=(x_min, x_max, -float(rng.uniform(3.7, 4.3)), 0.0, float(rng.uniform(2.45, 2.7))),
-        window_on_left=not fridge_left,
+        room=room,
+        window_on_left=layout == "l" or not fridge_left,
         yaw_rad=float(rng.uniform(-np.pi, np.pi)),
     )
 
@@ -90,49 +100,70 @@ def _pick_measures(rng: np.random.Generator) -> Measures:
     )
 
 
-def _base_kinds(rng: np.random.Generator) -> list[UnitKind]:
+def _base_kinds(rng: np.random.Generator) -> list[AnyKind]:
     """A stack of drawers, two doors, and one or two of any kind, in any order."""
     more: tuple[UnitKind, ...] = ("door", "double", "drawers")
-    kinds: list[UnitKind] = ["drawers", "door", "door"]
+    kinds: list[AnyKind] = ["drawers", "door", "door"]
     kinds += [more[int(rng.integers(3))] for _ in range(int(rng.integers(1, 3)))]
     rng.shuffle(kinds)
     return kinds
 
 
-def _width(kind: UnitKind, rng: np.random.Generator) -> float:
-    low, high = {"door": (0.30, 0.61), "double": (0.68, 1.0), "drawers": (0.38, 0.90)}[kind]
-    return float(rng.uniform(low, high))
+def _upper_kinds(rng: np.random.Generator) -> list[UnitKind]:
+    """Two to four wall cabinets."""
+    return ["double" if rng.random() < 0.25 else "door" for _ in range(int(rng.integers(2, 5)))]
 
 
-def _plan_row(kinds: list[UnitKind], measures: Measures, style: Style, look: Look, rng: np.random.Generator) -> list[Unit]:
-    units, x = [], 0.0
-    for kind in kinds:
-        width = _width(kind, rng)
-        place = Place(x=x, width_m=width, bottom=measures.bottom, top=measures.top, depth_m=measures.depth)
-        units.append(plan_unit(kind, place, style, look, rng))
-        x += width
-    return units
+def _with_corner(base: list[Unit], kit: Kit, rng: np.random.Generator) -> tuple[list[Unit], _Rest]:
+    """The main row with a blind unit at its right end, and the wing that starts beside it."""
+    corner, filler = plan_corner(right_end(base), kit, rng)
+    x_max = corner.carcass.x + corner.carcass.width_m
+    wing = corner_wing(x_max, filler, kit, rng)
+    length = max(wing.ends[1], max(c.x + c.width_m for c in wing.base_carcasses))
+    return [*base, corner], _Rest(wings=(wing,), x_max=x_max, y_min=wing.place[1] - length - float(rng.uniform(1.0, 1.5)))
 
 
-def _plan_upper_row(right: float, measures: Measures, style: Style, look: Look, rng: np.random.Generator) -> list[Unit]:
-    """Two to four wall cabinets, somewhere over the run."""
-    kinds: list[UnitKind] = ["double" if rng.random() < 0.25 else "door" for _ in range(int(rng.integers(2, 5)))]
-    widths = [_width(kind, rng) for kind in kinds]
-    while sum(widths) > right - 0.05:
-        kinds, widths = kinds[:-1], widths[:-1]
-    units, x = [], float(rng.uniform(0.0, right - sum(widths)))
-    for kind, width in zip(kinds, widths, strict=True):
-        place = Place(
-            x=x,
-            width_m=width,
-            bottom=measures.upper_bottom,
-            top=measures.upper_top,
-            depth_m=measures.upper_depth,
-            upper=True,
-        )
-        units.append(plan_unit(kind, place, style, look, rng))
-        x += width
-    return units
+def _across(layout: str, right: float, kit: Kit, rng: np.random.Generator) -> _Rest:
+    """What stands before the main run: a second run on the wall opposite, or an island with room to walk round it."""
+    if layout == "galley":
+        wing = opposite_wing(right, kit, rng)
+        return _Rest(wings=(wing,), y_min=wing.place[1])
+    wings = island(right, kit, rng)
+    return _Rest(wings=wings, y_min=wings[0].place[1] - kit.measures.depth - float(rng.uniform(2.1, 2.4)))
+
+
+def _pick_room(right: float, fridge: Appliance, fridge_left: bool, rest: _Rest, rng: np.random.Generator) -> Room:
+    """Walls a little beyond everything, or where the layout has them."""
+    beside = fridge.size_m[0] + 0.04
+    x_min = -(beside if fridge_left else 0.0) - float(rng.uniform(0.05, 0.9))
+    x_max = right + (0.0 if fridge_left else beside) + float(rng.uniform(0.05, 0.9))
+    y_min = -float(rng.uniform(3.7, 4.3))
+    for wing in rest.wings:
+        ends = wing.kitchen_from_run.apply(np.array([[x, 0.0, 0.0] for x in wing.ends]))[:, 0]
+        x_min, x_max = min(x_min, float(ends.min()) - 1.15), max(x_max, float(ends.max()) + 1.15)
+    return (
+        x_min,
+        x_max if rest.x_max is None else rest.x_max,
+        y_min if rest.y_min is None else rest.y_min,
+        0.0,
+        float(rng.uniform(2.45, 2.7)),
+    )
+
+
+def _with_french_doors(fridge: Appliance, rng: np.random.Generator) -> Appliance:
+    """The refrigerator, wider, with two doors over a freezer drawer."""
+    width, height = float(rng.uniform(0.80, 0.92)), float(rng.uniform(1.72, 1.85))
+    (x, y, _), (old_width, depth, _) = fridge.centre, fridge.size_m
+    aside = (width - old_width) / 2 * (1 if x > 0 else -1)
+    return replace(
+        fridge,
+        category="french_door_refrigerator",
+        centre=(x + aside, y, height / 2),
+        size_m=(width, depth, height),
+        door_width_m=width,
+        drawer_m=float(rng.uniform(0.52, 0.70)),
+        handle=replace(fridge.handle, z=1.15),
+    )
 
 
 def _shown_ends(units: list[Unit]) -> tuple[Furniture, ...]:

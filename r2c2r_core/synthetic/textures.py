@@ -156,6 +156,38 @@ def _controls(height: int, width: int, paint: Paint, rng: np.random.Generator) -
     return image
 
 
+def _oven_front(height: int, width: int, paint: Paint, rng: np.random.Generator) -> np.ndarray:
+    """A strip of two knobs and a display over a door of dark glass."""
+    image = _flat(height, width, paint.colour)
+    strip, edge = round(0.17 * height), max(height // 200, 1)
+    image[strip - edge : strip + edge] = 0.0
+    for share in (0.16, 0.84):
+        cv2.circle(image, (round(share * width), strip // 2), strip // 4, list(paint.accent), -1, cv2.LINE_AA)
+    image[strip // 3 : 2 * strip // 3, width * 2 // 5 : width * 3 // 5] = (0.01, 0.02, 0.02)
+    y, x = strip + height // 7, width // 8
+    image[y : height - height // 10, x:-x] = 0.008
+    return image
+
+
+def _microwave_front(height: int, width: int, paint: Paint, rng: np.random.Generator) -> np.ndarray:
+    """A built-in one: its door, and the controls to the right of it."""
+    split = round(0.78 * width)
+    image = _flat(height, width, paint.colour)
+    image[:, :split] = _microwave_door(height, split, paint, rng)
+    image[:, split : split + max(width // 200, 1)] = 0.0
+    controls = Paint(kind="controls", colour=paint.colour, accent=paint.accent)
+    image[:, split + max(width // 200, 1) :] = _controls(height, width - split - max(width // 200, 1), controls, rng)
+    return image
+
+
+def _stripes(height: int, width: int, paint: Paint, rng: np.random.Generator) -> np.ndarray:
+    """Woven cloth with bands across its ends."""
+    image = _flat(height, width, paint.colour) * (1 + 0.06 * value_noise(rng, height, width, (2, 2)))[..., None]
+    for band in (0.06, 0.12, 0.82, 0.88, 0.94):
+        image[round(band * height) : round((band + 0.03) * height)] = paint.accent
+    return image
+
+
 def _hob(height: int, width: int, paint: Paint, rng: np.random.Generator) -> np.ndarray:
     """Black glass with four printed rings and a row of touch fields."""
     image = _flat(height, width, paint.colour)
@@ -219,6 +251,9 @@ PAINTERS: dict[str, Painter] = {
     "label": _label,
     "microwave_door": _microwave_door,
     "controls": _controls,
+    "oven_front": _oven_front,
+    "microwave_front": _microwave_front,
+    "stripes": _stripes,
     "hob": _hob,
     "spines": _spines,
     "picture": _picture,

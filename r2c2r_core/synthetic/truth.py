@@ -1,7 +1,7 @@
 """What is true of a sample: boxes, joints, clicks, and which axes the camera could see. Written in the capture frame."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import cv2
@@ -9,7 +9,7 @@ import numpy as np
 
 from r2c2r_core.geometry.camera import Intrinsics, unproject
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
-from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Leaf
+from r2c2r_core.synthetic.kitchen import Appliance, Fixed, Furniture, Hinge, Kitchen, Leaf, Run
 from r2c2r_core.synthetic.render import View
 
 _BINS = 16  # slices of an axis
@@ -44,7 +44,10 @@ class TrueObject:
 
 def true_objects(kitchen: Kitchen) -> tuple[TrueObject, ...]:
     """All prompted objects, in the order of `kitchen.object_names`."""
-    furniture = [_furniture(f) for f in (*kitchen.base, *kitchen.upper)]
+    furniture = [_furniture(f, run) for run in kitchen.runs for f in run.base]
+    furniture += [_furniture(f, run) for run in kitchen.runs for f in run.upper]
+    furniture += [_fixed(each, run) for run in kitchen.runs for each in run.fixed]
+    machines = [_appliance(each) for each in (kitchen.fridge, kitchen.microwave) if each is not None]
     bottles = [
         TrueObject(
             name=b.name,
@@ -57,7 +60,7 @@ def true_objects(kitchen: Kitchen) -> tuple[TrueObject, ...]:
         for b in kitchen.bottles
         if b.prompted
     ]
-    return (*furniture, _appliance(kitchen.fridge), _appliance(kitchen.microwave), *bottles)
+    return (*furniture, *machines, *bottles)
 
 
 def capture_from_kitchen(kitchen: Kitchen, first_eye: np.ndarray) -> Rigid3:
@@ -176,25 +179,47 @@ def prompts_document(objects: tuple[TrueObject, ...], sightings: Sightings, rng:
     return {"version": 1, "objects": entries}
 
 
-def _furniture(furniture: Furniture) -> TrueObject:
+def _furniture(furniture: Furniture, run: Run) -> TrueObject:
     first, last = furniture.leaves[0], furniture.leaves[-1]
     width, height = last.x + last.width_m - first.x, first.height_m
     centre = np.array([first.x + width / 2, -furniture.depth_m / 2, first.z + height / 2])
-    joints = tuple(_leaf_joint(furniture, leaf, position) for position, leaf in enumerate(furniture.leaves))
+    joints = tuple(_posed(_leaf_joint(furniture, leaf), run.kitchen_from_run) for leaf in furniture.leaves)
     return TrueObject(
         name=furniture.name,
         category=furniture.category,
         dimensions_m=np.array([width, furniture.depth_m, height]),
-        kitchen_from_object=Rigid3(np.eye(3), centre),
+        kitchen_from_object=run.kitchen_from_run @ Rigid3(np.eye(3), centre),
         joints=joints,
     )
 
 
-def _leaf_joint(furniture: Furniture, leaf: Leaf, position: int) -> TrueJoint:
+def _fixed(thing: Fixed, run: Run) -> TrueObject:
+    low, high = np.array(thing.low), np.array(thing.high)
+    return TrueObject(
+        name=thing.name,
+        category=thing.category,
+        dimensions_m=high - low,
+        kitchen_from_object=run.kitchen_from_run @ Rigid3(np.eye(3), (low + high) / 2),
+        joints=(),
+    )
+
+
+def _posed(joint: TrueJoint, kitchen_from_run: Rigid3) -> TrueJoint:
+    axis, origin = kitchen_from_run.turn(joint.axis[None])[0], kitchen_from_run.apply(joint.origin[None])[0]
+    return replace(joint, axis=axis, origin=origin)
+
+
+def _leaf_joint(furniture: Furniture, leaf: Leaf) -> TrueJoint:
+    """In the frame of its run."""
     suffix = f"_{leaf.hinge}" if len(furniture.leaves) > 1 else ""
     middle_z, face = leaf.z + leaf.height_m / 2, -furniture.depth_m
-    if leaf.hinge is None:
-        origin, axis, kind = np.array([leaf.x + leaf.width_m / 2, face, middle_z]), np.array([0.0, -1.0, 0.0]), "prismatic"
+    centre = np.array([leaf.x + leaf.width_m / 2, face, middle_z])
+    if leaf.slides is not None:
+        origin, axis, kind = centre, np.array([1.0 if leaf.slides == "right" else -1.0, 0.0, 0.0]), "prismatic"
+    elif leaf.hinge is None:
+        origin, axis, kind = centre, np.array([0.0, -1.0, 0.0]), "prismatic"
+    elif leaf.hinge == "bottom":
+        origin, axis, kind = np.array([centre[0], face, leaf.z]), np.array([1.0, 0.0, 0.0]), "revolute"
     else:
         # A door hinged on the left turns its free edge towards -Y: negative about +Z.
         edge = leaf.x if leaf.hinge == "left" else leaf.x + leaf.width_m
@@ -215,24 +240,35 @@ def _leaf_joint(furniture: Furniture, leaf: Leaf, position: int) -> TrueJoint:
 
 
 def _appliance(thing: Appliance) -> TrueObject:
-    width, depth, _ = thing.size_m
-    kitchen_from_object = Rigid3(rotation_about_z(thing.yaw_rad), np.array(thing.centre))
-    edge = -width / 2 if thing.hinge == "left" else width / 2
-    joint = TrueJoint(
-        name=f"{thing.name}_joint",
-        type="revolute",
-        axis=np.array([0.0, 0.0, -1.0 if thing.hinge == "left" else 1.0]),
-        origin=kitchen_from_object.apply(np.array([[edge, -depth / 2, 0.0]]))[0],
-        lower=0.0,
-        upper=thing.open_limit,
-        hinge=thing.hinge,
-    )
+    _, depth, height = thing.size_m
+    pose = Rigid3(rotation_about_z(thing.yaw_rad), np.array(thing.centre))
+    hinges: tuple[Hinge, ...] = ("left", "right") if thing.drawer_m else (thing.hinge,)
+    joints = [_swinging(thing, pose, hinge, f"{thing.name}_joint{f'_{hinge}' if thing.drawer_m else ''}") for hinge in hinges]
+    if thing.drawer_m:
+        face = pose.apply(np.array([[0.0, -depth / 2, (thing.drawer_m - height) / 2]]))[0]
+        out = pose.turn(np.array([[0.0, -1.0, 0.0]]))[0]
+        name = f"{thing.name}_joint_drawer"
+        joints.append(TrueJoint(name=name, type="prismatic", axis=out, origin=face, lower=0.0, upper=0.6 * depth, hinge=None))
     return TrueObject(
         name=thing.name,
         category=thing.category,
         dimensions_m=np.array(thing.size_m),
-        kitchen_from_object=kitchen_from_object,
-        joints=(joint,),
+        kitchen_from_object=pose,
+        joints=tuple(joints),
+    )
+
+
+def _swinging(thing: Appliance, pose: Rigid3, hinge: Hinge, name: str) -> TrueJoint:
+    width, depth, _ = thing.size_m
+    edge = -width / 2 if hinge == "left" else width / 2
+    return TrueJoint(
+        name=name,
+        type="revolute",
+        axis=np.array([0.0, 0.0, -1.0 if hinge == "left" else 1.0]),
+        origin=pose.apply(np.array([[edge, -depth / 2, thing.drawer_m / 2]]))[0],
+        lower=0.0,
+        upper=thing.open_limit,
+        hinge=hinge,
     )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from r2c2r_core import cli
 from r2c2r_core.cli import main
-from r2c2r_core.synthetic.choices import PALETTES, STYLES
+from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, STYLES
 
 from .ingest.corruptions import Corruption, corrupt_r3d
 from .ingest.tiny import TinyRoom, write_r3d
@@ -50,7 +50,7 @@ def test_wrong_usage_is_two() -> None:
     r2c2r("sample", "x", "--size", "big", code=2)
 
 
-@pytest.mark.parametrize(("option", "names"), [("--style", STYLES), ("--palette", PALETTES)])
+@pytest.mark.parametrize(("option", "names"), [("--style", STYLES), ("--palette", PALETTES), ("--layout", LAYOUTS)])
 def test_a_sample_explains_its_choices_and_names_them_where_one_is_unknown(option: str, names: dict[str, str]) -> None:
     said, _ = r2c2r("sample", "--help", code=0)
     _, refused = r2c2r("sample", "x", option, "baroque", code=2)
