@@ -1,0 +1,141 @@
+"""What moving each tuned number did, as a plot and as a page of the documentation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.tuning import modules_with_numbers, params_of
+
+MOVES = {"-25": 0.75, "+25": 1.25}
+SHOWN = 40
+
+BETTER = {
+    "segment.appliances.faces.gap_m": "where frames look past a side, rather than the first hole in its depth",
+    "segment.appliances.faces.patch_m": "the length over which this recording's depth errs alike",
+    "segment.appliances.box.front_m": "the recording's depth noise",
+    "segment.things.visual_hull.inside": "hull and cylinder both made, and the one kept that silhouettes agree with more",
+    "segment.things.visual_hull.pose_share": "the same: a hull that fails by a hair becomes a cylinder",
+    "segment.things.pixel_cut.smooth": "contrast across the borders that are sure in the same recording",
+    "segment.planes.cell_m": "the spacing of the fused surface",
+    "generate.lathe.bitten": "the likelihood of a profile under depth and masks, neck and body apart",
+    "generate.consistency.judges": "every frame that sees the object, weighted by what it adds",
+}
+"""By number: the estimator that would stand in its place."""
+
+
+def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
+    """Number, change of the loss down and up, the mean over the runs that moved it; the largest first."""
+    found: dict[str, list[list[float]]] = {}
+    for run in document["runs"]:
+        for name, moves in run["numbers"].items():
+            if "error" not in moves:
+                found.setdefault(name, []).append(
+                    [moves[at]["loss"] - moves[at]["before"] if at in moves else 0.0 for at in MOVES]
+                )
+    means = {name: np.mean(changes, axis=0).round(4).tolist() for name, changes in found.items()}
+    rows = [(name, down, up) for name, (down, up) in means.items()]
+    return sorted(rows, key=lambda row: (-max(abs(row[1]), abs(row[2])), row[0]))
+
+
+def same_everywhere(document: Mapping[str, Any]) -> set[str]:
+    """Numbers whose moves changed not a byte of any step of any run that moved them."""
+    moved = [(name, moves) for run in document["runs"] for name, moves in run["numbers"].items()]
+    other = {name for name, moves in moved if "error" in moves or any(move["changed"] for move in moves.values())}
+    return {name for name, _ in moved} - other
+
+
+def tornado(document: Mapping[str, Any]) -> str:
+    """The largest effects as bars to either side of the usual loss, SVG."""
+    rows = [row for row in effects(document)[:SHOWN] if max(map(abs, row[1:])) > 0]
+    most = max((abs(v) for row in rows for v in row[1:]), default=1.0) or 1.0
+    height, middle, reach = 18, 560, 220
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="820" height="{height * (len(rows) + 3)}" '
+        'font-family="sans-serif" font-size="11">',
+        '<rect width="100%" height="100%" fill="white"/>',
+        '<text x="10" y="14">change of the loss when a number moves by -25 % (blue) and +25 % (orange)</text>',
+    ]
+    for position, (name, down, up) in enumerate(rows):
+        y = height * (position + 1.6)
+        lines.append(f'<text x="{middle - reach - 10}" y="{y + 10:.0f}" text-anchor="end">{name}</text>')
+        for value, colour, offset in ((down, "#2166d6", 0), (up, "#ef7820", 6)):
+            width = abs(value) / most * reach
+            x = middle if value >= 0 else middle - width
+            lines.append(f'<rect x="{x:.1f}" y="{y + offset:.0f}" width="{max(width, 0.5):.1f}" height="6" fill="{colour}"/>')
+    foot = height * (len(rows) + 2.2)
+    lines.append(f'<line x1="{middle}" y1="24" x2="{middle}" y2="{foot - 8:.0f}" stroke="black" stroke-width="0.5"/>')
+    for share in (-1.0, 0.0, 1.0):
+        lines.append(
+            f'<text x="{middle + share * reach:.0f}" y="{foot + 6:.0f}" text-anchor="middle">{share * most:+.2f}</text>'
+        )
+    return "\n".join([*lines, "</svg>", ""])
+
+
+def table(document: Mapping[str, Any]) -> str:
+    """The page of the documentation."""
+    rows, same = [row for row in effects(document) if _stands(row[0])], set(filter(_stands, same_everywhere(document)))
+    still = sorted(name for name, down, up in rows if max(abs(down), abs(up)) == 0.0 and name not in same)
+    untouched = sorted(filter(_stands, set.intersection(*(set(run["untouched"]) for run in document["runs"]))))
+    broken = sorted({name for run in document["runs"] for name, moves in run["numbers"].items() if "error" in moves})
+    return "\n".join(
+        [
+            "# Which numbers matter",
+            "",
+            "`benchmarks/sensitivity.py` moves each tuned number by a quarter either way, alone, on one object of each kind",
+            "whose steps read it, and compares what comes out with the truth of the recordings below. The loss adds the mean",
+            "error of the sizes in percent, 100 (1 - mask IoU) and 100 (1 - share of right joints). Below 0 is better than as",
+            "it is.",
+            "",
+            *(_run_line(run) for run in document["runs"]),
+            "",
+            "![Change of the loss by number](sensitivity.svg)",
+            "",
+            "| number | -25 % | +25 % | what would estimate it |",
+            "|---|---:|---:|---|",
+            *(
+                f"| `{name}` | {down:+.3f} | {up:+.3f} | {BETTER.get(name.partition('[')[0], '')} |"
+                for name, down, up in rows[:SHOWN]
+                if max(abs(down), abs(up)) > 0.0
+            ),
+            "",
+            f"## Moved, and not a byte of any step was another ({len(same)})",
+            "",
+            _listed(sorted(same)),
+            "",
+            f"## Moved without effect on sizes, masks and joints ({len(still)})",
+            "",
+            "How much room boards and fronts leave shows in contacts, and how fine a mesh or a texture is in pictures, which",
+            "are not scored here.",
+            "",
+            _listed(still),
+            "",
+            *([f"## Ended in an error ({len(broken)})", "", _listed(broken), ""] if broken else []),
+            f"## Not read by the steps that were repeated ({len(untouched)})",
+            "",
+            "Other kitchens, other recordings and other backends read them.",
+            "",
+            _listed(untouched),
+            "",
+        ]
+    )
+
+
+def _stands(name: str) -> bool:
+    """Whether the code still has the number; a run tells what it moved, also of what is gone since."""
+    path, _, number = name.partition("[")[0].rpartition(".")
+    return path in modules_with_numbers(path.partition(".")[0]) and number in {f.name for f in fields(params_of(path))}
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names) or "none"
+
+
+def _run_line(run: Mapping[str, Any]) -> str:
+    (source, frames, recording, objects), usual = run["key"], run["usual"]
+    return (
+        f"- `{recording}` ({', '.join(objects)}), {frames} frames, code {source[:8]}: {len(run['numbers'])} of the "
+        f"{run['read']} numbers that are read were moved. With the usual ones the loss is {usual['loss']:.2f}: sizes "
+        f"{usual['extents_percent']:.2f} %, mask IoU {usual['mask_iou']:.3f}, joints {usual['joints']:.3f}."
+    )
