@@ -209,3 +209,8 @@ def write_nerfstudio(folder: Path, room: TinyRoom, *, depth: bool = True, npy: b
 def millimetres(depth_m: np.ndarray) -> np.ndarray:
     """uint16 millimetres."""
     return np.rint(depth_m * 1000).astype(np.uint16)
+
+
+def told(recording, words):
+    """Whether a notice says these words."""
+    return any(words in notice for notice in recording.notices)

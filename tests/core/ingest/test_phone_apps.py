@@ -1,0 +1,204 @@
+"""What is particular to what phone apps export, and its traps: Stray Scanner, its film, Polycam, 3D Scanner App."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.files import FolderFiles
+from r2c2r_core.ingest.readers.protocol import UnreadableFrame
+from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.ingest.readers.video import Video
+
+from .tiny import TinyRoom
+from .tiny_formats import (
+    HEVC,
+    sensor_images,
+    told,
+    write_polycam,
+    write_scanner_app,
+    write_stray,
+)
+
+ROOM = TinyRoom()
+SMALL = replace(ROOM, count=4)
+
+
+# Stray Scanner
+
+
+def test_stray_older_files_take_their_camera_from_the_matrix(tmp_path):
+    recording = open_recording(write_stray(tmp_path / "s", ROOM, per_frame=False))
+    assert recording.frames[5].rgb_camera.fx == pytest.approx(ROOM.focal)
+
+
+def test_stray_frames_without_depth_are_left_out_and_the_film_stays_in_step(tmp_path):
+    recording = open_recording(write_stray(tmp_path / "s", ROOM, skip=(1, 6)))
+    assert [f.index for f in recording.frames] == [0, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+    assert told(recording, "2 of 12 frames were left out: 2 a depth image missing")
+    picture = ROOM.image(ROOM.poses()[7], ROOM.camera)[..., ::-1].astype(int)
+    assert np.abs(recording.colour_of(recording.frames[5]) - picture).mean() < 6.0
+
+
+def test_stray_without_its_camera_is_named_as_the_nearest_miss(tmp_path):
+    (write_stray(tmp_path / "s", SMALL) / "camera_matrix.csv").unlink()
+    with pytest.raises(CaptureError, match=r"looks like Stray Scanner, but camera_matrix\.csv is missing") as caught:
+        open_recording(tmp_path / "s")
+    assert "Polycam" in caught.value.hint
+
+
+def test_stray_columns_go_by_name(tmp_path):
+    folder = write_stray(tmp_path / "s", ROOM)
+    expected = open_recording(folder).frames[3]
+    rows = [line.split(", ") for line in (folder / "odometry.csv").read_text().split("\n")]
+    (folder / "odometry.csv").write_text("\n".join(",".join(row[::-1]) for row in rows))
+    frame = open_recording(folder).frames[3]
+    assert frame.index == 3
+    assert np.array_equal(frame.capture_from_camera.matrix, expected.capture_from_camera.matrix)
+    (folder / "odometry.csv").write_text("time, x, y\n1, 2, 3")
+    with pytest.raises(CaptureError, match="no column timestamp, frame"):
+        open_recording(folder)
+
+
+def test_the_real_odometry_and_matrix_of_a_phone_are_read(real, tmp_path):
+    source = real("stray-scanner-fragments")
+    folder = write_stray(tmp_path / "s", ROOM)
+    (folder / "odometry.csv").write_bytes((source / "odometry.head.csv").read_bytes())
+    (folder / "camera_matrix.csv").write_bytes((source / "camera_matrix.csv").read_bytes())
+    (folder / "rgb.mp4").unlink()
+    (folder / "rgb").mkdir()
+    for k in range(7):
+        image = np.zeros((1440, 1920, 3), np.uint8)
+        cv2.imwrite(str(folder / "rgb" / f"{k:06d}.jpg"), image)
+        depth = (source / "promptda_depth_256x192_mm.png").read_bytes()
+        (folder / "depth" / f"{k:06d}.png").write_bytes(depth)
+        cv2.imwrite(str(folder / "confidence" / f"{k:06d}.png"), np.full((192, 256), 2, np.uint8))
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == list(range(7))
+    frame = recording.frames[6]
+    assert frame.timestamp_s == pytest.approx(0.166692834)
+    # held upright: the quaternion's camera has up along its -x, so three quarter turns, and x and y change places
+    assert (frame.rgb_camera.fx, frame.rgb_camera.width, frame.rgb_camera.height) == (1597.4362, 1440, 1920)
+    metres = recording.depth_of(frame).metres
+    assert metres.shape == (256, 192)
+    assert 1.5 < metres.min() < metres.max() < 3.6
+
+
+# Film
+
+
+def test_a_film_can_be_asked_backwards(tmp_path):
+    video = Video(FolderFiles(HEVC.parent), HEVC.name)
+    pictures = sensor_images(ROOM)
+    for number in (8, 9, 9, 2, 11, 0):
+        off = [np.abs(video.frame(number).astype(int) - picture[..., ::-1]).mean() for picture in pictures]
+        assert int(np.argmin(off)) == number
+    with pytest.raises(UnreadableFrame, match="after 12 frames"):
+        video.frame(12)
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (lambda c: b"", "an MP4 was expected"),
+        (lambda c: c[: len(c) // 2], "not a readable video"),
+        (lambda c: c.replace(b"hvc1", b"zzzz"), r"cannot decode the codec|not a readable video"),
+    ],
+)
+def test_a_film_that_cannot_be_decoded_is_one_clear_line(change, found, tmp_path):
+    folder = write_stray(tmp_path / "s", SMALL)
+    (folder / "rgb.mp4").write_bytes(change(HEVC.read_bytes()))
+    with pytest.raises(CaptureError, match=found) as caught:
+        open_recording(folder)
+    assert "rgb.mp4" in str(caught.value)
+
+
+def test_a_film_damaged_inside_costs_frames_only(tmp_path):
+    folder = write_stray(tmp_path / "s", ROOM)
+    content = bytearray(HEVC.read_bytes())
+    middle = content.index(b"mdat") + 6000
+    content[middle : middle + 3000] = bytes(3000)
+    (folder / "rgb.mp4").write_bytes(content)
+    recording = open_recording(folder)
+    for frame in recording.frames:
+        try:
+            assert recording.colour_of(frame).shape == (*ROOM.rgb_size[::-1], 3)
+        except UnreadableFrame:
+            continue
+
+
+# Polycam
+
+
+def test_polycams_confidence_has_three_levels(tmp_path):
+    levels = []
+    for value in (0, 127, 255):
+        recording = open_recording(write_polycam(tmp_path / str(value), SMALL, confidence=value))
+        levels.append(set(recording.depth_of(recording.frames[0]).confidence.ravel().tolist()))
+    assert levels == [{0}, {1}, {2}]
+
+
+def test_polycam_without_corrected_images_uses_the_others(tmp_path):
+    recording = open_recording(write_polycam(tmp_path / "p", SMALL, corrected=False))
+    assert recording.frames[0].rgb_camera == ROOM.camera
+    assert "keyframes/images/" in recording.frames[0].rgb_name
+    corrected = open_recording(write_polycam(tmp_path / "c", SMALL))
+    assert "keyframes/corrected_images/" in corrected.frames[0].rgb_name
+    assert corrected.frames[1].timestamp_s == pytest.approx(0.25)
+
+
+def test_polycams_frames_are_matched_by_time(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    sorted((folder / "keyframes" / "depth").iterdir())[1].unlink()
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == [0, 2, 3]
+    for frame in recording.frames:
+        assert frame.depth_name.split("/")[-1][:-4] == frame.rgb_name.split("/")[-1][:-4]
+
+
+# 3D Scanner App
+
+
+def test_scanner_apps_frames_without_a_photo_are_left_out_and_told(tmp_path):
+    recording = open_recording(write_scanner_app(tmp_path / "s", SMALL, without_photo=(0, 2)))
+    assert [f.index for f in recording.frames] == [1, 3]
+    assert told(recording, "2 of 4 frames were left out: 2 a colour image missing")
+    assert [f.timestamp_s for f in recording.frames] == pytest.approx([0.25, 0.75])  # since the first frame, photo or not
+    assert [set(recording.depth_of(f).confidence.ravel().tolist()) for f in recording.frames] == [{1}, {0}]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"cameraPoseARFrame": [1.0, 2.0]},
+        {"cameraPoseARFrame": "none"},
+        {"intrinsics": [0] * 9},
+        {"intrinsics": [10**400] * 9},
+        {"intrinsics": None},
+    ],
+)
+def test_a_camera_file_of_scanner_app_that_holds_no_camera_costs_its_frame_only(damage, tmp_path):
+    folder = write_scanner_app(tmp_path / "s", SMALL)
+    file = folder / "frame_00001.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | damage))
+    recording = open_recording(folder)
+    assert [f.index for f in recording.frames] == [0, 2, 3]
+    assert told(recording, "1 frames have no usable pose")
+
+
+def test_the_real_chair_of_scanner_app_is_read_by_number(real):
+    recording = open_recording(real("3d-scanner-app-chair"))
+    assert [f.index for f in recording.frames] == list(range(0, 70, 3))
+    assert told(recording, "46 of 70 frames were left out: 46 a colour image missing")
+    frame = recording.frames[0]
+    assert frame.depth_name == "depth_00000.png"
+    assert (frame.rgb_camera.width, frame.rgb_camera.height) in {(1920, 1440), (1440, 1920)}
+    assert frame.rgb_camera.fx == pytest.approx(1447.654296875)
+    # The same file's projection matrix, which counts from the image's edge: (1 + 0.0068009) * 1920 / 2
+    assert 966.529 in (pytest.approx(c, abs=0.01) for c in (frame.rgb_camera.cx, frame.rgb_camera.cy))
+    metres, confidence = recording.depth_of(frame)
+    assert set(np.unique(confidence)) <= {0, 1, 2}
+    assert 0.2 < np.median(metres[metres > 0]) < 5
