@@ -23,8 +23,8 @@ from r2c2r_core.synthetic.truth import TrueObject
 _MODEL = "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml"
 _DRAWN = 1  # the group of geoms that are seen; the others collide
 _GRIPS = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
-_BODIES = {  # name and category: the bodies it is made of
-    ("oven_0", "range"): ("ovenroot",),
+_BODIES = {  # name and category: the bodies it is made of, the one that may move last; the knobs on the hood are nobody's
+    ("oven_0", "range"): ("Burner 1", "Burner 2", "Burner 3", "Burner 4", "ovenroot"),
     ("hood_0", "hood"): ("hoodroot",),
     ("microwave_0", "microwave"): ("microroot", "microdoorroot"),
     ("kettle_0", "kettle"): ("kettleroot",),
@@ -149,13 +149,12 @@ def _thing(
 
 
 def _owner(model: Any, data: Any, geom: int, things: tuple[TrueObject, ...], scale: float) -> int:
-    """Index of the thing a geom belongs to, itself or as a knob of it: a carcass goes with the front that it lies behind."""
-    own_body = model.geom_bodyid[geom]
-    bodies = {model.body(own_body).name, model.body(model.body_parentid[own_body]).name}
+    """Index of the thing a geom belongs to: a carcass goes with the front that it lies behind."""
+    body = model.body(model.geom_bodyid[geom]).name
     lines = [*_BODIES.values(), *_FRONTS.values()]
     for index, (thing, names) in enumerate(zip(things, lines, strict=True)):
         own = thing.kitchen_from_object.inverse.apply(scale * data.geom_xpos[geom][None])[0]
-        if bodies & set(names) and (names not in _FRONTS.values() or abs(own[0]) <= thing.dimensions_m[0] / 2 + 0.01):
+        if body in names and (names not in _FRONTS.values() or abs(own[0]) <= thing.dimensions_m[0] / 2 + 0.01):
             return index
     return -1
 
