@@ -58,6 +58,12 @@ class Params:
         "of the width, from the middle, beyond which a handle is at an edge",
         source="handles of two doors meet in the middle",
     )
+    foot_m: float = param(
+        0.035,
+        "m",
+        "above the floor, of a lower end that is not told from it",
+        source="sample kitchens of both generators: of 6 refrigerators 4 ended 18-22 mm off there, on either side of the truth",
+    )
     trim: float = param(
         0.004,
         "share",
@@ -133,6 +139,8 @@ def measure_object(
         low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
         if track.box is not None and sources[1] == "inferred" and _face_seen(capture, low, high, rotation):
             sources[1] = "measured"
+    if track.kind == "appliance" and _foot_hidden(capture, low):
+        sources[2] = "inferred"
     if handle is None and spec.opens not in ("rigid", "fixed"):
         handle = handle_of_mesh(samples, rotation, low, high)
     pose = Rigid3(rotation, rotation @ ((low + high) / 2))
@@ -315,6 +323,11 @@ def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarr
             if len(y) > 30 and (filled > 0).mean() > 0.85:
                 return True
     return False
+
+
+def _foot_hidden(capture: Capture, low: Vector3) -> bool:
+    """Whether its lower end is too near to the floor to be told from it: feet lift an appliance by a dark gap or by none."""
+    return capture.room.floor_found and bool(low[2] < tuned(Params).foot_m)
 
 
 def _corrected(measured: MeasuredObject, override: ObjectOverride) -> MeasuredObject:

@@ -133,3 +133,12 @@ def test_a_round_thing_faces_as_its_box_does_however_it_was_placed(turn_deg: flo
         found = measure_object(capture(), track, placement, item, category_of("box"), ObjectOverride())
         yaws.append(np.degrees(np.arctan2(*found.world_from_object.rotation[[1, 0], 0])) % 90)
     assert yaws == pytest.approx([0.0, turn_deg], abs=1.0)
+
+
+@pytest.mark.parametrize(("bottom_m", "said"), [(0.0, "inferred"), (0.02, "inferred"), (0.85, "measured")])
+def test_the_height_of_an_appliance_that_ends_at_the_floor_is_inferred(bottom_m: float, said: str) -> None:
+    unit = Unit("f", "fridge", (0.0, 0.0, bottom_m + 0.8), (0.6, 0.7, 1.6), kind="appliance")
+    found = measure(unit)
+    assert found.sources[2] == said
+    np.testing.assert_allclose(found.dimensions_m[2], 1.6, atol=0.01)
+    assert measure(Unit("c", "cabinet", (0.0, 0.0, 0.36), (0.6, 0.58, 0.7))).sources[2] == "measured"  # a door's edge is seen
