@@ -19,6 +19,8 @@ class Params:
     """Which depth points are surface."""
 
     frames: int = param(40, "count", "whose depth is used", ge=2)
+    nearest_m: float = param(0.2, "m", "before a camera: nearer, none sees", source="ARKit LiDAR and Kinect: 0.2 to 0.4 m")
+    places: int = param(4, "count", "of a level surface, the most central ones, where a frame may see it", ge=1)
     most_rows: int = param(240, "px", "of a depth image that are used: finer ones show no more at a voxel's size", ge=16)
     least_hits: int = param(2, "count", "of frames that must see surface in a voxel", ge=1)
     agreed: float = param(
@@ -27,6 +29,7 @@ class Params:
     edge_step: float = param(
         0.06, "ratio", "of a step within 3x3 pixels to the depth, where depth mixes", source="backends.md 2.7"
     )
+    near_side: float = param(0.25, "share", "of a step, by which a pixel may lie behind its near side: thin legs are all edge")
     through_m: float = param(0.03, "m", "behind a voxel beyond the noise, from where the sensor looked through it")
 
 
@@ -55,9 +58,20 @@ class Region:
         return np.asarray(((points > self.low) & (points < self.high)).all(axis=-1))
 
     def lift(self, scene: Scene, frame: Frame) -> float:
-        """How much too high the frame shows it."""
-        middle = (self.low + self.high) / 2
-        return support_offset(scene, frame, self.level_z_m, np.array([middle[0], middle[1], self.level_z_m or 0.0]))
+        """How much too high the frame shows it: by the level surface where that lies most in the middle of the picture."""
+        if self.level_z_m is None:
+            return 0.0
+        x, y = (
+            np.linspace(0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b, 5) for a, b in zip(self.low[:2], self.high[:2], strict=True)
+        )
+        places = np.array([[u, v, self.level_z_m] for u in x for v in y])
+        local = frame.world_from_camera.inverse.apply(places)
+        off_axis = np.hypot(local[:, 0], local[:, 1]) / np.maximum(local[:, 2], 1e-6)
+        off_axis[local[:, 2] < tuned(Params).nearest_m] = np.inf
+        for place in np.argsort(off_axis)[: tuned(Params).places]:
+            if offset := support_offset(scene, frame, self.level_z_m, places[place]):
+                return offset
+        return 0.0
 
 
 def gather_cloud(scene: Scene, region: Region, size_m: float) -> DepthCloud:
@@ -88,10 +102,13 @@ def gather_cloud(scene: Scene, region: Region, size_m: float) -> DepthCloud:
 
 
 def clean_depth(depth: DepthMetres) -> DepthMetres:
-    """Depth without the pixels at its steps, where it mixes what is near with what is behind; 0 there."""
+    """Depth without the far side of its steps, where it mixes what is near with what is behind; 0 there."""
+    params = tuned(Params)
     near = cv2.erode(np.where(depth > 0, depth, 99.0).astype(np.float32), np.ones((3, 3), np.uint8))
     far = cv2.dilate(depth, np.ones((3, 3), np.uint8))
-    return np.where((depth > 0) & (far - near < tuned(Params).edge_step * near), depth, 0.0).astype(np.float32)
+    step = far - near
+    sure = (step < params.edge_step * near) | (depth - near < params.near_side * step)
+    return np.where((depth > 0) & sure, depth, 0.0).astype(np.float32)
 
 
 def _points_in(scene: Scene, frame: Frame, region: Region) -> tuple[Points, np.ndarray]:
@@ -111,21 +128,22 @@ def _seen_through(scene: Scene, views: list[Frame], region: Region, points: Poin
     """How many frames measured something clearly behind each point."""
     count = np.zeros(len(points))
     for frame in views:
-        lifted = raised(points, region.lift(scene, frame))
-        z, seen, _ = look_up(lifted, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        lifted, depth = raised(points, region.lift(scene, frame)), clean_depth(scene.depth(frame.index))
+        z, seen, _ = look_up(lifted, frame.world_from_camera, frame.depth_camera, depth)
         count += scene.noise.seen_through(seen, z, tuned(Params).through_m)
     return count
 
 
 def _views_of(scene: Scene, region: Region, most: int) -> list[Frame]:
-    """Frames that look at the region's middle: of as many stretches of the recording, the sharpest of each."""
-    middle = (region.low + region.high) / 2
-    seeing = []
-    for frame, local in zip(scene.frames, scene.seen_from_all(middle), strict=True):
-        if local[2] < 0.2:
-            continue
-        u, v = project(local, frame.rgb_camera)
-        if 0 < u < frame.rgb_camera.width and 0 < v < frame.rgb_camera.height:
-            seeing.append(frame)
-    groups = np.array_split(np.arange(len(seeing)), min(most, len(seeing))) if seeing else []
-    return [max((seeing[i] for i in group), key=lambda frame: frame.sharpness) for group in groups]
+    """Frames that look into the region's inner half: of as many stretches of the recording, the sharpest of each."""
+    middle, half = (region.low + region.high) / 2, (region.high - region.low) / 4
+    corners = middle + half * np.array([[0, 0, 0], *np.stack(np.meshgrid(*[[-1, 1]] * 3), axis=-1).reshape(-1, 3)])
+    shown = np.zeros(len(scene.frames), bool)
+    for corner in corners:
+        for number, (frame, local) in enumerate(zip(scene.frames, scene.seen_from_all(corner), strict=True)):
+            if local[2] > tuned(Params).nearest_m:
+                u, v = project(local, frame.rgb_camera)
+                shown[number] |= 0 < u < frame.rgb_camera.width and 0 < v < frame.rgb_camera.height
+    seeing = np.flatnonzero(shown)
+    groups = np.array_split(seeing, min(most, len(seeing))) if len(seeing) else []
+    return [max((scene.frames[i] for i in group), key=lambda frame: frame.sharpness) for group in groups]

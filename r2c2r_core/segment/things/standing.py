@@ -146,23 +146,32 @@ def _of_slab(cloud: DepthCloud, above: np.ndarray, footprint: np.ndarray, level_
     under = ndimage.binary_dilation(footprint, iterations=rim)
     column = above & under[cloud.cells[:, 0], cloud.cells[:, 1]]
     height = cloud.positions[:, 2] - level_m
-    slab = column & (height < params.off_slab_m) & (height > -params.slab_m)
+    own = footprint[cloud.cells[:, 0], cloud.cells[:, 1]]
+    slab = own & (height < params.off_slab_m) & (height > -params.slab_m)
     below = column & (height <= -params.slab_m)
+    return slab | _legs(cloud, below, level_m)
+
+
+def _legs(cloud: DepthCloud, below: np.ndarray, level_m: float) -> np.ndarray:
+    """Of the voxels below a slab, those that are slender at each height and together reach up to it."""
+    from scipy import ndimage
+
+    params = tuned(Params)
     filled = np.zeros(cloud.cells.max(axis=0) + 1, bool)
     filled[tuple(cloud.cells[below].T)] = True
-    labels, count = ndimage.label(ndimage.binary_closing(np.pad(filled, 2), iterations=1)[2:-2, 2:-2, 2:-2], np.ones((3, 3, 3)))
+    level = np.zeros((3, 3, 3), bool)
+    level[:, :, 1] = True
+    slices, _ = ndimage.label(filled, level)
+    spans = [max(s.stop - s.start for s in found[:2]) for found in ndimage.find_objects(slices)]
+    slender = np.array([False, *(span * cloud.size_m < params.leg_m for span in spans)])
+    labels, _ = ndimage.label(slender[slices], np.ones((3, 3, 3)))
     of = labels[tuple(cloud.cells.T)]
-    legs = np.zeros(len(cloud.cells), bool)
-    for part in range(1, count + 1):
-        member = below & (of == part)
-        at = cloud.positions[member]
-        if (
-            len(at)
-            and np.ptp(at[:, :2], axis=0).max() < params.leg_m
-            and at[:, 2].max() > level_m - params.slab_m - params.gap_m
-        ):
+    legs = np.zeros(len(of), bool)
+    for part in np.unique(of[of > 0]):
+        member = of == part
+        if cloud.positions[member, 2].max() > level_m - params.slab_m - params.gap_m:
             legs |= member
-    return slab | legs
+    return legs
 
 
 def _level_cells(scene: Scene, low: np.ndarray, high: np.ndarray, size: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Mask
+from r2c2r_core.arrays import Mask, Pixels, Points
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_through
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import refine_border
@@ -23,9 +23,15 @@ class Params:
 
     around_m: float = param(0.08, "m", "about the thing, that a crop shows")
     cut_px: int = param(220, "px", "of the longer side of what is cut: legs are thin", ge=32)
-    depth_odds: float = param(2.5, "log", "of a depth pixel on the thing or off it")
+    depth_odds: float = param(2.5, "log", "of a depth pixel on the thing")
+    behind_odds: float = param(1.5, "log", "against one off it: sensors lose thin parts to what is behind them")
     voxel_odds: float = param(2.0, "log", "of a pixel that the thing's voxels cover, or do not")
-    far_odds: float = param(6.0, "log", "of a pixel farther from the voxels than `around_m`")
+    fades_m: float = param(0.05, "m", "off its voxels, over which a pixel becomes unlikely: depth loses thin parts")
+    colour_gain: float = param(
+        1.6, "ratio", "of what colours say here to what they say of small things: parts have few colours"
+    )
+    reach_m: float = param(0.04, "m", "about its voxels and the floor under them, where more of it may be")
+    far_odds: float = param(6.0, "log", "of a pixel farther off")
     model_frames: int = param(12, "count", "that colours are learned from", ge=1)
 
 
@@ -37,18 +43,21 @@ class _Crop:
     voxels: Mask  # that the thing's voxels cover
     on: Mask  # depth on the thing
     off: Mask  # depth on something else
+    reach: Mask  # between its voxels and the floor under them, where legs may be that no depth shows
     hidden: Mask  # depth on something before it
     rgb: np.ndarray
 
 
 def standing_colours(found: Standing, scene: Scene, frames: tuple[Frame, ...]) -> ColourModel | None:
     """Colours on the thing against those around it, where voxels and depth agree."""
-    seeing = [crop for frame in frames if (crop := _crop_of(found, scene, frame)) is not None]
-    step = max(1, len(seeing) // tuned(Params).model_frames)
+    params = tuned(Params)
+    some = frames[:: max(1, len(frames) // (3 * params.model_frames))]  # not each of them sees it
+    crops = [crop for frame in some if (crop := _crop_of(found, scene, frame)) is not None]
     samples = []
-    for crop in seeing[::step]:
+    for crop in crops[:: max(1, len(crops) // params.model_frames)]:
         near = cv2.dilate(crop.voxels.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
-        samples.append((cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB), crop.on & crop.voxels, ~near & ~crop.hidden))
+        off = ~near if found.top_z_m is None else ~near | crop.off  # what stands on a slab is before it
+        samples.append((cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB), crop.on & crop.voxels, off & ~crop.hidden))
     return learn_colours(samples) if samples else None
 
 
@@ -60,13 +69,15 @@ def standing_mask(found: Standing, scene: Scene, frame: Frame) -> tuple[Mask, fl
     if crop is None:
         return mask, 0.0
     share = 1 - float((crop.voxels & crop.hidden).sum() / max(crop.voxels.sum(), 1))
-    odds = params.depth_odds * (crop.on.astype(np.float32) - crop.off.astype(np.float32))
+    odds = params.depth_odds * crop.on.astype(np.float32) - params.behind_odds * crop.off.astype(np.float32)
     odds = cv2.blur(odds, (3, 3))
     outside = cv2.distanceTransform((~crop.voxels).astype(np.uint8), cv2.DIST_L2, 5)
-    odds += np.where(crop.voxels, params.voxel_odds, -params.voxel_odds * np.minimum(outside / (0.02 * crop.scale + 1), 1.5))
+    odds += np.where(
+        crop.voxels, params.voxel_odds, -params.voxel_odds * np.minimum(outside / (params.fades_m * crop.scale + 1), 1.0)
+    )
     if found.thing.colours is not None:
-        odds += found.thing.colours.odds(cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB))
-    odds[outside > params.around_m * crop.scale] = -params.far_odds
+        odds += params.colour_gain * found.thing.colours.odds(cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB))
+    odds[~crop.reach] = -params.far_odds
     odds[crop.hidden & ~crop.on] -= params.far_odds
     small = cut_pixels(crop.rgb, odds, params.cut_px)
     photo = scene.rgb(frame.index)[crop.area]
@@ -100,10 +111,28 @@ def _crop_of(found: Standing, scene: Scene, frame: Frame) -> _Crop | None:
     small = shrunk(camera, area)
     shrink = (right - left) / small.width
     voxels = splat(project(local, small), (small.height, small.width), found.size_m * scale / shrink) > 0
+    reach = _hull_of(project(_with_feet(found, frame, lift), small), small, params.reach_m * scale / shrink)
     label, nearer = _depth_labels(found, scene, frame, small, lift)
     part = scene.rgb(frame.index)[area]
     rgb = cv2.resize(part, (small.width, small.height), interpolation=cv2.INTER_AREA)
-    return _Crop(area, small, scale / shrink, voxels, label == ON, label == OFF, nearer, np.asarray(rgb))
+    return _Crop(area, small, scale / shrink, voxels, label == ON, label == OFF, reach, nearer, np.asarray(rgb))
+
+
+def _with_feet(found: Standing, frame: Frame, lift_m: float) -> Points:
+    """The thing's voxels and the places on the floor under them, those before the camera, in its frame."""
+    voxels = found.thing.vertices[::3]
+    feet = np.column_stack([voxels[:, :2], np.full(len(voxels), found.thing.support_z_m or 0.0)])
+    local = frame.world_from_camera.inverse.apply(raised(np.concatenate([voxels, feet]), lift_m))
+    return local[local[:, 2] > 0.15]
+
+
+def _hull_of(uv_px: Pixels, camera: Intrinsics, margin_px: float) -> Mask:
+    """The convex hull of pixels, this much larger."""
+    canvas = np.zeros((camera.height, camera.width), np.uint8)
+    outline = cv2.convexHull(np.clip(uv_px, -(2**14), 2**14).astype(np.float32).round().astype(np.int32))
+    cv2.fillConvexPoly(canvas, outline, 1)
+    cv2.polylines(canvas, [outline], True, 1, thickness=max(1, 2 * round(margin_px)))
+    return canvas > 0
 
 
 def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsics, lift: float) -> tuple[np.ndarray, Mask]:
@@ -113,6 +142,8 @@ def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsic
     label = np.where(depth.ravel() > 0, found.label_of(world), UNKNOWN).reshape(depth.shape).astype(np.uint8)
     nearest = float(np.quantile(frame.world_from_camera.inverse.apply(found.thing.vertices)[:, 2], 0.02))
     nearer = (label == OFF) & scene.noise.occluded(depth, nearest, 0.05)
+    if found.top_z_m is not None:
+        nearer |= (label == OFF) & (world[:, 2] > found.top_z_m).reshape(depth.shape)
     label, inside = sample_through(label, frame.depth_camera, camera)
     nearer, _ = sample_through(nearer, frame.depth_camera, camera)
     return np.where(inside, label, UNKNOWN), inside & nearer
