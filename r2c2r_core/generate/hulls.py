@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
+from r2c2r_core.errors import GenerationFailed
+from r2c2r_core.generate.bars import find_bars
 from r2c2r_core.generate.carved import Carving, above, carve, emptied_height, sheet_field, solid_field, volume_below
 from r2c2r_core.generate.carved import Params as CarvedParams
+from r2c2r_core.generate.consistency import Params as ConsistencyParams
+from r2c2r_core.generate.consistency import disagreement, self_consistency
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.legs import Support, find_support
@@ -64,7 +69,21 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
             return _less_likely(shell, known, field, support)
         return replace(shell, unseen_error_m=emptied_height(known.carving, known.field, field))
 
+    def bars(variation: Variation) -> Shape:
+        known = carved(variation)
+        found = find_bars(known.carving, variation.views)
+        if found is None:
+            raise GenerationFailed("depth saw too little of it", hint="scan it from nearer")
+        seen = known.carving.seen
+        surface = surface_at(known.carving.grid, found.field, 0.0, seen.floor)
+        said = (f"{found.mirrored:.0%} of it is a mirror image: depth lost those legs",) if found.mirrored > 0.005 else ()
+        return thing_model(surface, seen.world_from_local, {"bars": 1.0, "mirrored": found.mirrored}, said)
+
     family = [Hypothesis("carved from free space", hull)]
+    if is_legged and support is None:
+        frame = Hypothesis("only what depth saw of it, as thick as a bar", bars)
+        closer = _cost(frame, evidence, everything) < _cost(family[0], evidence, everything)
+        family.insert(0 if closer else 1, frame)
     if is_round:
         family.insert(0, Hypothesis("carved, its back as round as its front", turned))
     if known.mirrored:
@@ -74,6 +93,16 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
     if support is not None:
         family.insert(0, Hypothesis("a slab on four legs", lambda variation: _on_legs(carved(variation), support)))
     return tuple(family)
+
+
+def _cost(hypothesis: Hypothesis, evidence: Evidence, everything: Variation) -> float:
+    """How far it disagrees with masks and depth of the best frames; infinite for what cannot be made."""
+    try:
+        shape = hypothesis.shape(everything)
+    except GenerationFailed:
+        return inf
+    judges = evidence.pool[: tuned(ConsistencyParams).judges]
+    return disagreement(self_consistency(shape.vertices_world, shape.faces, shape.maskable, judges))
 
 
 class _Carved(NamedTuple):

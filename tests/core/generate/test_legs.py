@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.generate.bars import find_bars
 from r2c2r_core.generate.carved import carve
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.hulls import carved_family
@@ -62,6 +63,22 @@ def test_a_leg_that_nobody_saw_is_the_mirror_image_of_one_that_was_seen(carving,
     assert {nearest_leg(post) for post in support.posts if not post.is_seen} == {leg for leg in LEGS if leg[0] > 0}
     for post in support.posts:
         assert post.top[:2] == pytest.approx(nearest_leg(post), abs=0.01)
+
+
+def test_the_bars_that_depth_saw_are_the_legs_and_there_is_air_between_them(carving, everything):
+    found = find_bars(carving, everything.views)
+    grid, half = carving.grid, 0.0225
+
+    def distance(point):
+        at = ((np.array(point) - grid.low) / grid.voxel_m).astype(int)
+        return found.field[tuple(at)]
+
+    assert found.field.shape == grid.shape
+    for height in (-0.35, -0.2, -0.1):
+        assert distance((0.0, 0.0, height)) > 0.01
+        for x, y in LEGS:  # a leg's outer sides are seen, not its middle
+            sides = [(x + dx, y + dy, height) for dx, dy in ((half, 0), (-half, 0), (0, half), (0, -half))]
+            assert min(distance(side) for side in sides) < 0
 
 
 def test_where_a_corner_is_seen_to_be_empty_there_are_no_four_legs(carving, everything):

@@ -1,0 +1,158 @@
+"""Open frames, as garden chairs: what depth saw, as thick as a bar, and nothing where nobody saw anything.
+
+Carving needs every mask to hold every bar: what a few of them lost is carved off. Depth points vote for what is there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.generate.carved import Carving
+from r2c2r_core.generate.evidence import View, depth_mask
+from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What a bar is."""
+
+    cell_m: float = param(0.01, "m", "side of the cells in which depth points are counted", gt=0)
+    half_m: float = param(
+        0.011, "m", "half a bar's thickness: of what was seen from one side alone", source="noise of a phone's LiDAR"
+    )
+    least_views: int = param(2, "count", "that see a cell filled", ge=1)
+    agreed: float = param(0.25, "share", "of the views that look at a cell, which must see it filled")
+    through_m: float = param(0.03, "m", "behind a cell beyond the noise, from where a view looked through it")
+    least_cells: int = param(12, "count", "of a piece that is kept", ge=1)
+    gap_m: float = param(0.10, "m", "between two pieces of one thing, that is bridged: sensors lose dark and thin parts")
+    symmetric: float = param(0.7, "share", "of the cells that have a twin, from where a leg that depth lost has one too")
+    twin_m: float = param(0.04, "m", "between a cell and the mirror image of its twin, at most")
+    apart_m: float = param(0.09, "m", "between two legs, at least: nearer, a mirror image is the same leg, seen twice")
+    lower: float = param(0.45, "share", "of the height, below which a leg is")
+    foot_m: float = param(0.15, "m", "above the floor, from where a bar goes on down to it")
+
+
+class Bars(NamedTuple):
+    """Distance outside of what depth saw, thickened, on a carving's grid, and how much of it is a mirror image."""
+
+    field: np.ndarray
+    mirrored: float  # share
+
+
+def find_bars(carving: Carving, views: Sequence[View]) -> Bars | None:
+    """What depth saw, thickened, with the legs that it lost; None where it saw too little."""
+    params = tuned(Params)
+    cells = _in_one_piece(_seen_cells(carving, views), params.cell_m)
+    if len(cells) < params.least_cells:
+        return None
+    seen, floor, count = carving.seen, carving.seen.floor, len(cells)
+    if floor is not None:
+        cells = _in_one_piece(np.concatenate([cells, _lost_legs(cells, floor, float(seen.high[2]))]), params.cell_m)
+    mirrored = max(len(cells) - count, 0) / len(cells)
+    if floor is not None:
+        cells = np.concatenate([cells, *_feet(cells, floor)])
+    from scipy.spatial import cKDTree
+
+    centres = carving.grid.centres()
+    away, _ = cKDTree(cells).query(centres, distance_upper_bound=4 * params.half_m)
+    beyond = np.maximum(seen.low - centres, centres - seen.high).max(axis=1)  # thickness goes inwards from its ends
+    field = np.maximum(np.minimum(away, 4 * params.half_m) - params.half_m, np.minimum(beyond, 4 * params.half_m))
+    return Bars(field.reshape(carving.grid.shape), mirrored)
+
+
+def _lost_legs(cells: Points, floor: float, top: float) -> Points:
+    """Mirror images of the lower cells where there is nothing, about the upright plane that the thing is symmetric to."""
+    from scipy.spatial import cKDTree
+
+    params = tuned(Params)
+    tree = cKDTree(cells)
+    middle = (np.quantile(cells, 0.01, axis=0) + np.quantile(cells, 0.99, axis=0)) / 2
+    best, lost = params.symmetric, cells[:0]
+    for axis in (0, 1):
+        twins = cells.copy()
+        twins[:, axis] = 2 * middle[axis] - twins[:, axis]
+        away, _ = tree.query(twins)
+        share = float((away < params.twin_m).mean())
+        if share > best:
+            best = share
+            lost = twins[(away > params.apart_m) & (twins[:, 2] < floor + params.lower * (top - floor))]
+    return lost
+
+
+def _seen_cells(carving: Carving, views: Sequence[View]) -> Points:
+    """Middles (local) of the depth points in the cells that enough views see filled."""
+    params = tuned(Params)
+    local_from_world = carving.seen.world_from_local.inverse
+    low, high = carving.seen.low - params.cell_m, carving.seen.high + params.cell_m
+    shape = tuple(np.ceil((high - low) / params.cell_m).astype(int) + 1)
+    keys, means = [], []
+    for view in views:
+        inside = depth_mask(view) & (view.depth_m > 0)
+        points = local_from_world.apply(view.world_from_camera.apply(depth_points(view.depth_m, view.depth_camera)[inside]))
+        points = points[((points > low) & (points < high)).all(axis=1)]
+        flat = np.ravel_multi_index(tuple(np.floor((points - low) / params.cell_m).astype(int).T), shape)
+        unique, member = np.unique(flat, return_inverse=True)
+        count = np.bincount(member, minlength=len(unique))
+        keys.append(unique)
+        means.append(np.column_stack([np.bincount(member, points[:, k], len(unique)) / count for k in range(3)]))
+    unique, member = np.unique(np.concatenate(keys), return_inverse=True)
+    hits = np.bincount(member, minlength=len(unique))
+    rows = np.concatenate(means)
+    middles = np.column_stack([np.bincount(member, rows[:, k], len(unique)) for k in range(3)]) / np.maximum(hits, 1)[:, None]
+    world = carving.seen.world_from_local.apply(middles)
+    through = np.zeros(len(middles))
+    for view in views:
+        z, seen, _ = look_up(world, view.world_from_camera, view.depth_camera, view.depth_m)
+        through += view.noise.seen_through(seen, z, params.through_m)
+    return middles[(hits >= params.least_views) & (hits >= params.agreed * (hits + through))]
+
+
+def _in_one_piece(cells: Points, cell_m: float) -> Points:
+    """The cells of the largest piece and of those near it, each joined to it by the shortest bar."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    params = tuned(Params)
+    if len(cells) == 0:
+        return cells
+    pairs = cKDTree(cells).query_pairs(1.8 * cell_m, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    _, labels = connected_components(links, directed=False)
+    sizes = np.bincount(labels)
+    left = [cells[labels == k] for k in np.argsort(-sizes) if sizes[k] >= params.least_cells]
+    if not left:
+        return cells[:0]
+    whole = left.pop(0)
+    while left:
+        tree = cKDTree(whole)
+        away = [tree.query(piece) for piece in left]
+        nearest = int(np.argmin([distance.min() for distance, _ in away]))
+        distance, index = away[nearest]
+        at = int(np.argmin(distance))
+        if distance[at] > params.gap_m:
+            break
+        piece = left.pop(nearest)
+        steps = np.linspace(0, 1, max(2, int(np.ceil(distance[at] / (0.5 * cell_m)))))[:, None]
+        bridge = piece[at] + steps * (whole[index[at]] - piece[at])
+        whole = np.concatenate([whole, piece, bridge])
+    return whole
+
+
+def _feet(cells: Points, floor: float) -> list[Points]:
+    """Points from the lower end of each leg straight down to the floor."""
+    params = tuned(Params)
+    low, feet = cells[cells[:, 2] < floor + params.foot_m], []
+    while len(low):
+        foot = low[np.argmin(low[:, 2])]
+        near = np.linalg.norm(low[:, :2] - foot[:2], axis=1) < params.apart_m
+        end = low[near & (low[:, 2] < foot[2] + 2 * params.cell_m), :2]
+        heights = np.arange(floor, foot[2], params.cell_m)
+        feet += [np.column_stack([end, np.full(len(end), z)]) for z in heights]
+        low = low[~near]
+    return feet
