@@ -29,7 +29,7 @@ from r2c2r_core.pool import Pool, usual_workers
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.contradictions import find_contradictions
 from r2c2r_core.segment.prompts import check_prompts, without_hinge
-from r2c2r_core.segment.stage import SEGMENTERS, open_session, track_object
+from r2c2r_core.segment.stage import SEGMENTERS, find_disputed, open_session, track_object
 from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
 from r2c2r_core.synthesize.stage import build_scene
@@ -179,6 +179,8 @@ def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> di
     config = replace(config, weights=SEGMENTERS.weights_named(name, config.weights))
     session = Shared(open_session, (capture, aside(run.work.cache), name, config))
     prompts = {prompt.name: without_hinge(prompt) for prompt in request.prompts.objects}
+    disputed = run.one("segment", find_disputed, session, list(prompts.values()), name="disputed", span=(0.0, 0.1)).value
+    prompts = {name: replace(prompt, others=disputed.get(name, ())) for name, prompt in prompts.items()}
     return run.each("segment", track_object, prompts, session, prompts, alone=SEGMENTERS.get(name).alone)
 
 

@@ -57,6 +57,7 @@ class ObjectPrompt:
     points: tuple[PromptPoint, ...]
     front: DrawnFront | None = None  # drawn: used as it is, whatever is clicked
     frames: tuple[FrameSaid, ...] = ()  # at most one a frame; they stand, whatever is found there
+    others: tuple[PromptPoint, ...] = ()  # clicks on other objects that fall on it: never in a file, found by segment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,7 @@
 """The protocol every segmenter satisfies, and its settings."""
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -10,7 +10,7 @@ from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
@@ -40,7 +40,10 @@ Glimpse = tuple[int, PackedMask, float]
 
 
 class SegmentSession(Protocol):
-    """A capture made ready for clicks. The track of one object never depends on another's prompt."""
+    """A capture made ready for clicks. The track of one object depends on another's prompt by `ObjectPrompt.others` alone."""
+
+    def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
+        """By object, the clicks on other objects that fall on what its own clicks mean; objects without any are left out."""
 
     def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
         """The object's mask in one frame, at RGB resolution; empty when that frame does not show it."""

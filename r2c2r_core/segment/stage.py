@@ -1,16 +1,17 @@
 """Capture + prompts -> mask tracks (paper 4.1)."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
 from r2c2r_core.segment.corrected import as_found, corrected_track
 from r2c2r_core.segment.protocol import SegmentConfig, Segmenter, SegmentSession
 
-__all__ = ["SEGMENTERS", "SegmentConfig", "open_session", "track_object"]
+__all__ = ["SEGMENTERS", "SegmentConfig", "find_disputed", "open_session", "track_object"]
 
 SEGMENTERS: Registry[Segmenter] = Registry(
     "segmenter",
@@ -64,6 +65,13 @@ def open_session(
     """A capture made ready for clicks; heavy results live in `cache`."""
     config = config or SegmentConfig()
     return SEGMENTERS.load(segmenter, weights=config.weights).open(capture, cache, config, progress=progress)
+
+
+def find_disputed(
+    session: SegmentSession, prompts: Sequence[ObjectPrompt], *, progress: Progress = SILENT
+) -> dict[str, tuple[PromptPoint, ...]]:
+    """By object, the clicks on other objects that fall on it: between two names there is a seam."""
+    return session.disputed([as_found(prompt) for prompt in prompts])
 
 
 def track_object(session: SegmentSession, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:

@@ -20,6 +20,8 @@ from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
+NOWHERE = np.zeros((0, 3))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -41,6 +43,9 @@ class Params:
     )
     steady_m: float = param(0.012, "m", "clicks this near a border are within pose error of it")
     border_m: float = param(0.035, "m", "clicks this near a border correct it: no panel is so narrow")
+    between_names: float = param(
+        0.5, "σ", "mean, of a line between two clicks of different names that parts them: the two names say that there is one"
+    )
     hull_share: float = param(
         1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"
     )
@@ -56,13 +61,26 @@ class Front:
     depth_m: float  # to the wall behind, or the usual depth
     sides: tuple[str, ...] = ()  # of left, right, bottom, top: faces of the carcass in view
 
+    def holds(self, point: Vector3) -> bool:
+        """Whether a world point lies on it."""
+        on = self.run.grid.cells_of(near_plane(self.run, point[None]))
+        return len(on) > 0 and self.cell.contains(*on[0].tolist())
+
 
 def find_front(
-    run: Run, positives: Points, negatives: Points, *, pair: bool, unit: Category | None = None, stacked: bool = False
+    run: Run,
+    positives: Points,
+    negatives: Points,
+    *,
+    pair: bool,
+    unit: Category | None = None,
+    stacked: bool = False,
+    others: Points = NOWHERE,
 ) -> Front | None:
     """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
 
     `pair` joins the two doors of a cabinet, `unit` says that it is one front of that kind, `stacked` that it is a drawer.
+    `others` are clicks on other objects: between two names on one panel there is a seam, where any line shows.
     """
     on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
     first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
@@ -81,6 +99,9 @@ def find_front(
         cells += taken
     for column, row in off:
         cell = _without(cell, float(column), float(row), run, on)
+    for column, row in run.grid.cells_of(near_plane(run, others)):
+        if cell.contains(float(column), float(row)):
+            cell = _cut_off(cell, float(column), float(row), run, on, tuned(Params).between_names)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
     lab, seen = as_lab(run.mosaic)
     return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
@@ -222,8 +243,11 @@ def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) 
     return corrected if corrected is not None else _cut_off(cell, column, row, run, kept)
 
 
-def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
-    """The part of the cell, of two along the clearest line between the clicks, that does not hold the click off it."""
+def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray, least: float = -np.inf) -> Cell:
+    """The part of the cell, of two along the clearest line between the clicks, that does not hold the click off it.
+
+    The cell as it is where that line is not clearer than `least`, in σ.
+    """
     options: list[tuple[float, Cell]] = []
     for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
         profile = _profile(run, cell, axis)
@@ -238,7 +262,8 @@ def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) 
         position = low + max(round(start - low), 0) + int(np.argmax(window)) + 0.5
         first = Cell(low, cell.top, position, cell.bottom) if axis == 0 else Cell(cell.left, low, cell.right, position)
         second = Cell(position, cell.top, high, cell.bottom) if axis == 0 else Cell(cell.left, position, cell.right, high)
-        options.append((float(window.max()), first if len(below) else second))
+        if window.max() > least:
+            options.append((float(window.max()), first if len(below) else second))
     return max(options, key=lambda option: option[0])[1] if options else cell
 
 

@@ -31,10 +31,15 @@ class Params:
     small_m: float = param(0.25, "m", "radius below which things are carved by silhouettes")
 
 
-def find_object(prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits) -> Found:
-    """The object under the clicks; raises ObjectNotSeen when neither a front nor a thing is there."""
+def find_object(
+    prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits, others: Points
+) -> Found:
+    """The object under the clicks; raises ObjectNotSeen when neither a front nor a thing is there.
+
+    `others` (n, 3) are points of other objects that were clicked on.
+    """
     if category.kind == "front":
-        found = _front(prepared, category, positives.points, negatives.points)
+        found = _front(prepared, category, positives.points, negatives.points, others)
         if found is not None:
             return found
     if category.kind == "appliance":
@@ -81,13 +86,23 @@ def glimpse_object(
     return FoundThing(small, prepared.scene, small=True, round=config.round) if small is not None else None
 
 
-def _front(prepared: PreparedCapture, category: Category, positives: Points, negatives: Points) -> FoundFront | None:
+def _front(
+    prepared: PreparedCapture, category: Category, positives: Points, negatives: Points, others: Points
+) -> FoundFront | None:
     region = region_at(prepared.planes, positives[0])
     run = prepared.run_of(region) if region is not None else None
     if run is None:
         return None
     unit = category if category.one_front else None
-    front = find_front(run, positives, negatives, pair=category.may_be_pair, unit=unit, stacked=category.one_of_a_stack)
+    front = find_front(
+        run,
+        positives,
+        negatives,
+        pair=category.may_be_pair,
+        unit=unit,
+        stacked=category.one_of_a_stack,
+        others=others,
+    )
     if front is None:
         return None
     depth = depth_to_wall(front, prepared.scene.capture.room, category) or category.depth.usual

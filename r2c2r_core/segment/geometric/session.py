@@ -1,16 +1,17 @@
 """The weight-free segmenter: fronts cut on orthomosaics, things cut from the fused surface."""
 
+import contextlib
 import hashlib
 import importlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Vector3
-from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.errors import ObjectNotSeen, PromptError, R2C2RError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
@@ -23,6 +24,7 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
 from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
+from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.geometric.cache import kept
 from r2c2r_core.segment.geometric.finders import find_drawn, find_object, glimpse_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
@@ -152,7 +154,26 @@ class GeometricSession:
             check_prompt(self.scene.capture, prompt)
             return find_drawn(self, prompt, prompt.front, category_of(prompt.category))
         hint, positives, negatives = self._clicked(prompt)
-        return find_object(self, prompt, hint, positives, negatives)
+        others = np.array([point for click in prompt.others if (point := self._hit(click)) is not None]).reshape(-1, 3)
+        return find_object(self, prompt, hint, positives, negatives, others)
+
+    def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
+        """Clicks of others on the same front, by the front's name."""
+        clicks = [(prompt, click) for prompt in prompts for click in prompt.points if click.label == 1]
+        hits = [(prompt, click, point) for prompt, click in clicks if (point := self._hit(click)) is not None]
+        found: dict[str, tuple[PromptPoint, ...]] = {}
+        for prompt in prompts:
+            if category_of(prompt.category).kind != "front" or prompt.front is not None:
+                continue
+            with contextlib.suppress(R2C2RError):  # what is not found is told by `track`
+                own = self.find(prompt)
+                within = [click for other, click, point in hits if other is not prompt and _is_on(own, point)]
+                found |= {prompt.name: tuple(within)} if within else {}
+        return found
+
+    def _hit(self, click: PromptPoint) -> Vector3 | None:
+        known = any(frame.index == click.frame for frame in self.scene.frames)
+        return self.scene.pick(click.frame, click.x, click.y) if known else None
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
         """The furniture run on a plane, and this far around it; computed once."""
@@ -209,6 +230,10 @@ class GeometricSession:
                     _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
                 )
         return Hits(tuple(clicks), np.array(points).reshape(-1, 3))
+
+
+def _is_on(found: Found, point: Vector3) -> bool:
+    return isinstance(found, FoundFront) and found.front.holds(point)
 
 
 def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:

@@ -1,6 +1,6 @@
 """Learned segmenters: a video model draws masks, depth prunes them, furniture is measured as without weights."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
@@ -142,6 +142,10 @@ class LearnedSession:
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
         """What was drawn; what is found is measured when all frames had their say."""
         return self.prepared.panel(prompt) if prompt.front is not None else None
+
+    def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
+        """None: the model follows each object's own clicks."""
+        return {}
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """What the weight-free segmenter sees; the model follows what is confirmed."""

@@ -6,7 +6,10 @@ import pytest
 
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.runs.orthomosaic import joined
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
@@ -112,3 +115,37 @@ def test_the_stream_starts_at_the_click_and_spreads_outwards(session: GeometricS
     order = [index for index, _, _ in session.stream(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60)))]
     assert order[:3] == [60, 50, 70]
     assert len(order) == len(set(order))
+
+
+def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Path) -> None:
+    session = open_session(boxes[0], cache)
+    assert isinstance(session, GeometricSession)
+    doors = two_doors(boxes[0])
+    first = session.find(doors[0])
+    assert isinstance(first, FoundFront)
+    run, apart = first.front.run, [session.panel(door) for door in doors]
+    hits = [session.scene.pick(click.frame, click.x, click.y) for door in doors for click in door.points]
+    cells = [cell for column, row in run.grid.cells_of(np.array(hits)) if (cell := run.cell_at(column, row)) is not None]
+    run.cells = (joined(cells), *(cell for cell in run.cells if cell not in cells))  # a seam that nobody saw
+    run.handles = tuple(None for _ in run.cells)
+
+    again = [dataclasses.replace(door, category="base_cabinet") for door in doors]  # found anew
+    both = [session.panel(door) for door in again]
+    assert [panel is not None and panel.width_m > 0.9 for panel in both] == [True, True]
+    disputed = session.disputed(again)
+    assert disputed == {doors[0].name: doors[1].points, doors[1].name: doors[0].points}
+    for door, own in zip(again, apart, strict=True):
+        panel = session.panel(dataclasses.replace(door, others=disputed[door.name]))
+        assert panel is not None
+        assert own is not None
+        assert panel.width_m == pytest.approx(own.width_m, abs=6e-3)
+        np.testing.assert_allclose(panel.world_from_front.translation, own.world_from_front.translation, atol=6e-3)
+
+
+def test_neighbours_that_are_apart_dispute_nothing(session: GeometricSession, boxes: Boxes) -> None:
+    assert session.disputed(two_doors(boxes[0])) == {}
+
+
+def two_doors(capture: Capture) -> list[ObjectPrompt]:
+    places = list(DOORS.items())[:2]
+    return [prompt(name, "cabinet", click_on(capture, (left + 0.2, FRONT_Y, 0.4), 60)) for name, (left, _) in places]
