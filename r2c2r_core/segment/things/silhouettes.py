@@ -27,7 +27,7 @@ class Params:
         source="a handle 1200 px wide takes the time of one of 320 px; VGA crops are not shrunk",
         ge=32,
     )
-    around_m: float = param(0.03, "m", "about the hull, beyond the pose error, that a crop shows: what is not the thing")
+    around_m: float = param(0.04, "m", "about the hull, beyond the pose error, that a crop shows: what is not the thing")
     border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
     sure_odds: float = param(9.0, "log", "of a pixel that is known")
     on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
