@@ -10,7 +10,7 @@ from r2c2r_core.geometry.camera import depth_points, project
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.silhouettes import raised, support_offset
+from r2c2r_core.segment.things.support import raised, support_offset
 from r2c2r_core.tuning import param, tuned
 
 

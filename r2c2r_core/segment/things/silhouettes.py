@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
+from r2c2r_core.arrays import Image, Mask, Pixels
 from r2c2r_core.geometry.camera import Intrinsics, project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import colour_gradient, refine_border
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
 from r2c2r_core.segment.things.pixel_cut import Params as CutParams
+from r2c2r_core.segment.things.support import raised, support_offset
 from r2c2r_core.segment.things.thing import Thing
 from r2c2r_core.tuning import param, tuned
 
@@ -31,7 +32,6 @@ class Params:
     border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
     sure_odds: float = param(9.0, "log", "of a pixel that is known")
     on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
-    pose_error_m: float = param(0.04, "m", "of the height of a support between frames, at most")
     attached_m: float = param(0.035, "m", "from the hull: handles and caps that it lacks")
     attached_odds: float = param(3.2, "log", "of such a place: depth and colour together may add it")
 
@@ -134,36 +134,6 @@ def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) ->
     return learn_colours(samples) if samples else None
 
 
-def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
-    """How much higher than it stands one frame's depth shows the support around the thing: that frame's pose error."""
-    params = tuned(Params)
-    if support_z_m is None:
-        return 0.0
-    depth = scene.depth(frame.index)
-    camera = frame.depth_camera
-    local = frame.world_from_camera.inverse.apply(centre[None])[0]
-    if local[2] < 0.2:
-        return 0.0
-    u, v = project(local, camera)
-    reach = 0.22 * camera.fx / local[2]
-    rows = slice(int(np.clip(v - reach, 0, camera.height)), int(np.clip(v + reach, 0, camera.height)), 2)
-    columns = slice(int(np.clip(u - reach, 0, camera.width)), int(np.clip(u + reach, 0, camera.width)), 2)
-    patch = depth[rows, columns]
-    if not (patch > 0).any():
-        return 0.0
-    row, column = np.nonzero(patch > 0)
-    uv = np.stack([columns.start + 2 * column + 0.5, rows.start + 2 * row + 0.5], axis=1)
-    heights = frame.world_from_camera.apply(unproject(uv, patch[row, column].astype(np.float64), camera))[:, 2] - support_z_m
-    near = heights[np.abs(heights) < params.pose_error_m]
-    if len(near) < 60:
-        return 0.0
-    counts, edges = np.histogram(
-        near, bins=round(2 * params.pose_error_m / 0.004), range=(-params.pose_error_m, params.pose_error_m)
-    )
-    peak = float(edges[int(np.argmax(np.convolve(counts, [1, 2, 1], mode="same")))] + 0.002)
-    return float(np.median(near[np.abs(near - peak) < 0.008]))
-
-
 def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
     """How far the hull's outline lies from the colour edges it belongs to, metres, in the middle of the frames."""
     shifts = []
@@ -174,11 +144,6 @@ def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
             moved = _best_shift(crop.hull, odds, gradient, round(thing.pose_error_m * crop.scale))
             shifts.append(float(np.hypot(*moved)) / crop.scale)
     return float(np.median(shifts)) if shifts else 0.0
-
-
-def raised(points: Points, lift_m: float) -> Points:
-    """World points lifted by a height."""
-    return points + np.array([0.0, 0.0, lift_m])
 
 
 def hull_crop(thing: Thing, scene: Scene, frame: Frame) -> Crop | None:

@@ -12,7 +12,8 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.cylinder import Params as CylinderParams
 from r2c2r_core.segment.things.cylinder import upright_shape
-from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline, raised, support_offset, usual_shift
+from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline, usual_shift
+from r2c2r_core.segment.things.support import raised, support_offset
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, support_height
 from r2c2r_core.segment.things.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 from r2c2r_core.segment.viewpoints import best_views

@@ -12,7 +12,8 @@ from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import visual_hull
-from r2c2r_core.segment.things.silhouettes import small_mask, support_offset, usual_shift
+from r2c2r_core.segment.things.silhouettes import small_mask, usual_shift
+from r2c2r_core.segment.things.support import support_offset
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, find_thing, support_height, thing_mask
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
 from tests.core.segment.conftest import Truth
