@@ -62,7 +62,7 @@ def test_every_name_is_the_same_in_every_stage(category: Category, monkeypatch: 
     for name in category.names:
         found = category_of(name)
         # segment: what is looked for
-        finders._front(bench, found, np.zeros((1, 3)), np.zeros((0, 3)))
+        finders._front(bench, found, np.zeros((1, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         assert asked["pair"] == (category.name in PAIRED or category.name.endswith("refrigerator"))
         assert asked["unit"] is (category if category.one_front else None)
         assert asked["stacked"] == (category.name == "drawer")
