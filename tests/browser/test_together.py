@@ -13,6 +13,7 @@ from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
 FRAME = (160, 120)
+CLOSES_MS = 5000
 STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
 
 
@@ -256,7 +257,12 @@ def test_a_tablet_reaches_everything_by_touch(browser: Browser, server: Server) 
 def say(page: Page, button: str, text: str) -> None:
     dialog = page.get_by_role("dialog")
     dialog.get_by_role("textbox").fill(text)
-    dialog.get_by_role("button", name=button, exact=True).click()
+    answer = dialog.get_by_role("button", name=button, exact=True)
+    answer.click()
+    try:
+        expect(dialog).to_be_hidden(timeout=CLOSES_MS)
+    except AssertionError:  # seen once in eight, just as the 3D view's frame is attached: the click never reaches the dialog
+        answer.click()
 
 
 def move(page: Page, step: str, reason: str = "") -> None:
