@@ -173,13 +173,16 @@ def recording_key(source: Path) -> str:
     return content_key(file_key(source), beside) if beside else file_key(source)
 
 
+DISPUTED = "disputed-clicks"  # with a hyphen: no object is called so, and Workspace.names leaves it out
+
+
 def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> dict[str, Kept[MaskTrack]]:
     """Every object's masks."""
     name, config = request.tools.segmenter, request.config.segment
     config = replace(config, weights=SEGMENTERS.weights_named(name, config.weights))
     session = Shared(open_session, (capture, aside(run.work.cache), name, config))
     prompts = {prompt.name: without_hinge(prompt) for prompt in request.prompts.objects}
-    disputed = run.one("segment", find_disputed, session, list(prompts.values()), name="disputed", span=(0.0, 0.1)).value
+    disputed = run.one("segment", find_disputed, session, list(prompts.values()), name=DISPUTED, span=(0.0, 0.1)).value
     prompts = {name: replace(prompt, others=disputed.get(name, ())) for name, prompt in prompts.items()}
     return run.each("segment", track_object, prompts, session, prompts, alone=SEGMENTERS.get(name).alone)
 

@@ -124,8 +124,8 @@ class Workspace:
             return None
 
     def names(self, stage: str) -> list[str]:
-        """Names of the nouns a stage has stored."""
-        return sorted(path.stem for path in (self.root / "nouns" / stage).glob("*.noun"))
+        """Names of the objects a stage has stored nouns of; a name with a hyphen is of what it made for all of them."""
+        return sorted(path.stem for path in (self.root / "nouns" / stage).glob("*.noun") if "-" not in path.stem)
 
     def save(self, stage: str, name: str, noun: object, header: dict[str, Any]) -> None:
         """Store a noun atomically."""

@@ -18,7 +18,7 @@ from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.ledger import Kept, Ledger
 from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
 from r2c2r_core.model.mesh import TexturedMesh
-from r2c2r_core.pipeline import Request, Tools, generate_objects, place_objects, restricted_licences
+from r2c2r_core.pipeline import DISPUTED, Request, Tools, generate_objects, place_objects, restricted_licences
 from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT
 from r2c2r_core.workspace import Workspace
@@ -207,3 +207,11 @@ def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, tmp_p
     assert len(stored) == 4
     for path in stored:
         assert contents(tmp_path / "1" / path) == contents(tmp_path / "2" / path)
+
+
+def test_what_is_made_for_all_objects_is_not_taken_for_one(tmp_path: Path) -> None:
+    work = Workspace(tmp_path)
+    for name in ("door_1", DISPUTED):
+        work.save("segment", name, {}, {"key": "k", "seconds": 0.0})
+    assert work.load_latest("segment", DISPUTED) == {}
+    assert work.names("segment") == ["door_1"]
