@@ -133,6 +133,7 @@ _JOINTS = {
     "side": "revolute",
     "pair": "revolute",
     "bottom": "revolute",
+    "sideways": "prismatic",
     "fixed": "none",
     "rigid": "none",
 }

@@ -23,6 +23,7 @@ _HOODS = "makers: 0.5-1.2 m wide, flat visors 5 cm to chimneys of 1 m high"
 _BOARDS = "European lists: fronts of 16-22 mm, fillers of 2-10 cm, plinths of 6-20 cm; US toe kicks 4.5 in high"
 _WORKTOPS = "EN 1116 worktops 600 mm and deeper, lists of 0.6-1.2 m; boards of 12-60 mm"
 _SHELVES = "furniture sold as wall shelves and bookcases: 0.2-1.2 m wide, 0.15-0.6 m deep"
+_SLIDING = "makers: 0.3-1.5 m wide, before carcasses of wall units to wardrobes of 2.6 m"
 _OWN = "own estimate of household things as sold"
 
 DEPTHS_SOLD_M = (0.30, 0.37, 0.48, 0.58, 0.62, 0.75)
@@ -128,6 +129,21 @@ _FRONTS = (
         width=_PAIR_WIDTH,
         depth=_BASE_DEPTH,
         height=_BASE_HEIGHT,
+        material=materials.CHIPBOARD,
+    ),
+    Category(
+        name="sliding_door",
+        aliases=(
+            *("sliding_cabinet_door", "sliding_cabinet", "sliding_wardrobe_door", "sliding_closet_door", "sliding_front"),
+            *("sliding_leaf", "lateral_sliding_door"),
+        ),
+        kind="front",
+        opens="sideways",
+        hinge="right",
+        fixture="sliding_door",
+        width=Size(0.30, 0.62, 1.5, _SLIDING),
+        depth=Size(0.20, 0.58, 0.80, f"{_CARCASSES}; {_WALL_UNITS}"),
+        height=Size(0.28, 0.75, 2.6, f"{_SLIDING}; base units the most"),
         material=materials.CHIPBOARD,
     ),
     Category(

@@ -12,8 +12,9 @@ from r2c2r_core.tuning import param, tuned
 Kind = Literal["front", "appliance", "thing"]
 """How it is looked for: a panel among lines, a box behind a front, or the part of the scan that stands on something."""
 
-Opening = Literal["drawer", "side", "pair", "bottom", "fixed", "rigid"]
-"""How it opens: slides out, one side-hinged door, two doors, a bottom-hinged door, not at all; or it is a loose thing."""
+Opening = Literal["drawer", "side", "pair", "bottom", "sideways", "fixed", "rigid"]
+"""How it opens: slides out, one side-hinged door, two doors, a bottom-hinged door, slides along its front, not at all; or it is
+a loose thing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +72,7 @@ class Category:
     height: Size
     material: Material = UNKNOWN_THING
     fixture: str | None = None  # what builds it: "module" or "module:NAME" of synthesize/fixtures or of a plug-in
-    hinge: HingeSide | None = None  # of a single door, where nothing tells
+    hinge: HingeSide | None = None  # of a single door, where nothing tells; one that slides sideways goes there
     one_front: bool = False  # a machine, or a stack: one front whatever lines it carries
     several_fronts: bool = False  # that are one object, told apart by their handles
     stands: bool = False  # rests on what is below it; a wall cabinet and a built-in front do not

@@ -62,7 +62,7 @@ SIZE_SAID = f"[width, depth, height]: three numbers of metres, positive, at most
 POSE_SAID = f"a 4x4 world_from_object: a rotation, and a translation within {FARTHEST_M:g} m"
 LIMITS_SAID = f"[lower, upper] in rad or m within ±{FULL_TURN:g}, null for what stays computed"
 JOINTS_SAID = f"a table of joints, each by its name or its part's, with {LIMITS_SAID}"
-HINGE_SAID = "left, right, top or bottom, as seen by a person facing the front"
+HINGE_SAID = "left, right, top or bottom, as seen by a person facing the front; of a sliding door: where it slides to"
 BATCHES_SAID = f"0 to {MOST_BATCHES}: how often further candidates were asked for"
 
 

@@ -25,6 +25,7 @@ from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import Source
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
+from r2c2r_core.synthesize.fixtures.spec import Lap
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
 from r2c2r_core.tuning import param, tuned
@@ -91,6 +92,7 @@ class MeasuredObject:
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
     fixed_by_person: bool  # a person gave pose or size: the layout leaves it where it is
+    laps: tuple[Lap, ...] = ()  # with the leaves that it slides past, once everything stands
     placed_pose: Rigid3  # world_from_object as the mesh was placed, before person and layout
     warnings: tuple[str, ...]
 
@@ -153,7 +155,7 @@ def measure_object(
         sources=(sources[0], sources[1], sources[2]),
         handle=handle,
         handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
-        opened_m=_drawn_out(track),
+        opened_m=None if spec.opens == "sideways" else _drawn_out(track),
         swung=_swung_open(track),
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,

@@ -19,3 +19,11 @@ def trimmed(item: MeasuredObject, axis: int, sign: float, amount_m: float) -> Me
     size[axis] -= amount_m
     shift = -sign * amount_m / 2 * item.world_from_object.rotation[:, axis]
     return replace(moved(item, shift), dimensions_m=size)
+
+
+def edge_moved(item: MeasuredObject, sign: float, inwards_m: float) -> MeasuredObject:
+    """The front with one side edge (-1 left, +1 right) drawn in, or let out where negative; its handle stays in the room."""
+    handle, shift = item.handle, sign * inwards_m / 2
+    if handle is not None:  # while the front's centre moves
+        handle = replace(handle, left_m=handle.left_m + shift, right_m=handle.right_m + shift)
+    return replace(trimmed(item, 0, sign, inwards_m), handle=handle)

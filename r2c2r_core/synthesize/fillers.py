@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from r2c2r_core.failing import spared
 from r2c2r_core.kitchen.fillers import FrontBox, missing_filler
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.edits import trimmed
+from r2c2r_core.synthesize.edits import edge_moved
 from r2c2r_core.tuning import param, tuned
 
 
@@ -52,13 +52,7 @@ def _is_front(item: MeasuredObject) -> bool:
 
 
 def _drawn_in(item: MeasuredObject, sign: float, amount_m: float, other: str) -> MeasuredObject:
-    handle = item.handle
-    if handle is not None:  # it stays where it is while the front's centre moves
-        shift = sign * amount_m / 2
-        handle = replace(handle, left_m=handle.left_m + shift, right_m=handle.right_m + shift)
     warning = f"{1000 * amount_m:.0f} mm of its width left as the filler at the corner with {other}"
-    narrower = trimmed(item, 0, sign, amount_m)
+    narrower = edge_moved(item, sign, amount_m)
     _, depth_source, height_source = item.sources
-    return replace(
-        narrower, handle=handle, sources=("inferred", depth_source, height_source), warnings=(*item.warnings, warning)
-    )
+    return replace(narrower, sources=("inferred", depth_source, height_source), warnings=(*item.warnings, warning))

@@ -1,4 +1,7 @@
-"""How each fixture opens: the hinge side from the handle, the neighbours or the category; a person's word wins."""
+"""How each fixture opens: the hinge side from the handle, the neighbours or the category; a person's word wins.
+
+Of a leaf that slides, its side is where it slides to: away from its pull as a hinge is, or over the one leaf that it passes.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,6 +38,13 @@ class Params:
         0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"
     )
 
+    past_leaf: float = param(
+        0.95,
+        "score",
+        "confidence, 0 to 1, that a leaf slides past the only one beside it",
+        source="a guess, stated as one: no unit gives it another way, if both are leaves",
+    )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hinge:
@@ -53,12 +63,12 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
     hinges: dict[str, Hinge] = {}
     undecided: list[MeasuredObject] = []
     for item in objects:
-        if item.spec.opens not in ("side", "bottom"):
+        if item.spec.opens not in ("side", "bottom", "sideways"):
             continue
         asked = overrides.of(item.name).hinge
         said, seen = list[str](), None
         with spared("its handle was not looked at", said):
-            seen = handle_hinge(item) if item.spec.opens == "side" else None
+            seen = _side_seen(item)
         if said:
             seen = _by_category(item, said[0])
         if asked is not None:
@@ -72,6 +82,8 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
             hinges[item.name] = seen
         elif item.spec.opens == "bottom":
             hinges[item.name] = Hinge(side="bottom", source="inferred", reason="the category opens downwards", confidence=None)
+        elif item.spec.opens == "sideways":
+            hinges[item.name] = _by_category(item, "nothing in the scan tells the side")
         else:
             undecided.append(item)
     for item in sorted(undecided, key=lambda o: _along(o, o)):
@@ -81,6 +93,24 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
         if said:
             hinges[item.name] = _by_category(item, said[0])
     return hinges
+
+
+def _side_seen(item: MeasuredObject) -> Hinge | None:
+    """What the object itself shows of its side; None where nothing does, or it has no choice."""
+    if item.spec.opens == "bottom":
+        return None
+    return _past_leaf(item) or handle_hinge(item)
+
+
+def _past_leaf(item: MeasuredObject) -> Hinge | None:
+    """Over the leaf that it passes, where that is on one side only: on the other one its unit ends."""
+    others = {lap.side: lap.other for lap in item.laps}
+    if len(others) != 1:
+        return None
+    ((side, other),) = others.items()
+    return Hinge(
+        side=side, source="inferred", reason=f"slides past {other}", confidence=tuned(Params).past_leaf, by_handle=True
+    )
 
 
 def handle_hinge(item: MeasuredObject) -> Hinge | None:

@@ -17,6 +17,7 @@ from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
 from r2c2r_core.synthesize.fillers import leave_fillers
+from r2c2r_core.synthesize.laps import lap_of
 from r2c2r_core.synthesize.runs import align_runs
 from r2c2r_core.synthesize.solve import solved, strain
 from r2c2r_core.synthesize.ties import ties_of
@@ -178,7 +179,10 @@ def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]
 
 
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:
-    """Index pairs whose boxes come nearer than GAP_M (REST_GAP_M vertically, for what stands on the other), and by how much."""
+    """Index pairs whose boxes come nearer than GAP_M (REST_GAP_M vertically, for what stands on the other), and by how much.
+
+    Leaves that pass each other have one body, and each its own track: they part nothing.
+    """
     if len(items) < 2:
         return []
     first, second = np.triu_indices(len(items), 1)
@@ -188,7 +192,7 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
     found = []
     for i, j, d in zip(first.tolist(), second.tolist(), depth.tolist(), strict=True):
         if d > 1e-6 and not _rests_on(items[i], items[j]) and not _rests_on(items[j], items[i]):
-            if items[i].fixed_by_person and items[j].fixed_by_person:
+            if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
             found.append((i, j, d))
     return found

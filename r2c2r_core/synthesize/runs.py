@@ -10,6 +10,7 @@ from r2c2r_core.failing import spared
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation, rotation_about_z
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
+from r2c2r_core.synthesize.laps import lap_of
 from r2c2r_core.tuning import param, tuned
 
 
@@ -115,13 +116,14 @@ def _run_yaw(items: Sequence[MeasuredObject], line: _Line, manhattan_yaw_rad: fl
 
 
 def _planes(items: Sequence[MeasuredObject], members: Sequence[int], outward: Vector3) -> list[list[int]]:
-    """Members whose front planes lie within 1.5 cm of their group's heaviest one."""
+    """Members whose front planes lie within 1.5 cm of their group's heaviest one; leaves that pass each other share none."""
     params = tuned(Params)
     left = sorted(members, key=lambda i: -weight(items[i]))
     planes: list[list[int]] = []
     for i in left:
         offset = items[i].front_centre @ outward
-        home = next((p for p in planes if abs(items[p[0]].front_centre @ outward - offset) < params.coplanar_m), None)
+        near = (p for p in planes if abs(items[p[0]].front_centre @ outward - offset) < params.coplanar_m)
+        home = next((p for p in near if not any(lap_of(items[k], items[i]) for k in p)), None)
         if home is None:
             planes.append([i])
         else:

@@ -26,6 +26,7 @@ from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
+from r2c2r_core.synthesize.laps import lapped, with_hidden_edges
 from r2c2r_core.synthesize.layout import arrange, with_outliers
 from r2c2r_core.synthesize.opening import open_all
 from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
@@ -86,13 +87,15 @@ def build_scene(
     if not measured:
         raise StageError("no object could be measured", hint="; ".join(failures.values()))
     progress.at(0.5, "arranging")
+    measured = with_hidden_edges(measured)
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     if config.outliers == "keep":
         layout = with_outliers(layout, measured)
     failures |= {name: f"synthesize: {name}: left out: {why}" for name, why in layout.outliers.items()}
-    hinges = choose_hinges(layout.objects, overrides)
+    placed = lapped(layout.objects)
+    hinges = choose_hinges(placed, overrides)
     built: list[SceneObject] = []
-    for item in progress.part(0.5, 0.9).each(layout.objects, "building"):
+    for item in progress.part(0.5, 0.9).each(placed, "building"):
         with apart("synthesize", item.name, failures):
             if item.spec.fixture is None:
                 built.append(_thing(item, *meshes[item.name], config.seed))
@@ -101,7 +104,7 @@ def build_scene(
     if not built:
         raise StageError("no object could be built", hint="; ".join(failures.values()))
     progress.at(0.9, "opening every joint")
-    arranged = {item.name: item for item in layout.objects if item.name not in failures}
+    arranged = {item.name: item for item in placed if item.name not in failures}
 
     def rebuild(name: str, hinge: Hinge) -> SceneObject:
         return _fixture(arranged[name], hinge, overrides.of(name), carcass)
@@ -144,6 +147,7 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         hinge=hinge.side if hinge else item.spec.hinge,
         handle=item.handle,
         handles=item.handles,
+        laps=item.laps,
         carcass=carcass,
     )
     build = fixture.build(order)
@@ -157,7 +161,8 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     if (seen_open := _seen_open(item, hinge)) and all(joint.sources["limits"] == "default" for joint in joints):
         warnings.append(f"seen open to {seen_open}, which need not be all it opens")
     if hinge is not None and hinge.source == "default":
-        warnings.append(f"hinge on the {hinge.side} by default: {hinge.reason}")
+        said_of = "slides to the" if item.spec.opens == "sideways" else "hinge on the"
+        warnings.append(f"{said_of} {hinge.side} by default: {hinge.reason}")
     return SceneObject(
         name=item.name,
         category=item.category,

@@ -6,12 +6,13 @@ from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.fixtures.carcass import Params as CarcassParams
+from r2c2r_core.synthesize.laps import lap_of
 from r2c2r_core.synthesize.runs import built_in
 from r2c2r_core.synthesize.solve import Face, Tie
 from r2c2r_core.tuning import param, tuned
@@ -42,7 +43,15 @@ def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
             ties += _levels(items, plane, sign)
         for axis in (0, 2):
             ties += _seams(items, plane, axis)
-    return [*ties, *_closed(items)]
+    return [*ties, *_tracks(items), *_closed(items)]
+
+
+def _tracks(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
+    """Leaves that pass each other hang in one pair of profiles: their tops and their bottoms are level."""
+    for (i, a), (j, b) in combinations(enumerate(items), 2):
+        if lap_of(a, b) is not None and not (a.fixed_by_person or b.fixed_by_person):
+            near = (sign for sign in (1.0, -1.0) if abs(_edge(a, 2, sign) - _edge(b, 2, sign)) < tuned(Params).line_m)
+            yield from (Tie(first=Face(i, 2, sign), second=Face(j, 2, sign)) for sign in near)
 
 
 def _closed(items: Sequence[MeasuredObject]) -> Iterator[Tie]:

@@ -26,6 +26,7 @@ class Params:
 
     beside_m: float = param(0.0015, "m", "between a moving front and what stays beside it")
     behind_m: float = param(0.002, "m", "between a moving front and the carcass behind it")
+    before_m: float = param(0.001, "m", "before a front that others pass, within which its own surface may lie")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,6 +52,8 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
         wider = _widened(region)
         # edges of the carcass are banded like its front: white ones would shine through the seam
         rest = rest - box_solid(wider.low, wider.high, paint.back_uv)
+    if _shares_its_box(item):
+        rest = rest ^ box_solid(*_body(item), paint.back_uv)
     low, high = cavity(item)
     if (high > low).all():
         rest = rest - box_solid(low, high, paint.inside_uv)
@@ -59,14 +62,28 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
     return visuals
 
 
+def _shares_its_box(item: SceneObject) -> bool:
+    """Whether its front slides sideways: then others pass where its box is, before its body or beside it."""
+    return any(joint.type == "prismatic" and abs(float(joint.axis_object[1])) < 0.5 for joint in item.joints)
+
+
+def _body(item: SceneObject) -> tuple[Vector3, Vector3]:
+    """Corners of what may stay of the mesh, in the object frame."""
+    half = item.dimensions_m / 2
+    return _range(item.links[0], item.links[0].boxes) if _shares_its_box(item) else (-half, half)
+
+
 def front_region(item: SceneObject, link: Link) -> Region:
-    """The box of the front boards, unbounded forwards (the handle) and where it reaches the object's own edge."""
+    """The box of the front boards, unbounded forwards (the handle) and where it reaches the object's own edge.
+
+    A front that slides sideways ends where its handle does: another may pass before it.
+    """
     low, high = front_range(link)
     half = item.dimensions_m / 2
     for axis in (0, 2):
         low[axis] = -_FAR_M if low[axis] < -half[axis] + _TOUCH_M else low[axis]
         high[axis] = _FAR_M if high[axis] > half[axis] - _TOUCH_M else high[axis]
-    low[1] = -_FAR_M
+    low[1] = _range(link, link.boxes)[0][1] - tuned(Params).before_m if _shares_its_box(item) else -_FAR_M
     return Region(low=low, high=high)
 
 
@@ -79,14 +96,14 @@ def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
     """The inside of the carcass, between its boards; empty (low > high) unless both sides, top, bottom and back have one."""
     params = tuned(Params)
     base = item.links[0]
-    half = item.dimensions_m / 2
+    first, last = _body(item)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for box in base.of_role("carcass"):
         start, end = _range(base, (box,))
         axis = int(np.argmin(end - start))
-        if start[axis] < -half[axis] + _TOUCH_M:
+        if start[axis] < first[axis] + _TOUCH_M:
             low[axis] = min(low[axis], end[axis])
-        if end[axis] > half[axis] - _TOUCH_M:
+        if end[axis] > last[axis] - _TOUCH_M:
             high[axis] = max(high[axis], start[axis])
         if axis == 0:
             low[1] = min(low[1], start[1] - params.behind_m)  # the front edges of the sides

@@ -133,6 +133,7 @@ def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: R
         assert offered[name][0] == name
     assert offered["sink"] == ("sink cabinet", "revolute")
     assert offered["chest_of_drawers"] == ("drawer stack", "prismatic")
+    assert offered["sliding_wardrobe_door"] == ("sliding door", "prismatic")
     project = web.sample()
     for name in ("bottle", "sink", "Chest of Drawers"):
         assert web.post(f"/api/projects/{project}/objects", {"category": name}, 201)["notices"] == []

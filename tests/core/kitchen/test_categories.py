@@ -20,7 +20,7 @@ from tests.core.synthesize.kitchen_units import Unit, capture
 from tests.core.synthesize.test_build_scene import built
 
 PAIRED = {"double_door_cabinet", "double_door_wall_cabinet", "sink_cabinet", "double_sink_cabinet"}
-OPENS = {"drawer": "prismatic", "side": "revolute", "pair": "revolute", "bottom": "revolute"}
+OPENS = {"drawer": "prismatic", "sideways": "prismatic", "side": "revolute", "pair": "revolute", "bottom": "revolute"}
 
 
 def built_as(name: str, category: Category) -> SceneObject:
@@ -43,7 +43,7 @@ def test_every_line_is_whole(category: Category) -> None:
         assert 0 < size.low <= size.usual <= size.high
         assert len(size.source) > 20
     assert (category.fixture is None) == (category.opens == "rigid") == (fixture_of(category) is None)
-    assert (category.hinge is not None) == (category.opens in ("side", "bottom"))
+    assert (category.hinge is not None) == (category.opens in ("side", "bottom", "sideways"))
     if category.wider is not None:
         least, other = category.wider
         assert category_of(other).opens == "pair"
@@ -90,6 +90,7 @@ def test_every_name_is_the_same_in_every_stage(category: Category, monkeypatch: 
         ("two_door_cabinet", "front", "pair", 0.58),
         ("microwave_oven", "appliance", "side", 0.38),
         ("upper_cabinet", "front", "side", 0.35),
+        ("sliding wardrobe doors", "front", "sideways", 0.58),
         ("wall oven", "front", "bottom", 0.58),
         ("refrigerator", "appliance", "side", 0.65),
         ("hood", "appliance", "fixed", 0.45),

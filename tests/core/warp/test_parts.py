@@ -12,7 +12,7 @@ from r2c2r_core.model.scene import Box, SceneObject
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from r2c2r_core.warp.parts import cavity, cut_apart, front_region
 from r2c2r_core.warp.solids import with_plain_colours
-from tests.core.synthesize.kitchen_units import Unit, capture, placed_unit
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 WALL_M, FRONT_M = 0.015, 0.018  # a cabinet's boards
 
@@ -99,3 +99,20 @@ def test_fronts_reach_to_the_units_edge_and_stop_at_their_seam() -> None:
     assert right.low[0] - left.high[0] == pytest.approx(0.003, abs=1e-9)
     assert left.low[1] < -1  # the handle, however far it stands out
     assert left.high[1] == pytest.approx(-item.dimensions_m[1] / 2 + FRONT_M, abs=1e-9)
+
+
+def test_what_is_left_of_a_sliding_leafs_mesh_lies_clear_of_the_other_leafs_track() -> None:
+    """Front leaf and rear leaf 26 mm behind it: a body drawn over the whole box would stand where the rear one slides."""
+    front = Unit("front", "sliding_door", (0.0, 0.0, 0.5), (0.6, 0.58, 0.7))
+    rear = Unit("rear", "sliding_door", (0.58, 0.013, 0.5), (0.56, 0.554, 0.7), handle=Handle(0.2, 0.0, out=0.035))
+    made = zip(*(placed_unit(each, np.random.default_rng(0)) for each in (front, rear)), strict=True)
+    items = {item.name: item for item in build_scene(capture(), *made, Overrides(objects={}), SynthesizeConfig()).objects}
+    visuals = {name: cut(items[name]) for name in ("front", "rear")}
+    track_back = -0.29 + 0.026 + FRONT_M
+    assert visuals["front"]["front_base"].vertices[:, 1].min() > track_back
+    body = visuals["front"]["front_base"].vertices[:, 0].max(), visuals["rear"]["rear_base"].vertices[:, 0].min()
+    assert body[0] < body[1] + items["rear"].world_from_object.translation[0] - items["front"].world_from_object.translation[0]
+    # the front leaf passes 8 mm before the rear one, handle and all
+    assert front_region(items["rear"], items["rear"].links[1]).low[1] > -items["rear"].dimensions_m[1] / 2 - 0.008
+    low, high = cavity(items["front"])
+    assert (high - low > 0.4).all()

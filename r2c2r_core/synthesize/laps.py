@@ -1,0 +1,84 @@
+"""Leaves that slide sideways: which pass each other, where they cover each other, and how much of the rear one that hides."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.edits import edge_moved
+from r2c2r_core.synthesize.fixtures.spec import Lap
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Leaves on tracks one behind the other."""
+
+    overlap_m: tuple[float, float] = param(
+        (0.015, 0.10),
+        "m",
+        "least and most by which leaves cover each other",
+        source="makers of sliding doors: 20 mm at each joint of two, three or four doors, to stiles of 80 mm",
+    )
+    step_m: tuple[float, float] = param(
+        (0.008, 0.07),
+        "m",
+        "least and most from the face of one leaf to the next one's: less is one track",
+        source="panes of glass of 5 mm in one profile; double tracks of wardrobes are 80 mm deep in all",
+    )
+    apart_m: float = param(0.03, "m", "between what is seen of two leaves that cover each other")
+
+
+def lapped(objects: Sequence[MeasuredObject]) -> tuple[MeasuredObject, ...]:
+    """The objects, every sliding leaf with the leaves that it passes, as they stand."""
+    return tuple(replace(item, laps=_laps(item, objects)) for item in objects)
+
+
+def lap_of(item: MeasuredObject, other: MeasuredObject) -> Lap | None:
+    """Where two leaves of one unit cover each other, as the first one sees it; None where they do not pass each other."""
+    params = tuned(Params)
+    sideways = item.spec.opens == other.spec.opens == "sideways"
+    if item is other or not sideways or float(item.outward @ other.outward) < 0.99:
+        return None
+    x, behind, z = item.world_from_object.rotation.T @ (other.front_centre - item.front_centre)
+    (width, _, height), (other_width, _, other_height) = item.dimensions_m, other.dimensions_m
+    overlap = float((width + other_width) / 2 - abs(x))
+    level = (height + other_height) / 2 - abs(z) > 0.5 * min(height, other_height)
+    tracks = params.step_m[0] <= abs(behind) <= params.step_m[1]
+    if not (level and tracks and -params.apart_m < overlap < params.overlap_m[1] + params.apart_m):
+        return None
+    return Lap(
+        other=other.name,
+        side="right" if x > 0 else "left",
+        overlap_m=overlap,
+        behind_m=float(behind),
+        reach_m=float(other_width - overlap),
+    )
+
+
+def with_hidden_edges(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
+    """The objects, rear leaves as wide as those in front of them: leaves of one unit are, and the edge behind is not seen."""
+    return [_with_hidden_edges(item, objects) for item in objects]
+
+
+def _laps(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> tuple[Lap, ...]:
+    return tuple(lap for other in objects if (lap := lap_of(item, other)) is not None)
+
+
+def _with_hidden_edges(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> MeasuredObject:
+    params = tuned(Params)
+    hidden = [lap for lap in _laps(item, objects) if lap.behind_m < 0]
+    if not hidden or item.fixed_by_person:
+        return item
+    before = {lap.other for lap in hidden}
+    wanted = float(np.mean([other.dimensions_m[0] for other in objects if other.name in before]))
+    seen_m = float(item.dimensions_m[0]) - sum(lap.overlap_m for lap in hidden)
+    overlap_m = float(np.clip((wanted - seen_m) / len(hidden), *params.overlap_m))
+    pose = item.world_from_object
+    for lap in hidden:
+        item = edge_moved(item, 1.0 if lap.side == "right" else -1.0, lap.overlap_m - overlap_m)
+    shift = item.world_from_object @ pose.inverse
+    _, depth_source, height_source = item.sources
+    # the mesh stays where it was placed: only the box grew
+    return replace(item, placed_pose=shift @ item.placed_pose, sources=("inferred", depth_source, height_source))
