@@ -21,9 +21,13 @@ def trimmed(item: MeasuredObject, axis: int, sign: float, amount_m: float) -> Me
     return replace(moved(item, shift), dimensions_m=size)
 
 
-def edge_moved(item: MeasuredObject, sign: float, inwards_m: float) -> MeasuredObject:
-    """The front with one side edge (-1 left, +1 right) drawn in, or let out where negative; its handle stays in the room."""
+def edge_moved(item: MeasuredObject, axis: int, sign: float, inwards_m: float) -> MeasuredObject:
+    """The front with one edge drawn in, or let out where negative; its handle stays in the room.
+
+    `axis` and `sign` name the edge in the object frame: 0 left (-1) or right (+1), 2 bottom or top.
+    """
     handle, shift = item.handle, sign * inwards_m / 2
     if handle is not None:  # while the front's centre moves
-        handle = replace(handle, left_m=handle.left_m + shift, right_m=handle.right_m + shift)
-    return replace(trimmed(item, 0, sign, inwards_m), handle=handle)
+        ends = ("left_m", "right_m") if axis == 0 else ("bottom_m", "top_m")
+        handle = replace(handle, **{end: getattr(handle, end) + shift for end in ends})
+    return replace(trimmed(item, axis, sign, inwards_m), handle=handle)

@@ -53,6 +53,6 @@ def _is_front(item: MeasuredObject) -> bool:
 
 def _drawn_in(item: MeasuredObject, sign: float, amount_m: float, other: str) -> MeasuredObject:
     warning = f"{1000 * amount_m:.0f} mm of its width left as the filler at the corner with {other}"
-    narrower = edge_moved(item, sign, amount_m)
+    narrower = edge_moved(item, 0, sign, amount_m)
     _, depth_source, height_source = item.sources
     return replace(narrower, sources=("inferred", depth_source, height_source), warnings=(*item.warnings, warning))

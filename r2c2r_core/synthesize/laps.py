@@ -27,7 +27,15 @@ class Params:
         "least and most from the face of one leaf to the next one's: less is one track",
         source="panes of glass of 5 mm in one profile; double tracks of wardrobes are 80 mm deep in all",
     )
-    apart_m: float = param(0.03, "m", "between what is seen of two leaves that cover each other")
+    apart_m: float = param(
+        0.09,
+        "m",
+        "between what was cut of two leaves that cover each other",
+        source="a cut that ends at the sunk panel of a framed leaf leaves out its stile of 50-90 mm",
+    )
+    level_m: float = param(
+        0.02, "m", "between their tops, or bottoms, from which on the front one's holds for both: the rear one is in its shadow"
+    )
 
 
 def lapped(objects: Sequence[MeasuredObject]) -> tuple[MeasuredObject, ...]:
@@ -58,7 +66,10 @@ def lap_of(item: MeasuredObject, other: MeasuredObject) -> Lap | None:
 
 
 def with_hidden_edges(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
-    """The objects, rear leaves as wide as those in front of them: leaves of one unit are, and the edge behind is not seen."""
+    """The objects, rear leaves as wide as those in front of them, and level with them.
+
+    Leaves of one unit are; an edge behind another leaf is not seen, and a top that ends elsewhere was cut wrongly.
+    """
     return [_with_hidden_edges(item, objects) for item in objects]
 
 
@@ -71,14 +82,24 @@ def _with_hidden_edges(item: MeasuredObject, objects: Sequence[MeasuredObject]) 
     hidden = [lap for lap in _laps(item, objects) if lap.behind_m < 0]
     if not hidden or item.fixed_by_person:
         return item
-    before = {lap.other for lap in hidden}
-    wanted = float(np.mean([other.dimensions_m[0] for other in objects if other.name in before]))
+    names = {lap.other for lap in hidden}
+    before = [other for other in objects if other.name in names]
+    wanted = float(np.mean([other.dimensions_m[0] for other in before]))
     seen_m = float(item.dimensions_m[0]) - sum(lap.overlap_m for lap in hidden)
     overlap_m = float(np.clip((wanted - seen_m) / len(hidden), *params.overlap_m))
     pose = item.world_from_object
     for lap in hidden:
-        item = edge_moved(item, 1.0 if lap.side == "right" else -1.0, lap.overlap_m - overlap_m)
-    shift = item.world_from_object @ pose.inverse
+        item = edge_moved(item, 0, 1.0 if lap.side == "right" else -1.0, lap.overlap_m - overlap_m)
     _, depth_source, height_source = item.sources
+    for sign in (-1.0, 1.0):
+        off = sign * (_end_z(item, sign) - float(np.mean([_end_z(other, sign) for other in before])))
+        if abs(off) > params.level_m:
+            item, height_source = edge_moved(item, 2, sign, off), "inferred"
+    shift = item.world_from_object @ pose.inverse
     # the mesh stays where it was placed: only the box grew
     return replace(item, placed_pose=shift @ item.placed_pose, sources=("inferred", depth_source, height_source))
+
+
+def _end_z(item: MeasuredObject, sign: float) -> float:
+    """Height of its top (+1) or bottom (-1) in the world."""
+    return float(item.world_from_object.translation[2] + sign * item.dimensions_m[2] / 2)

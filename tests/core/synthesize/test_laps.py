@@ -6,8 +6,10 @@ from itertools import product
 import numpy as np
 import pytest
 
+from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.model.inputs import ObjectOverride, Overrides
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.synthesize.clearance import link_boxes
 from tests.core.synthesize.kitchen_units import Handle, Unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached
 from tests.core.synthesize.test_build_scene import built, the
@@ -88,6 +90,30 @@ def test_two_leaves_of_one_unit_are_level() -> None:
     scene = built(FRONT, replace(REAR, centre=(REAR.centre[0], REAR.centre[1], 0.506)))
     tops = [item.world_from_object.translation[2] + item.dimensions_m[2] / 2 for item in scene.objects[:2]]
     assert tops[0] == pytest.approx(tops[1], abs=1e-4)
+
+
+def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_reaches_behind_it() -> None:
+    """Its stile of 6 cm and its upper rail of 8 cm left out: the door in front shows both."""
+    x, y, z = REAR.centre
+    width, depth, height = REAR.size
+    low = replace(REAR, centre=(x + 0.03, y, z - 0.04), size=(width - 0.06, depth, height - 0.08))
+    scene = built(FRONT, low)
+    item = door(scene, "rear")
+    assert item.dimensions_m[2] == pytest.approx(height, abs=0.004)
+    assert item.world_from_object.translation[2] == pytest.approx(z, abs=0.003)
+    assert item.dimension_sources[2] == "inferred"
+    assert item.dimensions_m[0] == pytest.approx(WIDTH_M, abs=0.004)
+    grip = next(box for box in item.links[1].boxes if box.role == "handle")
+    at = item.world_from_object.apply(grip.link_from_box.translation[None])[0]
+    assert at[[0, 2]] == pytest.approx([x + 0.03 + 0.22, z - 0.04 + 0.1], abs=0.004)  # where it was seen
+    assert min(joint.upper for each in scene.objects[:2] for joint in each.joints) > 0.5
+
+
+def test_each_has_its_own_half_of_what_is_behind_both(scene: ArticulatedScene) -> None:
+    (ours, theirs) = (link_boxes(item, item.links[0]) for item in (door(scene, "front"), door(scene, "rear")))
+    repeated = Boxes(*(np.repeat(part, len(theirs.centres), axis=0) for part in ours))
+    tiled = Boxes(*(np.concatenate([part] * len(ours.centres)) for part in theirs))
+    assert box_penetration(repeated, tiled).max() < -0.001
 
 
 @pytest.mark.parametrize(("handle", "towards"), [(Handle(-0.24, 0.1), 1.0), (Handle(0.24, 0.1), -1.0)])
