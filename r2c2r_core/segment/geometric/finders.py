@@ -17,6 +17,7 @@ from r2c2r_core.segment.fronts.front import Front, depth_to_wall, find_front, se
 from r2c2r_core.segment.planes import PlaneRegion, region_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
+from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
 from r2c2r_core.segment.things.standing_mask import standing_colours
 from r2c2r_core.segment.things.thing import ThingConfig, find_thing, sized_as
@@ -146,6 +147,11 @@ def _thing(
             colours = standing_colours(standing, prepared.scene, prepared.scene.frames)
             coloured = replace(standing, thing=replace(standing.thing, colours=colours))
             return FoundStanding(coloured, prepared.scene)
+    if config.round:
+        on, off = ([Sight(*prepared.scene.ray(c.frame, c.x, c.y)) for c in prompt.points if c.label == sign] for sign in (1, 0))
+        body = find_round(prepared.scene, on, off, positives[0], config, _structure_off(prepared, positives[0]))
+        if body is not None:
+            return FoundThing(replace(body, clicks=prompt.points), prepared.scene, small=True, round=True)
     if config.radius_m < tuned(Params).small_m:
         small = find_small(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
         if small is not None:

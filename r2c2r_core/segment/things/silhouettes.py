@@ -32,8 +32,7 @@ class Params:
     border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
     sure_odds: float = param(9.0, "log", "of a pixel that is known")
     on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
-    attached_m: float = param(0.035, "m", "from the hull: handles and caps that it lacks")
-    attached_odds: float = param(3.2, "log", "of such a place: depth and colour together may add it")
+    attached_odds: float = param(3.2, "log", "of a place where a handle may be: depth and colour together may add it")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +83,7 @@ def crop_outline(
     odds = seen_odds(thing, scene, frame, crop)
     shift = _best_shift(crop.hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale))
     hull = _moved(crop.hull, shift)
-    odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), params.attached_m * scale)
+    odds = odds + _outline_odds(hull, max(1.5, (band_m or thing.border_m) * scale), thing.attached_m * scale)
     odds[crop.hidden] = -params.sure_odds
     for click in thing.clicks:
         if click.frame == frame.index:

@@ -1,5 +1,6 @@
 """The height at which a frame's depth shows what things stand on: a frame's pose error along the vertical."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,3 +52,9 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
 def raised(points: Points, lift_m: float) -> Points:
     """World points lifted by a height."""
     return points + np.array([0.0, 0.0, lift_m])
+
+
+def pose_spread(offsets_m: Sequence[float]) -> float:
+    """How much frames disagree about the height of a support: the median absolute deviation of their offsets."""
+    offsets = np.array(offsets_m)
+    return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0

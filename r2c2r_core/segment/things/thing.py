@@ -44,6 +44,7 @@ class ThingConfig:
     radius_m: float  # half its largest side, about
     width_m: float | None = None  # across, about, where the name says it
     round: bool = False  # as deep as wide
+    handled: bool = False  # may have a handle
     on_floor: bool = False
     flat_top: bool = False
     tallest_m: float = 1.1
@@ -55,6 +56,7 @@ def sized_as(category: Category) -> ThingConfig:
         radius_m=min(category.longest_m / 2, tuned(Params).farthest_m),
         width_m=category.width.usual if category.round else None,
         round=category.round,
+        handled=category.open_vessel,
         on_floor=category.on_floor,
         flat_top=category.flat_top,
         tallest_m=category.height.high,
@@ -71,6 +73,7 @@ class Thing:
     spacing_m: float = 0.01  # between neighbouring vertices
     pose_error_m: float = 0.02  # how far a frame may show it from where it stands
     border_m: float = 0.006  # how far its outline may be off
+    attached_m: float = 0.035  # about its outline, where handles and caps may be that it lacks
     colours: ColourModel | None = None  # learned from where frames are sure
     clicks: tuple[PromptPoint, ...] = ()  # what a person said of single pixels holds in their frames
 

@@ -13,7 +13,7 @@ from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.cylinder import Params as CylinderParams
 from r2c2r_core.segment.things.cylinder import upright_shape
 from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline, usual_shift
-from r2c2r_core.segment.things.support import raised, support_offset
+from r2c2r_core.segment.things.support import pose_spread, raised, support_offset
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, support_height
 from r2c2r_core.segment.things.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 from r2c2r_core.segment.viewpoints import best_views
@@ -175,8 +175,7 @@ def _from_hull(thing: Thing, click: Vector3, views: list[Frame]) -> float:
 
 def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre: Vector3) -> float:
     """How much the frames disagree about the height of the support: the median absolute deviation."""
-    offsets = np.array([support_offset(scene, frame, support, centre) for frame in views])
-    return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0
+    return pose_spread([support_offset(scene, frame, support, centre) for frame in views])
 
 
 def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support: float | None, count: int) -> Voxels:

@@ -131,6 +131,58 @@ def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     return _filmed("dining", poses, [_packed(boxes, ["table", "carton", "chair"])] * len(poses), ())
 
 
+BOTTLE = (0.10, -0.35)
+"""Plan of the bottle's axis."""
+BOTTLE_PROFILE = ((0.04, 0.0), (0.04, 0.16), (0.014, 0.19), (0.014, 0.215))
+"""Radius and height of the bottle's corners above the worktop; a cap of another colour goes on to the last height."""
+CAP_M, WORKTOP_M = 0.24, 0.90
+
+
+def bottle() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """A bottle with a cap before a wall with a dark patch, beside another one, and their true masks.
+
+    Its colours are those of the patch: only depth and views from several sides tell them apart.
+    """
+    boxes: list[Named] = [
+        ((-1.5, 0.0, 0.0), (2.0, 0.02, 2.4), (200, 202, 198), None),  # wall
+        ((-0.06, -0.002, 0.90), (0.06, 0.0, 1.12), (110, 118, 112), None),  # as a shadow on it
+        ((-1.5, -0.62, 0.86), (2.0, 0.0, WORKTOP_M), (70, 74, 80), None),
+        ((-1.5, -3.5, -0.02), (2.0, 0.0, 0.0), (120, 100, 80), None),
+    ]
+    shapes, _ = _packed(boxes, [])
+    turned = [
+        _lathe((*BOTTLE, WORKTOP_M), BOTTLE_PROFILE, (105, 115, 108), 1),
+        _lathe((*BOTTLE, WORKTOP_M), (BOTTLE_PROFILE[-1], (0.014, CAP_M)), (60, 62, 150), 1),
+        _lathe((0.28, -0.30, WORKTOP_M), BOTTLE_PROFILE, (170, 90, 60), 2),
+    ]
+    for part in turned:
+        shapes = Shapes(
+            np.concatenate([shapes.vertices, part.vertices]),
+            np.concatenate([shapes.faces, part.faces + len(shapes.vertices)]),
+            np.concatenate([shapes.colours, part.colours]),
+            np.concatenate([shapes.ids, part.ids]),
+        )
+    eyes = [np.array([x, -1.25 + 0.2 * abs(x), 1.2 + 0.1 * np.cos(5 * x)]) for x in np.linspace(-0.7, 0.9, 14)]
+    poses = [look_at(eye, np.array([*BOTTLE, 1.0])) for eye in eyes]
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
+    return _filmed("bottle", poses, [(shapes, ["bottle", "other"])] * len(poses), (wall,))
+
+
+def _lathe(
+    foot: tuple[float, float, float], profile: tuple[tuple[float, float], ...], colour: tuple[int, int, int], number: int
+) -> Shapes:
+    """A body of revolution with a lid, lighter on one side."""
+    sides = 32
+    angles = np.arange(sides) / sides * 2 * np.pi
+    rings = [(radius, z) for radius, z in (*profile, (0.0, profile[-1][1]))]
+    at = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in rings for a in angles]) + foot
+    k, j = (grid.ravel() for grid in np.meshgrid(np.arange(len(rings) - 1), np.arange(sides), indexing="ij"))
+    a, b = k * sides + j, k * sides + (j + 1) % sides
+    faces = np.concatenate([np.column_stack([a, b, b + sides]), np.column_stack([a, b + sides, a + sides])])
+    shade = np.tile(0.9 + 0.1 * np.cos(angles), len(rings))[:, None]
+    return Shapes(at, faces, np.array(colour) * shade, np.full(len(at), float(number)))
+
+
 def _legs(box: Corners, width: float, height: float, colour: tuple[int, int, int], name: str) -> list[Named]:
     """Four posts in the corners of a box."""
     (left, near, _), (right, far, _) = box
