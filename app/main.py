@@ -54,7 +54,7 @@ from app.services.at_work import AtWork
 from app.services.context import Context
 from app.services.descriptions import Descriptions
 from app.services.people import People
-from app.services.prompts import tell_object
+from app.services.prompts import segment_again, tell_object
 from app.services.uploads import forget_stopped
 from app.settings import MEBIBYTE, Settings, shipped
 from app.viewer.client import Viewer
@@ -147,6 +147,7 @@ def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) 
     )
     context.descriptions.start()
     context.live.on_object = lambda project, number: _tell(context, project, number)
+    context.live.on_again = lambda project, number, key, others: _again(context, project, number, key, others)
     if settings.run_jobs:
         runner.start()
         masks.resume(context)
@@ -196,6 +197,13 @@ TIDYING = (
 def _tell(context: Context, project: str, number: int) -> None:
     try:
         tell_object(context, project, number)
+    except R2C2RError:  # deleted meanwhile
+        return
+
+
+def _again(context: Context, project: str, number: int, key: str, others: list[int]) -> None:
+    try:
+        segment_again(context, project, number, key, others)
     except R2C2RError:  # deleted meanwhile
         return
 

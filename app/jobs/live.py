@@ -32,14 +32,19 @@ VANISHED = body("worker-died", "the live segmenter ended early", "click again to
 
 
 class LiveSegmenters:
-    """All live segmenters. `on_object` is told of every object whose masks came to an end."""
+    """All live segmenters. `on_object` is told of every object whose masks came to an end.
+
+    `on_again` is told of every object whose masks are to be drawn anew, with their key, for clicks on these others.
+    """
 
     def __init__(self, engine: Engine, hub: Hub, settings: Settings, commands: Commands) -> None:
         self._engine, self._hub, self._settings, self._commands = engine, hub, settings, commands
         self._sessions: dict[str, LiveSession] = {}
         self._ended: dict[str, LiveSession] = {}  # the last failure of each project
         self._lock = threading.RLock()
+        self.telling = threading.Lock()  # held while objects are read and told: what is told last was read last
         self.on_object: Callable[[str, int], None] = lambda project, number: None
+        self.on_again: Callable[[str, int, str, list[int]], None] = lambda project, number, key, others: None
 
     def open(self, project: str, files: ProjectFiles, segmenter: str) -> None:
         """Start the project's process unless it runs."""
@@ -60,12 +65,36 @@ class LiveSegmenters:
             session = self._sessions.get(project) or self._ended.get(project)
             return session.status if session else schemas.LiveStatus(state="off", fraction=0.0, text="", error=None)
 
-    def segment(self, project: str, files: ProjectFiles, segmenter: str, number: int, key: str, prompt: dict[str, Any]) -> None:
-        """Compute the object's masks for these clicks, before anything asked for earlier; a newer call supersedes."""
+    def runs(self, project: str) -> bool:
+        """Whether there is a process for the project."""
+        with self._lock:
+            return project in self._sessions
+
+    def know(self, project: str, objects: list[dict[str, Any]]) -> None:
+        """Tell the project's process, if there is one, of all its objects as app.jobs.disputes reads them."""
+        with self._lock:
+            session = self._sessions.get(project)
+            if session is not None:
+                session.know(objects)
+
+    def segment(
+        self,
+        project: str,
+        files: ProjectFiles,
+        segmenter: str,
+        number: int,
+        key: str,
+        prompt: dict[str, Any],
+        objects: list[dict[str, Any]] | None,
+    ) -> None:
+        """Compute the object's masks for these clicks, before anything asked for earlier; a newer call supersedes.
+
+        With it the process is told of all the project's objects; None where a call that follows at once tells it.
+        """
         self.open(project, files, segmenter)
         with self._lock:
             session = self._sessions.get(project) or self._started(project, files, segmenter)  # it may be gone again
-            session.segment(number, key, prompt)
+            session.segment(number, key, prompt, objects)
 
     def proposing(self, project: str) -> tuple[float, list[dict[str, Any]]] | None:
         """The share of the work of proposing that is done, and what came of it; None when nobody is at it."""
@@ -114,7 +143,8 @@ class LiveSegmenters:
         width = str(self._settings.preview_width)
         options = ("--width", width, "--segmenter", segmenter, "--elevations", str(files.elevations))
         worker = Worker((*self._commands.live, str(files.work), *options), files.root / "logs" / "live.log")
-        session = LiveSession(project, files, segmenter, worker, self._hub, self._lock, self._tell_object)
+        told = self._tell_object, self._tell_again
+        session = LiveSession(project, files, segmenter, worker, self._hub, self._lock, *told)
         session.proposals_path = None if files.proposals.is_file() else files.proposals
         self._sessions[project] = session
         self._ended.pop(project, None)
@@ -183,14 +213,18 @@ class LiveSegmenters:
         _log.warning("the live segmenter of %s vanished: started anew", lost.project)
         session = self._started(lost.project, lost.files, lost.segmenter)
         session.deaths, session.watched, session.at_work = lost.deaths + 1, lost.watched, lost.at_work or session.at_work
+        session.objects = lost.objects
         for number, task in lost.tasks.items():
             if task.is_open:
-                session.segment(number, task.key, task.prompt)
+                session.segment(number, task.key, task.prompt, None)
         lost.tasks.clear()
         session.tell_status()
 
     def _tell_object(self, project: str, number: int) -> None:
         self.on_object(project, number)
+
+    def _tell_again(self, project: str, number: int, key: str, others: list[int]) -> None:
+        self.on_again(project, number, key, others)
 
     def _store_work(self, session: LiveSession) -> None:
         """Store when it was at work; not under the lock, for whoever writes to the database may wait for that."""

@@ -1,11 +1,14 @@
 """The live segmenter of one project, in a process of its own: `python -m app.jobs.live_segment WORKDIR --width 960
 --segmenter geometric --elevations FOLDER`.
 
-Reads JSON lines: {"cmd": "segment", "object", "key", "prompt"} · {"cmd": "cancel", "object"} · {"cmd": "propose"} · end of
-input stops it.
+Reads JSON lines: {"cmd": "segment", "object", "key", "prompt", "objects"} · {"cmd": "cancel", "object"} · {"cmd": "objects",
+"objects"} · {"cmd": "propose"} · end of input stops it. `objects` are all of the project as they are now (app.jobs.disputes);
+with a segment they are left out where more is asked at once.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
 {"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
-differs) and {"object", "key", "end", "front"}. The newest click goes first; the objects it interrupted go on afterwards.
+differs) and {"object", "key", "end", "front", "others"}. The newest click goes first; the objects it interrupted go on
+afterwards. {"object", "key", "again": [...]} asks for a segment of an object whose masks are others since these objects are
+clicked where they are; of none, since none is any more.
 Proposals, {"proposals": [...], "fraction"}, wait until no click does.
 """
 
@@ -17,11 +20,12 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from app.errors import told
+from app.jobs.disputes import Again, Disputes, others_line, read_prompt
 from app.jobs.elevation_files import write_elevations
 from app.jobs.front_wire import front_line
 from app.jobs.mask_wire import mask_bits
@@ -29,11 +33,11 @@ from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.progress import Progress
 from r2c2r_core.segment.corrected import as_found, corrected_stream
-from r2c2r_core.segment.prompts import check_prompt, parse_prompts
+from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.protocol import Glimpse, SegmentSession
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
 from r2c2r_core.workspace import Workspace
@@ -82,8 +86,9 @@ class _Followed:
 
     key: str
     prompt: ObjectPrompt
-    masks: Iterator[Glimpse]
+    said: tuple[FrameSaid, ...]  # of it, in single frames
     glimpsed: Glimpse | None  # already shown
+    masks: Iterator[Glimpse] | None = None  # None until its turn comes
 
 
 class Desk:
@@ -97,6 +102,9 @@ class Desk:
         self.session, self.capture, self.width = session, capture, width
         self.total = len(capture.frames)
         self._open: dict[int, _Followed] = {}
+        self._objects: list[dict[str, Any]] = []  # the project's, as last told
+        self._settled = self._objects  # those whose disputes are known
+        self._disputes = Disputes(session, self._front)
         self._prefetching: Iterator[None] | None = session.prefetch()
         self._proposing: Iterator[tuple[float, tuple[Proposal, ...]]] | None = None
         self._closed = False
@@ -120,45 +128,85 @@ class Desk:
                 self._proposing = self._proposing or self.session.propose()
                 self._changed.notify()
             return
+        if command["cmd"] == "objects":
+            self._learn(command["objects"])
+            return
         number = int(command["object"])
         with self._changed:
             stopped = self._open.pop(number, None)
             if stopped is not None and command["cmd"] == "cancel":
                 _say(object=number, key=stopped.key, end="cancelled")
         if command["cmd"] == "segment":
-            self._follow(number, str(command["key"]), command["prompt"])
+            self._follow(number, str(command["key"]), command["prompt"], command.get("objects"))
 
-    def _follow(self, number: int, key: str, document: dict[str, Any]) -> None:
-        """Show a first look, then let the frames be gone through."""
+    def _learn(self, objects: list[dict[str, Any]]) -> None:
+        with self._changed:
+            self._objects = objects
+            self._changed.notify()
+
+    def _follow(self, number: int, key: str, document: dict[str, Any], objects: list[dict[str, Any]] | None) -> None:
+        """Show a first look, then let the frames be gone through.
+
+        What the click means for others, and theirs for it, is found out after that look: nobody waits for it.
+        """
         try:
-            prompt = _prompt(document)
+            prompt = read_prompt(document)
             check_prompt(self.capture, prompt)
-            asked = as_found(prompt)
+            asked = replace(as_found(prompt), others=self._disputes.drawn_with(number, key) or ())
             glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # it may be of a frame that is set right
             first = self._shown(glimpsed) if glimpsed is not None else None
-            masks = corrected_stream(iter(self.session.stream(asked)), prompt.frames)
         except Exception as error:
             _say(object=number, key=key, **_failed(error))
+            if objects is not None:
+                self._learn(objects)
             return
         with self._changed:
             if first is not None:
                 _say(object=number, key=key, **first)
-            self._open[number] = _Followed(key, asked, masks, glimpsed)
+            self._open[number] = _Followed(key, asked, prompt.frames, glimpsed)
+            self._objects = self._objects if objects is None else objects
             self._changed.notify()
 
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._open or self._prefetching or self._proposing)
+                self._changed.wait_for(self._has_work)
                 if self._closed:
                     return
                 newest = next(reversed(self._open.items()), None)
-            if newest is not None:
+                waiting = {number for number, followed in self._open.items() if followed.masks is None}
+                objects = self._objects
+            if objects is not self._settled:
+                self._settle(objects, waiting)
+            elif newest is not None:
                 self._segment_step(*newest)
             elif self._prefetching is not None:
                 self._prefetch_step()
             else:
                 self._propose_step()
+
+    def _has_work(self) -> bool:
+        unsettled = self._settled is not self._objects
+        return self._closed or unsettled or bool(self._open or self._prefetching or self._proposing)
+
+    def _settle(self, objects: list[dict[str, Any]], waiting: set[int]) -> None:
+        """Find whose clicks fall on whose front, and ask for those anew whose masks are others by that."""
+        again: list[Again] = []
+        try:
+            again = self._disputes.settle(objects, waiting)
+        except Exception:  # clicks go on working without
+            traceback.print_exc()
+        with self._changed:
+            self._settled = objects
+            for number, key, clicked in again if self._objects is objects else ():
+                self._open.pop(number, None)  # nothing more of what it was before
+                self._disputes.draw(number, key)
+                _say(object=number, key=key, again=clicked)
+
+    def _begin(self, number: int, followed: _Followed) -> Iterator[Glimpse]:
+        """The object's masks, with the clicks on others that are known by now."""
+        followed.prompt = replace(followed.prompt, others=self._disputes.draw(number, followed.key))
+        return corrected_stream(iter(self.session.stream(followed.prompt)), followed.said)
 
     def _prefetch_step(self) -> None:
         assert self._prefetching is not None
@@ -186,8 +234,10 @@ class Desk:
     def _segment_step(self, number: int, followed: _Followed) -> None:
         found: Glimpse | None = None
         try:
+            if followed.masks is None:
+                followed.masks = self._begin(number, followed)
             found = next(followed.masks, None)
-            said = self._shown(found) if found is not None else {"end": "done", "front": self._front(followed.prompt)}
+            said = self._shown(found) if found is not None else self._done(followed.prompt)
         except Exception as error:  # one object must not take the others with it
             found, said = None, _failed(error)
         with self._changed:
@@ -197,6 +247,9 @@ class Desk:
                 del self._open[number]
             if found is None or found != followed.glimpsed:
                 _say(object=number, key=followed.key, **said)
+
+    def _done(self, prompt: ObjectPrompt) -> dict[str, Any]:
+        return {"end": "done", "front": self._front(prompt), "others": others_line(prompt.others)}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
         panel = self.session.panel(prompt)
@@ -222,10 +275,6 @@ def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
     return Desk(session, capture, width)
 
 
-def _prompt(document: dict[str, Any]) -> ObjectPrompt:
-    return parse_prompts({"version": 2, "objects": [document]}).objects[0]
-
-
 def _waiting(commands: Commands) -> list[dict[str, Any]] | None:
     """The next commands, without those that a later one about the same object makes pointless; None at the end."""
     waiting = [commands.get()]
@@ -234,8 +283,18 @@ def _waiting(commands: Commands) -> list[dict[str, Any]] | None:
             waiting.append(commands.get_nowait())
     if waiting[-1] is None:
         return None
-    last = {command.get("object"): position for position, command in enumerate(waiting) if command}
-    return [command for position, command in enumerate(waiting) if command and last[command.get("object")] == position]
+    last = {_subject(command): position for position, command in enumerate(waiting) if command}
+    kept = []
+    for position, command in enumerate(waiting):
+        if command and last[_subject(command)] == position:
+            kept.append(command)
+        elif command and "objects" in command:
+            kept.append({"cmd": "objects", "objects": command["objects"]})
+    return kept
+
+
+def _subject(command: dict[str, Any]) -> int | str:
+    return int(command["object"]) if "object" in command else str(command["cmd"])
 
 
 def _named(error: Exception) -> R2C2RError:

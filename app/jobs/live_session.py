@@ -1,5 +1,6 @@
 """What one project's live segmenter is at: its state, its objects' masks, its proposals, told to every tab as they come.
 
+It is told of all objects of the project, for a click on one may part the front of another: that is then drawn anew.
 The methods are called under the lock of app.jobs.live, but for `take`, which takes it.
 """
 
@@ -46,7 +47,7 @@ class Task:
 
 @dataclass(slots=True)
 class LiveSession:
-    """One project's process. `on_object` is told of every object whose masks came to an end."""
+    """One project's process. `on_object` hears of every object whose masks came to an end, `on_again` of each to draw anew."""
 
     project: str
     files: ProjectFiles
@@ -55,6 +56,7 @@ class LiveSession:
     hub: Hub
     lock: threading.RLock
     on_object: Callable[[str, int], None]
+    on_again: Callable[[str, int, str, list[int]], None]
     deaths: int = 0  # of processes before this one, since one finished an object
     state: schemas.LiveState = "starting"
     fraction: float = 0.0
@@ -64,6 +66,7 @@ class LiveSession:
     used: float = field(default_factory=time.monotonic)
     watched: float | None = None  # when a tab last looked; None when none ever did
     tasks: dict[int, Task] = field(default_factory=dict)
+    objects: list[dict[str, Any]] = field(default_factory=list)  # the project's, as app.jobs.disputes reads them
     proposals_path: Path | None = None  # where proposals go; None when they are there already
     proposals: list[dict[str, Any]] = field(default_factory=list)
     proposed: float = 0.0  # share of the work of proposing
@@ -83,14 +86,24 @@ class LiveSession:
         proposing = self.state == "ready" and self.proposals_path is not None
         return preparing or proposing or any(task.is_open for task in self.tasks.values())
 
-    def segment(self, number: int, key: str, prompt: dict[str, Any]) -> None:
-        """Compute the object's masks, before anything asked for earlier; what was asked about it before is superseded."""
+    def know(self, objects: list[dict[str, Any]]) -> None:
+        """The project's objects are these by now."""
+        self.objects = objects
+        if self.state == "ready":
+            self.worker.say({"cmd": "objects", "objects": objects})
+
+    def segment(self, number: int, key: str, prompt: dict[str, Any], objects: list[dict[str, Any]] | None) -> None:
+        """Compute the object's masks, before anything asked for earlier; what was asked about it before is superseded.
+
+        `objects` are the project's by now; None where they are told with another that is asked for at once.
+        """
         self.used = time.monotonic()
+        self.objects = self.objects if objects is None else objects
         path = mask_path(self.files.masks, number, key)
         mask_store.begin(path)
         task = self.tasks[number] = Task(key, path, prompt)
         if self.state == "ready":
-            self._send(number, task)
+            self._send(number, task, objects)
         self._note_work()
         self._tell_segment(number, task, restart=True)
 
@@ -117,6 +130,8 @@ class LiveSession:
             self._take_state(line)
         elif "proposals" in line:
             self._take_proposals(line)
+        elif "again" in line:
+            self.on_again(self.project, int(line["object"]), line["key"], line["again"])
         else:
             self._take_mask(line)
 
@@ -132,10 +147,11 @@ class LiveSession:
             self.error = told_body(line["error"]) if line.get("error") else None
             self.used = time.monotonic()
             if self.state == "ready":
+                self.know(self.objects)
                 for number, task in self.tasks.items():
                     if task.state == "waiting":
                         task.asked = time.monotonic()
-                        self._send(number, task)
+                        self._send(number, task, None)
                 if self.proposals_path is not None:
                     self.worker.say({"cmd": "propose"})
             self._note_work()
@@ -169,7 +185,7 @@ class LiveSession:
             self.used = time.monotonic()
             if "end" in line:
                 error = told_body(line["error"]) if line.get("error") else None
-                task.masks.front = line.get("front")
+                task.masks.front, task.masks.others = line.get("front"), line.get("others", [])
                 self._end_task(number, task, line["end"], error)
                 return
             first = task.state == "waiting"
@@ -190,15 +206,16 @@ class LiveSession:
         shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
         self.hub.publish("mask", self.project, object=number, **counts, **shown)
 
-    def _send(self, number: int, task: Task) -> None:
-        self.worker.say({"cmd": "segment", "object": number, "key": task.key, "prompt": task.prompt})
+    def _send(self, number: int, task: Task, objects: list[dict[str, Any]] | None) -> None:
+        command = {"cmd": "segment", "object": number, "key": task.key, "prompt": task.prompt}
+        self.worker.say(command if objects is None else {**command, "objects": objects})
 
     def _end_task(self, number: int, task: Task, end: str, error: dict[str, Any] | None) -> None:
         task.masks.end, task.masks.error = end, error
         task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
         self.deaths = 0 if end == "done" else self.deaths
         try:
-            mask_store.finish(task.path, end, error, task.masks.front)
+            mask_store.finish(task.path, end, error, task.masks.front, task.masks.others)
         except OSError:
             task.kept = False
         self._note_work()

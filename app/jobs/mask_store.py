@@ -1,6 +1,9 @@
 """Masks on disk: one file per object and prompt state, one JSON line per mask, so undo finds the older ones again.
 
 The last line of a file that came to its end says where each frame's line is: whoever looks at one frame reads one line.
+It also says with which clicks on other objects the masks were drawn. Those are no part of the key, for which clicks fall on
+a front only the prepared recording tells, long after the change that makes the key is stored. The live segmenter compares
+them with those of now whenever it starts and at every change, and has the masks drawn anew where they part it otherwise.
 """
 
 import base64
@@ -15,6 +18,7 @@ import numpy as np
 from r2c2r_core.workspace import write_atomically
 
 Entry = dict[str, Any]  # of one frame: {"frame", "confidence", "area", "mask"}
+Others = list[list[float]]  # clicks on other objects that fall on this one's front: frame, x, y of each
 
 _TAIL_BYTES = 1 << 16  # the last line of a file of some 1000 masks
 OUTDATED = "outdated"  # done before a file said what flat front was found
@@ -28,6 +32,7 @@ class Masks(Protocol):
     end: str | None  # done | failed | cancelled | OUTDATED; None when it never came to an end
     error: dict[str, Any] | None
     front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
+    others: Others  # drawn with these
 
     def __len__(self) -> int:
         """On how many frames there is one."""
@@ -47,6 +52,7 @@ class MaskFile:
     end: str | None = None
     error: dict[str, Any] | None = None
     front: dict[str, Any] | None = None
+    others: Others = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -71,6 +77,7 @@ class StoredMasks:
     error: dict[str, Any] | None = None
     backend: str = ""  # that drew them, where the file says so
     front: dict[str, Any] | None = None
+    others: Others = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.index)
@@ -120,13 +127,17 @@ def append(path: Path, line: dict[str, Any]) -> None:
         handle.write(json.dumps(line) + "\n")
 
 
-def finish(path: Path, end: str, error: dict[str, Any] | None, front: dict[str, Any] | None = None) -> None:
-    """Say how it came to its end, what flat front it has, and where each mask is."""
+def finish(
+    path: Path, end: str, error: dict[str, Any] | None, front: dict[str, Any] | None = None, others: Others | None = None
+) -> None:
+    """Say how it came to its end, what flat front it has, what it was drawn with, and where each mask is."""
     found = _scanned(path, path.read_bytes() if path.exists() else b"")
-    append(path, {"end": end, "error": error, "front": front, "index": _packed(found.index)})
+    append(path, {"end": end, "error": error, "front": front, "others": others or [], "index": _packed(found.index)})
 
 
-def write(path: Path, entries: list[Entry], backend: str, front: dict[str, Any] | None = None) -> None:
+def write(
+    path: Path, entries: list[Entry], backend: str, front: dict[str, Any] | None = None, others: Others | None = None
+) -> None:
     """A whole file at once, of what the backend drew."""
     lines, index, at = [], [], 0
     for entry in sorted(entries, key=lambda entry: int(entry["frame"])):
@@ -134,7 +145,8 @@ def write(path: Path, entries: list[Entry], backend: str, front: dict[str, Any] 
         index.append([entry["frame"], entry["confidence"], entry["area"], at, len(line)])
         lines.append(line)
         at += len(line)
-    end = {"end": "done", "error": None, "backend": backend, "front": front, "index": _packed(np.array(index, float))}
+    end = {"end": "done", "error": None, "backend": backend, "front": front, "others": others or []}
+    end |= {"index": _packed(np.array(index, float))}
     write_atomically(path, b"".join(lines) + json.dumps(end).encode() + b"\n")
 
 
@@ -186,7 +198,7 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
-    found.front = line.get("front")
+    found.front, found.others = line.get("front"), line.get("others", [])  # older files: every object was drawn alone
     if found.end == "done" and "front" not in line:
         found.end = OUTDATED
     index = line.get("index", [])  # numbers, in files of before they were packed

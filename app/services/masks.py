@@ -18,6 +18,7 @@ from app.errors import NotReady
 from app.file_cache import FileCache
 from app.files import ProjectFiles, project_files
 from app.jobs import mask_store
+from app.jobs.disputes import others_line
 from app.jobs.front_wire import front_line
 from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_file, mask_path
 from app.jobs.mask_wire import mask_bits
@@ -25,6 +26,7 @@ from app.services.context import Context
 from r2c2r_core.errors import PromptError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace, noun_path
 
@@ -71,7 +73,7 @@ def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     places = Places.of(context.files(project))
-    context.live.open(project_id, places.files, project.segmenter)
+    tell_objects(context, project, starts=True)
     for item in items:
         if _outdated(found_of(context, project, item, places)):
             segment(context, project_id, item.id or 0)
@@ -86,7 +88,7 @@ def segment(context: Context, project_id: str, object_id: int) -> None:
         clicks = queries.clicks_of(session, object_id)
     if not item.masks_key:
         raise PromptError(f"{item.name} has no click on it", hint="click on the object first, or draw its front")
-    _start(context, project, item, clicks)
+    _start(context, project, item, clicks, tells=True)
 
 
 def cancel(context: Context, project_id: str, object_id: int) -> None:
@@ -96,27 +98,49 @@ def cancel(context: Context, project_id: str, object_id: int) -> None:
     context.live.cancel(project_id, object_id)
 
 
-def follow(context: Context, project_id: str, object_id: int) -> None:
-    """Compute the masks of changed clicks, unless they are already there (after an undo, say) or nothing is clicked."""
+def segment_again(context: Context, project_id: str, object_id: int, key: str) -> bool:
+    """Compute the masks of these clicks of the object anew; False, and nothing, where it has others by now."""
+    with reading(context.engine) as session:
+        item = queries.object_row(session, project_id, object_id)
+    if item.masks_key != key:
+        return False
+    segment(context, project_id, object_id)
+    return True
+
+
+def tell_objects(context: Context, project: Project, *, starts: bool = False) -> None:
+    """Tell the live segmenter what is clicked by now: a click on one object may part another's front, or leave it whole again.
+
+    It is started for that where it is asked to, and where masks were drawn with clicks that are gone.
+    """
+    with context.live.telling:
+        objects = _objects(context, project)
+        if project.status == "ready" and (starts or _miss_clicks(objects)):
+            context.live.open(project.id, context.files(project), project.segmenter)
+        context.live.know(project.id, objects)
+
+
+def follow(context: Context, project_id: str, object_id: int, *, tells: bool = True) -> None:
+    """Compute the masks of changed clicks, unless they are already there (after an undo, say) or nothing is clicked.
+
+    Without `tells` another object follows at once, with which all are told.
+    """
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id, deleted=True)
         clicks = queries.clicks_of(session, object_id)
     found = found_of(context, project, item)
-    if item.deleted or not item.masks_key:
+    wanted, done = bool(item.masks_key) and not item.deleted, found is not None and found.state == "done"
+    if wanted and not done and project.status == "ready":
+        _start(context, project, item, clicks, tells=tells)
+        return
+    if not wanted:
         context.live.cancel(project_id, object_id)
-    elif found is not None and found.state == "done":
-        if found.source == "run":  # nothing to show anew
-            return
-        counts = {"done": len(found.masks), "total": len(found.masks)}
+    elif found is not None and done and found.source == "live":  # a run's are shown anyway
         context.live.cancel(project_id, object_id)
-        context.hub.publish("segment", project_id, object=object_id, state="done", error=None, restart=True, **counts)
-        for frame in found.masks.seen()[:, 0].astype(int).tolist():
-            if (entry := found.masks.entry(frame)) is not None:
-                shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
-                context.hub.publish("mask", project_id, object=object_id, **counts, **shown)
-    elif project.status == "ready":
-        _start(context, project, item, clicks)
+        _show(context, project_id, object_id, found.masks)
+    if tells:
+        tell_objects(context, project, starts=wanted)
 
 
 def resume(context: Context) -> None:
@@ -221,9 +245,46 @@ def _frame_mask(number: int, found: Found, entry: Entry) -> FrameMask:
     return shown | {"source": found.source, "mask": entry["mask"]}
 
 
-def _start(context: Context, project: Project, item: SceneObject, clicks: list[queries.Click]) -> None:
+def _start(context: Context, project: Project, item: SceneObject, clicks: list[queries.Click], *, tells: bool) -> None:
+    prompt, files = prompt_entry(item, clicks), context.files(project)
+    with context.live.telling:
+        objects = _objects(context, project) if tells else None
+        context.live.segment(project.id, files, project.segmenter, item.id or 0, item.masks_key, prompt, objects)
+
+
+def _show(context: Context, project_id: str, object_id: int, masks: Masks) -> None:
+    """Draw masks that are there in every tab."""
+    counts = {"done": len(masks), "total": len(masks)}
+    context.hub.publish("segment", project_id, object=object_id, state="done", error=None, restart=True, **counts)
+    for frame in masks.seen()[:, 0].astype(int).tolist():
+        if (entry := masks.entry(frame)) is not None:
+            shown = {"frame": entry["frame"], "confidence": entry["confidence"], "mask": entry["mask"]}
+            context.hub.publish("mask", project_id, object=object_id, **counts, **shown)
+
+
+def _objects(context: Context, project: Project) -> list[dict[str, Any]]:
+    """The project's objects as app.jobs.disputes reads them: what is clicked, and what finished masks were drawn with."""
+    with reading(context.engine) as session:
+        items = [item for item in queries.live_objects(session, project.id) if item.masks_key]
+        clicks = queries.clicks_by_object(session, project.id)
+    places = Places.of(context.files(project))
+    return [_object_line(context, project, item, clicks.get(item.id or 0, []), places) for item in items]
+
+
+def _object_line(
+    context: Context, project: Project, item: SceneObject, clicks: list[queries.Click], places: Places
+) -> dict[str, Any]:
+    found = found_of(context, project, item, places)
     prompt = prompt_entry(item, clicks)
-    context.live.segment(project.id, context.files(project), project.segmenter, item.id or 0, item.masks_key, prompt)
+    prompt.pop("frames", None)  # large, and nobody else's
+    others = found.masks.others if found is not None and found.state == "done" else None
+    return {"object": item.id, "key": item.masks_key, "prompt": prompt, "others": others}
+
+
+def _miss_clicks(objects: list[dict[str, Any]]) -> bool:
+    """Whether masks were drawn with clicks on others that are on none any more."""
+    there = {(point["frame"], point["x"], point["y"]) for line in objects for point in line["prompt"]["points"]}
+    return any(tuple(click) not in there for line in objects for click in line["others"] or ())
 
 
 def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
@@ -256,9 +317,17 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
         for older in kept.parent.glob(f"{item.name}-*.jsonl"):
             older.unlink(missing_ok=True)
         front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
-        mask_store.write(kept, _entries(track, width), track.backend, front)
+        mask_store.write(kept, _entries(track, width), track.backend, front, _run_others(files, item.name))
         found = _stored(kept)
     return found if found is not None and found.backend == segmenter else None
+
+
+def _run_others(files: ProjectFiles, name: str) -> mask_store.Others:
+    """With which clicks on other objects the last run drew the object."""
+    from r2c2r_core.pipeline import DISPUTED  # it brings all stages: not when the server starts
+
+    disputed: dict[str, tuple[PromptPoint, ...]] = Workspace(files.work).load_latest("segment", DISPUTED) or {}
+    return others_line(disputed.get(name, ()))
 
 
 def _world_from_capture(files: ProjectFiles) -> Rigid3:

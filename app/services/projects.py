@@ -95,7 +95,7 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
     if "segmenter" in changed:  # once that is stored: to end a process that hangs takes seconds, and nobody could write
         context.live.close(project_id)
     for number in objects:
-        masks.follow(context, project_id, number)
+        masks.follow(context, project_id, number, tells=number == objects[-1])
     tell(context, project_id)
     return get_project(context, project_id)
 

@@ -6,7 +6,7 @@ from app.db.documents import prompt_entry, prompts_version
 from app.db.engine import reading, writing
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
-from app.services.prompts import after_change, change_of, check_point, check_said
+from app.services.prompts import after_changes, change_of, check_point, check_said
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
@@ -29,4 +29,4 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
                 check_said(context, project, entry.name, said.frame, said.mask)
         items = adopt_prompts(session, project, body, context.who)
         changes = [change_of(context, session, project, item, infer=False) for item in items]
-    return [after_change(context, change) for change in changes]
+    return after_changes(context, changes)

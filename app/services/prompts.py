@@ -68,7 +68,7 @@ def create_all(
             change_of(context, session, project, item, infer and _gives_masks(body))
             for item, body in zip(items, bodies, strict=True)
         ]
-    return [after_change(context, change) for change in made]
+    return after_changes(context, made)
 
 
 def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
@@ -105,8 +105,7 @@ def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneOb
         with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.who):
             item.deleted = True
             session.add(item)
-        change = answered_change(context, session, project, item, infer=False)
-    context.live.cancel(project_id, object_id)
+        change = answered_change(context, session, project, item, infer=True)
     return after_change(context, change)
 
 
@@ -195,6 +194,16 @@ def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneO
     return tell_object(context, project_id, object_id)
 
 
+def segment_again(context: Context, project_id: str, object_id: int, key: str, others: list[int]) -> None:
+    """Compute the masks of these clicks anew, for others are clicked on its front, or none are any more, and say so."""
+    with reading(context.engine) as session:
+        names = {item.id: item.name for item in queries.drawn(session, project_id)}
+    if masks.segment_again(context, project_id, object_id, key):
+        others_named = [names[number] for number in others if number in names]
+        context.hub.publish("parted", project_id, name=names.get(object_id), others=others_named)
+        tell_object(context, project_id, object_id)
+
+
 def cancel_segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """Stop computing the object's masks; those there stay."""
     masks.cancel(context, project_id, object_id)
@@ -247,10 +256,17 @@ def answered_change(context: Context, session: Session, project: Project, item: 
     return change
 
 
-def after_change(context: Context, change: Change) -> schemas.SceneObject:
-    """What follows from a stored change: masks where asked for, and every tab told."""
+def after_changes(context: Context, changes: list[Change]) -> list[schemas.SceneObject]:
+    """`after_change` of changes that were stored together: what they mean for each other is looked at once, with the last."""
+    return [after_change(context, change, tells=change is changes[-1]) for change in changes]
+
+
+def after_change(context: Context, change: Change, *, tells: bool = True) -> schemas.SceneObject:
+    """What follows from a stored change: masks where asked for, of others where they depend on it, and every tab told."""
     if change.infer:
-        masks.follow(context, change.project.id, change.shape.id)
+        masks.follow(context, change.project.id, change.shape.id, tells=tells)
+    elif tells and context.live.runs(change.project.id):
+        masks.tell_objects(context, change.project)
     now = masks.state_of(context, change.project, change.item)
     return _tell(context, _with_masks(change.shape, change.project, now))
 

@@ -20,8 +20,8 @@ PEOPLE = {"ann": "admin", "bea": "reviewer"}
 class Server:
     """The app on a port of its own, to be stopped and started again on the same data; Ann and Bea have accounts."""
 
-    def __init__(self, data: Path) -> None:
-        self.data, self.port = data, free_port()
+    def __init__(self, data: Path, live: str = "live") -> None:
+        self.data, self.port, self.live = data, free_port(), live
         self.process: subprocess.Popen[str] | None = None
         engine = open_engine(data / "r2c2r.db")
         for name, role in PEOPLE.items():
@@ -40,7 +40,7 @@ class Server:
         return f"http://localhost:{self.port}"
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), "localhost"]
+        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), self.live, "localhost"]
         self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         assert self.process.stdout is not None
         assert "http://localhost" in self.process.stdout.readline()

@@ -21,6 +21,7 @@ import { together } from "../../static/js/lib/together.js";
 import { Answers } from "../../static/js/lib/answers.js";
 import { Newest } from "../../static/js/lib/newest.js";
 import { patiently } from "../../static/js/lib/patience.js";
+import { partedText } from "../../static/js/lib/parted.js";
 import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
 
 const key = (name, held = {}) => ({ key: name, ctrlKey: false, metaKey: false, shiftKey: false, altKey: false, ...held });
@@ -399,4 +400,9 @@ test("an answer that a later one overtook is not taken, and one before a failure
   assert.deepEqual(shown, ["second"]);
   await answers.take(Promise.resolve("fourth"), (answer) => shown.push(answer));
   assert.deepEqual(shown, ["second", "fourth"]);
+});
+
+test("who gave way to whom is said by their names, and also that a front is whole again", () => {
+  assert.equal(partedText("door_1", ["door_2", "door_3"]), "door_1 gave way at the seam to door_2, door_3");
+  assert.equal(partedText("door_1", []), "door_1 has its whole front again");
 });

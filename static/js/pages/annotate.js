@@ -21,6 +21,7 @@ import { FrameCanvas } from "../elements/frame-canvas.js";
 import { FrameMosaic } from "../elements/frame-mosaic.js";
 import { say, sayError } from "../elements/toasts.js";
 import { Commands, isForPage } from "../keyboard.js";
+import { partedText } from "../lib/parted.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
@@ -161,6 +162,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#edits, "clicks", () => this.#picture.drawMarkers());
     this.#on(this.#edits, "saved", ({ text, tone }) => this.#tools.saved(text, tone));
     this.#on(live, "object", ({ object }) => object.project === this.project && this.#objects.store(object));
+    this.#on(live, "parted", ({ name, others }) => say(partedText(name, others)));
     this.#on(live, "live", ({ status }) => this.#tools.segmenter.show(status));
     this.#on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#begunAnew());
     this.#on(outbox, "caught-up", () => this.#player.frame && this.#reload().catch(sayError));

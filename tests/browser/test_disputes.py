@@ -1,0 +1,61 @@
+"""Two names clicked on one panel show a mask each, and the page says whose front gave way; taken back, it is whole again."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.test_together import click_frame, on_canvas, sample
+from tests.browser.together import Server, signed_in
+
+LEFT, RIGHT, BESIDE = (15, 30), (65, 30), (120, 30)  # on the panel's halves and off it
+PIXEL = """(canvas, at) => {
+  const scale = canvas.width / canvas.getBoundingClientRect().width;
+  return [...canvas.getContext("2d").getImageData(at.x * scale, at.y * scale, 1, 1).data];
+}"""
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path, live="panels") as running:
+        yield running
+
+
+def alike(page: Page, one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether two pixels of the frame, of one colour in the picture, are drawn in the same colour."""
+    canvas = page.locator("r2c2r-frame-canvas canvas").first
+    colours = [canvas.evaluate(PIXEL, on_canvas(page, *point)) for point in (one, other)]
+    return max(abs(a - b) for a, b in zip(*colours, strict=True)) < 20
+
+
+def until_drawn(page: Page, *, whole: bool) -> None:
+    """Wait until the panel has masks, of one object or of two."""
+    for _ in range(600):
+        if not alike(page, LEFT, BESIDE) and not alike(page, RIGHT, BESIDE) and alike(page, LEFT, RIGHT) is whole:
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("not drawn")
+
+
+def test_two_names_on_one_panel_show_two_masks(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Annotate").click()
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 20, 60)
+    expect(page.get_by_label("Name of drawer_2")).to_be_visible()
+    until_drawn(page, whole=True)
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 60, 60)
+    toasts = page.get_by_role("status").filter(has_text="drawer_2")
+    expect(toasts).to_contain_text("drawer_2 gave way at the seam to drawer_3")
+    until_drawn(page, whole=False)
+    picture(page, "disputes-two")
+    page.get_by_role("button", name="Delete drawer_3").click()
+    expect(toasts).to_contain_text("drawer_2 has its whole front again")
+    until_drawn(page, whole=True)
+    picture(page, "disputes-whole")
+    context.close()
