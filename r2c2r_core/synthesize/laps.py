@@ -16,10 +16,10 @@ class Params:
     """Leaves on tracks one behind the other."""
 
     overlap_m: tuple[float, float] = param(
-        (0.015, 0.10),
+        (0.015, 0.05),
         "m",
-        "least and most by which leaves cover each other",
-        source="makers of sliding doors: 20 mm at each joint of two, three or four doors, to stiles of 80 mm",
+        "least and most by which leaves cover each other, whatever their widths say",
+        source="makers of sliding doors: 20 mm at each joint of two, three or four doors, more where stiles meet",
     )
     step_m: tuple[float, float] = param(
         (0.008, 0.07),

@@ -109,6 +109,14 @@ def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_r
     assert min(joint.upper for each in scene.objects[:2] for joint in each.joints) > 0.5
 
 
+def test_a_front_leaf_cut_too_wide_widens_the_rear_one_by_an_overlap_at_most() -> None:
+    """7 cm of the unit beside it taken in at its free edge: no two leaves cover each other by 11 cm."""
+    x, y, z = FRONT.centre
+    wide = replace(FRONT, centre=(x - 0.035, y, z), size=(WIDTH_M + 0.07, *FRONT.size[1:]))
+    scene = built(wide, REAR)
+    assert door(scene, "rear").dimensions_m[0] == pytest.approx(WIDTH_M - OVERLAP_M + 0.05, abs=0.004)
+
+
 def test_each_has_its_own_half_of_what_is_behind_both(scene: ArticulatedScene) -> None:
     (ours, theirs) = (link_boxes(item, item.links[0]) for item in (door(scene, "front"), door(scene, "rear")))
     repeated = Boxes(*(np.repeat(part, len(theirs.centres), axis=0) for part in ours))
