@@ -7,7 +7,8 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.category import Category, Size
+from r2c2r_core.kitchen.category import Params as SizeParams
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import ThingBox
 from r2c2r_core.segment.fronts.front import Front, front_corners, side_corners, side_faces
@@ -43,6 +44,12 @@ class Params:
         "worth of a usual size, beside 1 for all four edges",
         source="without it the same microwave loses 42 mm of its height",
     )
+    past: float = param(
+        2.0,
+        "score",
+        "cost of a rectangle that depth looks past everywhere, beside 1 for all four edges",
+        source="by 0 a microwave of a third party's kitchen takes in the wall's edge beside it; by 2 it is right to 1 %",
+    )
     refused: float = param(10.0, "score", "cost of a click that says no")
     sure_z: float = param(4.0, "σ", "of a line that is clear", gt=0)
     clearest_z: float = param(6.0, "σ", "at which lines are cut where candidates are looked for", gt=0)
@@ -55,9 +62,12 @@ class Params:
 
 
 def find_rectangle(
-    run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, support_row: float | None = None
+    run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, past: Mask, support_row: float | None = None
 ) -> Cell | None:
-    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support."""
+    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support.
+
+    `past` are the cells that depth looks past: none of an appliance's are.
+    """
     params = tuned(Params)
     cell_m = run.grid.cell_m
     low, high = clicks.min(axis=0), clicks.max(axis=0)
@@ -67,28 +77,34 @@ def find_rectangle(
     rows = _candidates(run.horizontal, low[0], high[0], params.reach * kind.width.low / cell_m, cell_m)
     if support_row is not None:
         rows = np.append(rows[rows < support_row - params.shadow_m / cell_m], support_row)
-    support = np.pad(part.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    support, empty = (np.pad(cells.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0))) for cells in (part, past))
     best: tuple[float, Cell] | None = None
     for left in columns[columns < low[0]]:
         for right in columns[columns > high[0]]:
             width = (right - left) * cell_m
-            if not kind.width.holds(width):
+            if not _possible(kind.width, width):
                 continue
             tops, bottoms = rows[rows < low[1]], rows[rows > high[1]]
             top, bottom = (grid.ravel() for grid in np.meshgrid(tops, bottoms, indexing="ij"))
             tall = (bottom - top) * cell_m
-            fits = (tall >= kind.height.low) & (tall <= kind.height.high)
+            fits = _possible(kind.height, tall)
             if not fits.any():
                 continue
             top, bottom, tall = top[fits], bottom[fits], tall[fits]
+            foot = _along_rows(horizontal, bottom, left, right, run.horizontal.block)
+            if support_row is not None:
+                foot = np.where(bottom == support_row, 1.0, foot)  # depth saw what it stands on: as sure as a line can be
             edges = (
                 _along(vertical, left, top, bottom, run.vertical.block)
                 + _along(vertical, right, top, bottom, run.vertical.block)
                 + _along_rows(horizontal, top, left, right, run.horizontal.block)
-                + _along_rows(horizontal, bottom, left, right, run.horizontal.block)
+                + foot
             ) / 4
             usual = np.exp(-0.5 * (kind.height.deviation(tall) ** 2 + kind.width.deviation(width) ** 2))
             score = edges + params.usual * usual + params.covered * _covered(support, left, right, top, bottom)
+            score = score - params.past * _held(empty, left, right, top, bottom) / np.maximum(
+                (right - left) * (bottom - top), 1
+            )
             for column, row in refused:
                 score = score - params.refused * ((left < column < right) & (top < row) & (row < bottom))
             i = int(np.argmax(score))
@@ -125,6 +141,12 @@ def appliance_box(front: Front) -> ThingBox:
     )
 
 
+def _possible(size: Size, values_m: float | np.ndarray) -> np.ndarray:
+    """Which values may be such a size, cut a little beside its border."""
+    slack = np.exp(tuned(SizeParams).slack)
+    return np.asarray((values_m >= size.low / slack) & (values_m <= size.high * slack))
+
+
 def _component(run: Run, clicks: np.ndarray) -> np.ndarray:
     """The seen part of the plane that lies at, or nearest to, the clicks."""
     count, labels = cv2.connectedComponents(run.seen.astype(np.uint8), connectivity=4)
@@ -145,13 +167,14 @@ def _distance(part: np.ndarray, click: np.ndarray) -> float:
 
 
 def _covered(support: np.ndarray, left: float, right: float, top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
-    """Share of the support inside the rectangle, less the share of the rectangle's outside that it fills."""
-    total = support[-1, -1]
-    if total <= 0:
-        return np.zeros(len(top))
+    """Share of the support inside each rectangle."""
+    return np.asarray(_held(support, left, right, top, bottom) / max(float(support[-1, -1]), 1.0))
+
+
+def _held(sums: np.ndarray, left: float, right: float, top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
+    """How many cells, of running sums over both axes, lie inside each rectangle."""
     a, b, c, d = round(left), round(right), np.round(top).astype(int), np.round(bottom).astype(int)
-    inside = support[d, b] - support[c, b] - support[d, a] + support[c, a]
-    return np.asarray(inside / total)
+    return np.asarray(sums[d, b] - sums[c, b] - sums[d, a] + sums[c, a])
 
 
 def _sums(evidence: Evidence) -> np.ndarray:
@@ -175,16 +198,23 @@ def _along_rows(sums: np.ndarray, rows: np.ndarray, left: float, right: float, b
 
 
 def _candidates(evidence: Evidence, low: float, high: float, reach: float, cell_m: float) -> np.ndarray:
-    """Positions (cell centres) of the clearest lines across the clicks' surroundings."""
+    """Positions (cell centres) of the lines that are clearest on either side of the clicks: a click may be at its border."""
     params = tuned(Params)
     around = 2 * round(params.apart_m / cell_m) + 1
-    first = int(max((low - reach) // evidence.block, 0))
-    if first >= len(evidence.score):
+    if max(low - reach, 0) // evidence.block >= len(evidence.score):
         return np.zeros(0)  # the clicks lie beside what was seen
-    last = int(max(min(np.ceil((high + reach) / evidence.block), len(evidence.score)), first + 1))
-    shown = np.where(evidence.known[first:last], np.clip(evidence.score[first:last], 0, params.clearest_z), 0).mean(axis=0)
-    profile = cv2.GaussianBlur(shown[None].astype(np.float32), (0, 0), params.blur_m / cell_m)[0]
+    before, after = (_shown(evidence, *span) for span in ((low - reach, high), (low, high + reach)))
+    profile = cv2.GaussianBlur(np.maximum(before, after)[None].astype(np.float32), (0, 0), params.blur_m / cell_m)[0]
     peak = (profile >= cv2.dilate(profile[None], np.ones((1, around), np.uint8))[0] - 1e-6) & (profile > params.least_line)
     positions = np.flatnonzero(peak)
     order = np.argsort(-profile[positions], kind="stable")[: params.candidates]
     return np.sort(positions[order]) + 0.5
+
+
+def _shown(evidence: Evidence, low: float, high: float) -> np.ndarray:
+    """How clearly each position shows a line between two places along it."""
+    count = len(evidence.score)
+    first = int(np.clip(low // evidence.block, 0, count - 1))
+    last = int(np.clip(np.ceil(high / evidence.block), first + 1, count))
+    clear = np.clip(evidence.score[first:last], 0, tuned(Params).clearest_z)
+    return np.asarray(np.where(evidence.known[first:last], clear, 0).mean(axis=0))

@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.kitchen.categories import every_category
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import fit_box
+from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
@@ -56,7 +57,8 @@ def appliance_front(
         return None
     on = run.grid.cells_of(np.array([point, *_on_plane(prepared, region, clicks[1:])]))
     off = run.grid.cells_of(near_plane(run, negatives))
-    cell = _rectangle(run, on, off, kind, _support_row(prepared, run, point, kind))
+    past = looked_past(run, prepared.scene, on[0], kind)
+    cell = _rectangle(run, on, off, kind, past, _support_row(prepared, run, point, kind))
     if cell is None:
         return None
     lab, seen_colour = as_lab(run.mosaic)
@@ -68,19 +70,19 @@ def appliance_front(
     return replace(fitted.front, cell=_nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)), fitted.depth_seen
 
 
-def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, support_row: float | None) -> Cell | None:
+def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, past: Mask, support_row: float | None) -> Cell | None:
     """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
-    cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
+    cell = find_rectangle(run, on[:1], kind, off[:0], past, support_row)
     if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
         on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
-        cell = find_rectangle(run, on[:1], kind, off[:0], support_row)
+        cell = find_rectangle(run, on[:1], kind, off[:0], past, support_row)
     if cell is None:
         return None
     missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
     wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
     if not missed and not wrong:
         return cell
-    return find_rectangle(run, np.array([on[0], *missed]), kind, np.array(wrong).reshape(-1, 2), support_row) or cell
+    return find_rectangle(run, np.array([on[0], *missed]), kind, np.array(wrong).reshape(-1, 2), past, support_row) or cell
 
 
 def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Category) -> float | None:

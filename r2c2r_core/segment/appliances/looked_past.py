@@ -1,0 +1,49 @@
+"""Where depth looks past the plane of a front: no part of an appliance is there, whatever lines a shadow or a tile draws."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.viewpoints import best_views
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth has passed a plane."""
+
+    frames: int = param(8, "count", "that are asked: a click waits for them", ge=1)
+    spacing_m: float = param(0.02, "m", "between the places that are asked", gt=0)
+    behind_m: float = param(0.06, "m", "behind the plane, beyond the noise, from where the sensor looked past it")
+    share: float = param(0.5, "share", "of the frames that know a place, which must have looked past it", gt=0, lt=1)
+
+
+def looked_past(run: Run, scene: Scene, click: np.ndarray, kind: Category) -> Mask:
+    """Which cells of the run's grid, as far around a click (column, row) as such an appliance reaches, depth looks past."""
+    params, grid = tuned(Params), run.grid
+    step = max(1, round(params.spacing_m / grid.cell_m))
+    reach = np.array([kind.width.high, kind.height.high]) / grid.cell_m
+    rows, columns = run.seen.shape
+    low = np.clip(click - reach, 0, [columns, rows]).astype(int)
+    high = np.clip(click + reach, 0, [columns, rows]).astype(int)
+    past = np.zeros(run.seen.shape, bool)
+    column, row = np.arange(low[0], high[0], step), np.arange(low[1], high[1], step)
+    if not len(column) or not len(row):
+        return past
+    places = np.stack(np.meshgrid(column, row), axis=-1) + step / 2
+    points = grid.points_at(places.reshape(-1, 2).astype(np.float64))
+    known, through = np.zeros(len(points)), np.zeros(len(points))
+    for frame in best_views(scene, grid.points_at(click[None])[0], params.frames)[: params.frames]:
+        z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        known += (seen > 0) & ~scene.noise.occluded(seen, z, params.behind_m)
+        through += scene.noise.seen_through(seen, z, params.behind_m)
+    share = (through > params.share * np.maximum(known, 1)).reshape(places.shape[:2]).astype(np.uint8)
+    size = (int(high[0] - low[0]), int(high[1] - low[1]))
+    past[low[1] : high[1], low[0] : high[0]] = cv2.resize(share, size, interpolation=cv2.INTER_NEAREST) > 0
+    return past
