@@ -68,7 +68,8 @@ def lap_of(item: MeasuredObject, other: MeasuredObject) -> Lap | None:
 def with_hidden_edges(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
     """The objects, rear leaves as wide as those in front of them, and level with them.
 
-    Leaves of one unit are; an edge behind another leaf is not seen, and a top that ends elsewhere was cut wrongly.
+    Leaves of one unit are; an edge behind another leaf is not seen, and a top that ends elsewhere was cut wrongly. One that
+    reaches behind the other already stays as it is.
     """
     return [_with_hidden_edges(item, objects) for item in objects]
 
@@ -80,7 +81,8 @@ def _laps(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> tuple[Lap,
 def _with_hidden_edges(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> MeasuredObject:
     params = tuned(Params)
     hidden = [lap for lap in _laps(item, objects) if lap.behind_m < 0]
-    if not hidden or item.fixed_by_person:
+    cut_short = any(lap.overlap_m < params.overlap_m[0] for lap in hidden)  # as a camera sees it; a person draws all of it
+    if not cut_short or item.fixed_by_person:
         return item
     names = {lap.other for lap in hidden}
     before = [other for other in objects if other.name in names]

@@ -143,6 +143,15 @@ def test_a_person_says_where_it_slides_to() -> None:
     assert scene.objects[0].joints[0].sources["axis"] == "person"
 
 
+def test_a_rear_leaf_that_was_drawn_with_its_hidden_edge_stays_as_it_was_drawn() -> None:
+    x, y, z = REAR.centre
+    width, depth, height = REAR.size
+    scene = built(FRONT, replace(REAR, centre=(x - 0.02, y, z), size=(width + 0.04, depth, height - 0.03), handle=None))
+    item = door(scene, "rear")
+    assert item.dimensions_m[0] == pytest.approx(width + 0.04, abs=1e-3)
+    assert item.dimension_sources[0] == "measured"
+
+
 def test_a_size_that_a_person_gave_a_leaf_stays() -> None:
     given = (0.58, 0.55, 0.74)
     scene = built(FRONT, REAR, overrides=Overrides(objects={"rear": ObjectOverride(dimensions_m=np.array(given))}))
