@@ -71,6 +71,7 @@ class Params:
         "of an edge's candidates about it: from how far off the box may be thought to what poses err",
     )
     reach_spreads: float = param(2.5, "σ", "how far from an edge its candidates are looked for, in spreads")
+    apart_m: float = param(0.01, "m", "between depths that are looked at apart", source="half the widest spread")
     rounds: int = param(3, "count", "of expectation and maximisation at each spread", ge=1)
     independent: float = param(
         4.0, "count", "photographs that err on their own about an edge: a line beside it misleads the others alike"
@@ -154,11 +155,21 @@ def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3)
     def annealed(box: np.ndarray, spreads_m: Sequence[float]) -> Solution:
         return _annealed(evidence, photos, world_from_front, box, spreads_m)
 
-    coarse = min((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
-    fine = annealed(coarse.box, params.spreads_m[1:])
+    coarse = sorted((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
+    # At the widest spread the shadow behind it and its own back are one edge: the likeliest of each depth goes on.
+    fine = min((annealed(found.box, params.spreads_m[1:]) for found in _apart(coarse, params.apart_m)), key=_cost)
     as_found = fine.box.copy()
     as_found[[LEFT, RIGHT]] = evidence.start[[LEFT, RIGHT]]
     return min(fine, annealed(as_found, params.spreads_m[2:]), key=_cost)
+
+
+def _apart(solutions: Sequence[Solution], apart_m: float) -> list[Solution]:
+    """The first of the solutions whose backs are this near to each other."""
+    kept: list[Solution] = []
+    for solution in solutions:
+        if all(abs(solution.box[BACK] - other.box[BACK]) > apart_m for other in kept):
+            kept.append(solution)
+    return kept
 
 
 def _cost(solution: Solution) -> float:

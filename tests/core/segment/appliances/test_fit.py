@@ -6,6 +6,7 @@ import pytest
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.segment.appliances import fit
 from r2c2r_core.segment.appliances.edges import BACK, FRONT, LEFT, RIGHT, TOP, YAW, Photo
 from r2c2r_core.segment.appliances.faces import Patches
 from r2c2r_core.segment.appliances.fit import Evidence, Params, Solution, covariance_of, solve
@@ -33,6 +34,19 @@ def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wa
     found = solved(start, [photo(eye) for eye in EYES])
     assert found.box[TOP] == pytest.approx(TOP_M, abs=PIXEL_M)
     assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)  # seen at a slant
+
+
+def test_depths_that_are_unlike_are_judged_by_their_edges_at_the_finest_spread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the widest one, a shadow on the wall behind is the likelier back."""
+
+    def annealed(_: Evidence, __: list[Photo], ___: Rigid3, box: np.ndarray, spreads_m: tuple[float, ...]) -> Solution:
+        coarse = spreads_m == tuned(Params).spreads_m[:1]
+        return Solution(box, np.eye(7), -float(box[BACK]) if coarse else abs(float(box[BACK]) - BACK_M))
+
+    monkeypatch.setattr(fit, "_annealed", annealed)
+    start = TRUE.copy()
+    start[BACK] = BACK_M + 0.01
+    assert solved(start, []).box[BACK] == pytest.approx(BACK_M + 0.01)
 
 
 @pytest.mark.parametrize("turn_deg", [1.4, -1.1])
