@@ -107,7 +107,7 @@ class Desk:
         self._disputes = Disputes(session, self._front)
         self._prefetching: Iterator[None] | None = session.prefetch()
         self._proposing: Iterator[tuple[float, tuple[Proposal, ...]]] | None = None
-        self._closed = False
+        self._closed = self._answering = False
         self._changed = threading.Condition()  # guards what is above, and the order of messages about an object
 
     def answer(self, commands: Commands) -> None:
@@ -115,8 +115,12 @@ class Desk:
         worker = threading.Thread(target=self._work, name="frames")
         worker.start()
         while (waiting := _waiting(commands)) is not None:
+            self._answering = True
             for command in waiting:
                 self._take(command)
+            with self._changed:
+                self._answering = False
+                self._changed.notify()
         with self._changed:
             self._closed = True
             self._changed.notify()
@@ -170,7 +174,7 @@ class Desk:
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(self._has_work)
+                self._changed.wait_for(self._may_work)
                 if self._closed:
                     return
                 newest = next(reversed(self._open.items()), None)
@@ -185,9 +189,11 @@ class Desk:
             else:
                 self._propose_step()
 
-    def _has_work(self) -> bool:
+    def _may_work(self) -> bool:
+        """Whether there is something to do, and nobody waits for a first look meanwhile."""
         unsettled = self._settled is not self._objects
-        return self._closed or unsettled or bool(self._open or self._prefetching or self._proposing)
+        work = unsettled or bool(self._open or self._prefetching or self._proposing)
+        return self._closed or (work and not self._answering)
 
     def _settle(self, objects: list[dict[str, Any]], waiting: set[int]) -> None:
         """Find whose clicks fall on whose front, and ask for those anew whose masks are others by that."""
