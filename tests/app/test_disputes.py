@@ -14,15 +14,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.db.engine import reading
+from app.db.queries import project_row
 from app.jobs import live_segment
 from app.jobs.live_segment import Desk
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.pipeline import DISPUTED
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.runs.orthomosaic import joined
 from r2c2r_core.segment.stage import open_session
+from r2c2r_core.workspace import Workspace
 from tests.app.conftest import FAKE_COMMANDS, Running, fake
+from tests.app.nouns import finish
 from tests.app.test_live import listening
 from tests.app.test_live import until as hear
 from tests.app.test_live_segment import until
@@ -257,3 +262,29 @@ def test_objects_of_a_prompts_file_part_each_other(panels: Callable[..., Any]) -
         for number in numbers:
             web.post(f"/api/projects/{project}/objects/{number}/segment", status=202)
         web.until(lambda: spans(web, project, *numbers) == [(0, 40), (40, 80)])
+
+
+@pytest.mark.parametrize(("parted_at", "source"), [(None, "run"), (130.5, "live")])
+def test_masks_of_a_run_are_drawn_anew_where_it_parted_them_at_a_click_that_is_gone(
+    panels: Callable[..., Any], parted_at: float | None, source: str
+) -> None:
+    with panels() as web:
+        project = web.sample()
+        drawer, mug = web.get(f"/api/projects/{project}/objects")
+        web.delete(f"/api/projects/{project}/objects/{mug['id']}")
+        with reading(web.context.engine) as session:
+            files = web.context.files(project_row(session, project))
+        finish(files.work, drawer["name"])
+        gone = () if parted_at is None else (PromptPoint(frame=3, x=parted_at, y=60.5, label=1),)
+        Workspace(files.work).save("segment", DISPUTED, {drawer["name"]: gone}, {"key": "k", "seconds": 1.0})
+        files.finished_prompts.write_text(json.dumps(web.get(f"/api/projects/{project}/prompts.json")))
+        assert lane_of(web, project, drawer["id"])["source"] == "run"
+        web.post(f"/api/projects/{project}/live/open")
+        other = web.post(f"/api/projects/{project}/objects", clicked(20.5), 201)["id"]
+        web.until(lambda: lane_of(web, project, other)["complete"] and lane_of(web, project, drawer["id"])["complete"])
+        assert lane_of(web, project, drawer["id"])["source"] == source
+
+
+def lane_of(web: Running, project: str, number: int) -> dict[str, Any]:
+    (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == number]
+    return dict(lane)
