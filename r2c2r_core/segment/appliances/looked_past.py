@@ -21,11 +21,15 @@ class Params:
     frames: int = param(8, "count", "that are asked: a click waits for them", ge=1)
     spacing_m: float = param(0.02, "m", "between the places that are asked", gt=0)
     behind_m: float = param(0.06, "m", "behind the plane, beyond the noise, from where the sensor looked past it")
+    below_m: float = param(0.01, "m", "under the floor, from where nothing stands: beyond what the floor's height errs by")
     share: float = param(0.5, "share", "of the frames that know a place, which must have looked past it", gt=0, lt=1)
 
 
 def looked_past(run: Run, scene: Scene, click: np.ndarray, kind: Category) -> Mask:
-    """Which cells of the run's grid, as far around a click (column, row) as such an appliance reaches, depth looks past."""
+    """Which cells of the run's grid, as far around a click (column, row) as such an appliance reaches, depth looks past.
+
+    Where the floor is known, those under it count as such.
+    """
     params, grid = tuned(Params), run.grid
     step = max(1, round(params.spacing_m / grid.cell_m))
     reach = np.array([kind.width.high, kind.height.high]) / grid.cell_m
@@ -43,7 +47,8 @@ def looked_past(run: Run, scene: Scene, click: np.ndarray, kind: Category) -> Ma
         z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
         known += (seen > 0) & ~scene.noise.occluded(seen, z, params.behind_m)
         through += scene.noise.seen_through(seen, z, params.behind_m)
-    share = (through > params.share * np.maximum(known, 1)).reshape(places.shape[:2]).astype(np.uint8)
+    below = points[:, 2] < -params.below_m if scene.capture.room.floor_found else np.zeros(len(points), bool)
+    share = ((through > params.share * np.maximum(known, 1)) | below).reshape(places.shape[:2]).astype(np.uint8)
     size = (int(high[0] - low[0]), int(high[1] - low[1]))
     past[low[1] : high[1], low[0] : high[0]] = cv2.resize(share, size, interpolation=cv2.INTER_NEAREST) > 0
     return past

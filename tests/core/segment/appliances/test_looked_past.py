@@ -9,7 +9,7 @@ from r2c2r_core.segment.planes import region_at
 from tests.core.segment.scenes import FRONT_Y, TOP_M
 
 
-def test_depth_looks_past_the_plane_above_the_worktop_and_not_on_the_doors(session: GeometricSession) -> None:
+def test_nothing_is_above_the_worktop_or_under_the_floor_and_the_doors_are_there(session: GeometricSession) -> None:
     on_door = np.array([0.25, FRONT_Y, 0.5])
     region = region_at(session.planes, on_door)
     assert region is not None
@@ -23,3 +23,4 @@ def test_depth_looks_past_the_plane_above_the_worktop_and_not_on_the_doors(sessi
 
     assert share((0.05, 0.2), (0.45, TOP_M - 0.05)) < 0.02
     assert share((0.05, TOP_M + 0.12), (0.45, TOP_M + 0.25)) > 0.9  # the wall, 0.6 m behind
+    assert share((0.05, -0.15), (0.45, -0.03)) > 0.9
