@@ -1,6 +1,6 @@
 """Silhouettes of small things: a hull rendered into a frame, shifted by that frame's pose error, snapped to colour edges."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -10,6 +10,7 @@ from r2c2r_core.geometry.camera import Intrinsics, project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import colour_gradient, refine_border
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.crops import shrunk
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
 from r2c2r_core.segment.things.pixel_cut import Params as CutParams
 from r2c2r_core.segment.things.support import raised, support_offset
@@ -21,13 +22,6 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """How a small thing's outline is drawn."""
 
-    longest_px: int = param(
-        320,
-        "px",
-        "of the crop an outline is looked for in: a larger one is shrunk, and only its border drawn at the photo's resolution",
-        source="a handle 1200 px wide takes the time of one of 320 px; VGA crops are not shrunk",
-        ge=32,
-    )
     around_m: float = param(0.04, "m", "about the hull, beyond the pose error, that a crop shows: what is not the thing")
     border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
     sure_odds: float = param(9.0, "log", "of a pixel that is known")
@@ -166,15 +160,6 @@ def hull_crop(thing: Thing, scene: Scene, frame: Frame) -> Crop | None:
     if hull.sum() < 8:
         return None
     return Crop(area, small, scale / shrink, hull > 0, _occluders(thing, scene, frame, area, small))
-
-
-def shrunk(camera: Intrinsics, area: tuple[slice, slice]) -> Intrinsics:
-    """The camera of an area of a photo, no larger than an outline needs."""
-    rows, columns = area
-    width, height = columns.stop - columns.start, rows.stop - rows.start
-    part = replace(camera, cx=camera.cx - columns.start, cy=camera.cy - rows.start, width=width, height=height)
-    shrink = max(1.0, max(width, height) / tuned(Params).longest_px)
-    return part if shrink == 1.0 else part.resized(max(round(width / shrink), 4), max(round(height / shrink), 4))
 
 
 def _occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice], camera: Intrinsics) -> Mask:

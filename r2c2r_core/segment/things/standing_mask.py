@@ -10,9 +10,10 @@ from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import refine_border
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.crops import shrunk
 from r2c2r_core.segment.things.depth_cloud import clean_depth
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
-from r2c2r_core.segment.things.silhouettes import shrunk, splat
+from r2c2r_core.segment.things.silhouettes import splat
 from r2c2r_core.segment.things.standing import OFF, ON, UNKNOWN, Standing
 from r2c2r_core.segment.things.support import raised
 from r2c2r_core.tuning import param, tuned

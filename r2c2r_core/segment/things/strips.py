@@ -12,7 +12,7 @@ from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.silhouettes import shrunk
+from r2c2r_core.segment.things.crops import shrunk
 from r2c2r_core.segment.things.support import raised, support_offset
 from r2c2r_core.tuning import param, tuned
 

@@ -9,7 +9,8 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture, Depth
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.silhouettes import Params, crop_outline, small_mask
+from r2c2r_core.segment.things.crops import Params
+from r2c2r_core.segment.things.silhouettes import crop_outline, small_mask
 from r2c2r_core.segment.things.thing import ThingConfig
 from r2c2r_core.segment.things.visual_hull import find_small
 from tests.core.segment.conftest import Truth
