@@ -1,5 +1,6 @@
 """Orthomosaic of a vertical plane: every frame warped by a homography onto one metric grid, occluders left out."""
 
+import warnings
 from dataclasses import dataclass, field
 
 import cv2
@@ -12,6 +13,9 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
+
+STEP = 2
+"""Grid cells in a cell of the relief, and of the odds of edges: depth is coarser than colour."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +30,8 @@ class Params:
         0.08, "m", "nearer by more hides the plane from a view", source="handles (5 cm) and the fused surface's error do not"
     )
     in_front_m: float = param(0.05, "m", "nearer than the plane by more is an occluder", source="handles are not")
+    odd_lab: float = param(25.0, "levels of Lab", "off what most frames show, from where a frame counts little", gt=0)
+    odd_weight: float = param(0.02, "share", "of its weight that such a frame keeps", gt=0)
     least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
 
 
@@ -208,20 +214,42 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.
 
 
 def blend(tiles: list[Tile], count: int) -> Image:
-    """RGB mosaic of the best `count` tiles, each moved by its own shift."""
+    """RGB mosaic of the best `count` tiles, each moved by its own shift; what few of them show counts little.
+
+    A drawer that is open in some frames, or something that passed by, must not leave a shade on the mosaic.
+    """
+    params, best = tuned(Params), tiles[:count]
+    moved = [_moved(tile) for tile in best]
+    usual = _usual(moved)
     total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
     weights = np.zeros(tiles[0].weight.shape, np.float32)
-    for tile in tiles[:count]:
-        move = np.array([[1, 0, tile.shift[0]], [0, 1, tile.shift[1]]], np.float32)
-        size = (tile.weight.shape[1], tile.weight.shape[0])
-        colour = cv2.warpAffine(tile.lab.astype(np.float32), move, size)
-        weight = cv2.warpAffine(tile.weight, move, size) ** 2
+    for colour, weight in moved:
+        off = np.abs(colour.astype(np.float32) - usual).max(axis=2)
+        weight = weight * (params.odd_weight + np.exp(-((off / params.odd_lab) ** 2)))
         total += colour * weight[..., None]
         weights += weight
     lab = (total / np.maximum(weights, 1e-9)[..., None]).clip(0, 255).astype(np.uint8)
     image = cv2.cvtColor(lab, cv2.COLOR_LAB2RGB)
     image[weights == 0] = 0
     return np.asarray(image, dtype=np.uint8)
+
+
+def _moved(tile: Tile) -> tuple[np.ndarray, np.ndarray]:
+    """A tile's colour and its weight in the mosaic, moved by its shift."""
+    move = np.array([[1, 0, tile.shift[0]], [0, 1, tile.shift[1]]], np.float32)
+    size = (tile.weight.shape[1], tile.weight.shape[0])
+    return cv2.warpAffine(tile.lab, move, size), cv2.warpAffine(tile.weight, move, size) ** 2
+
+
+def _usual(moved: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """The median colour (rows, columns, 3) of the tiles that show a cell, on cells of STEP."""
+    coarse = np.stack([colour[::STEP, ::STEP] for colour, _ in moved]).astype(np.float32)
+    coarse[np.stack([weight[::STEP, ::STEP] for _, weight in moved]) <= 0] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # cells that none shows
+        middle = np.nan_to_num(np.nanmedian(coarse, axis=0))
+    rows, columns = moved[0][1].shape
+    return np.asarray(cv2.resize(middle, (columns, rows), interpolation=cv2.INTER_LINEAR))
 
 
 def _for_opencv(pixel_from_cell: Matrix3) -> Matrix3:

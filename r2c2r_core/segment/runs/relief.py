@@ -6,12 +6,9 @@ import cv2
 import numpy as np
 
 from r2c2r_core.geometry.camera import depth_points
-from r2c2r_core.segment.runs.orthomosaic import PlaneGrid
+from r2c2r_core.segment.runs.orthomosaic import STEP, PlaneGrid
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
-
-STEP = 2
-"""Grid cells in a cell of the relief: depth is coarser than colour."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
