@@ -114,8 +114,9 @@ def test_alembic_folder_does_not_shadow_the_library() -> None:
 
 def test_no_large_file_is_tracked() -> None:
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False).stdout.decode().split("\0")
-    large = [name for name in listed if name and (ROOT / name).exists() and (ROOT / name).stat().st_size > 1_000_000]
-    assert large == []
+    most = {".onnx": 5_000_000}  # weights that come with the code
+    sizes = {name: (ROOT / name).stat().st_size for name in listed if name and (ROOT / name).exists()}
+    assert [name for name, size in sizes.items() if size > most.get(Path(name).suffix, 1_000_000)] == []
 
 
 @pytest.mark.parametrize("command", ["serve", "demo", "sample", "info", "run", "check", "evaluate", "dataset", "doctor"])
