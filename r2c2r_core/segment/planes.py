@@ -107,15 +107,17 @@ def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneR
 
 def region_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06) -> PlaneRegion | None:
     """The region that a world point lies on; of several, the nearest plane, larger ones first by a small margin."""
-    best: tuple[float, PlaneRegion] | None = None
+    return next(iter(regions_at(regions, point_world, reach_m)), None)
+
+
+def regions_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06) -> list[PlaneRegion]:
+    """The regions that a world point may lie on, the likeliest first."""
+    found: list[tuple[float, PlaneRegion]] = []
     for region in regions:
         distance = abs(float(region.world_from_plane.inverse.apply(point_world[None])[0, 1]))
-        if distance > reach_m or not region.supports(point_world[None], reach_m)[0]:
-            continue
-        score = distance - 0.01 * min(region.area_m2, 1.0)  # centimetre noise must not prefer a sliver
-        if best is None or score < best[0]:
-            best = (score, region)
-    return best[1] if best else None
+        if distance <= reach_m and region.supports(point_world[None], reach_m)[0]:
+            found.append((distance - 0.01 * min(region.area_m2, 1.0), region))  # centimetre noise must not prefer a sliver
+    return [region for _, region in sorted(found, key=lambda pair: pair[0])]
 
 
 def region_along(

@@ -14,7 +14,7 @@ from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, find_front, seen_sides
-from r2c2r_core.segment.planes import PlaneRegion, region_at
+from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
 from r2c2r_core.segment.things.revolution import Sight, find_round
@@ -90,26 +90,22 @@ def glimpse_object(
 def _front(
     prepared: PreparedCapture, category: Category, positives: Points, negatives: Points, others: Points
 ) -> FoundFront | None:
-    region = region_at(prepared.planes, positives[0])
-    run = prepared.run_of(region) if region is not None else None
-    if run is None:
+    """On the nearest plane where it is as large as its category is, else on the nearest: at a corner, two are near."""
+    best: Front | None = None
+    for region in regions_at(prepared.planes, positives[0]):
+        run = prepared.run_of(region)
+        front = None
+        if run is not None:
+            front = find_front(run, positives, negatives, pair=category.may_be_pair, kind=category, others=others)
+        if front is not None and (best is None or _fit(front, category) > _fit(best, category)):
+            best = front
+        if best is not None and _fit(best, category) == 1.0:
+            break
+    if best is None:
         return None
-    unit = category if category.one_front else None
-    front = find_front(
-        run,
-        positives,
-        negatives,
-        pair=category.may_be_pair,
-        unit=unit,
-        stacked=category.one_of_a_stack,
-        others=others,
-    )
-    if front is None:
-        return None
-    depth = depth_to_wall(front, prepared.scene.capture.room, category) or category.depth.usual
-    front = replace(front, depth_m=depth)
-    front = replace(front, sides=seen_sides(front, prepared.scene))
-    return FoundFront(front, prepared.scene, swings=_swings(category), fit=_fit(front, category))
+    best = replace(best, depth_m=depth_to_wall(best, prepared.scene.capture.room, category) or category.depth.usual)
+    best = replace(best, sides=seen_sides(best, prepared.scene))
+    return FoundFront(best, prepared.scene, swings=_swings(category), fit=_fit(best, category))
 
 
 def _fit(front: Front, category: Category) -> float:
