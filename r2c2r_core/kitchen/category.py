@@ -94,11 +94,6 @@ class Category:
         return self.name.replace("_", " ")
 
     @property
-    def one_of_a_stack(self) -> bool:
-        """Whether it is one drawer of what may have been cut as a stack."""
-        return self.opens == "drawer" and not self.several_fronts
-
-    @property
     def may_be_pair(self) -> bool:
         """Whether two doors side by side may be one object."""
         return self.opens == "pair" or self.wider is not None

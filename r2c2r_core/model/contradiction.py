@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-ContradictionRule = Literal["same-thing", "masks-overlap", "click-disobeyed", "size-unlikely", "in-the-air", "in-a-wall"]
+ContradictionRule = Literal[
+    "same-thing", "masks-overlap", "click-disobeyed", "size-unlikely", "in-the-air", "in-a-wall", "edge-unsure"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

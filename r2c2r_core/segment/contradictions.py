@@ -21,6 +21,8 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.tuning import param, tuned
 
+_SIDES = ("left", "right", "upper", "lower")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -51,6 +53,8 @@ class Params:
         "above the floor, that what stands on it may seem to be",
         source="0.03 m is the worst seen on the sample kitchens",
     )
+    unsure_edge: float = param(0.3, "probability", "of an edge, below which it is asked about", ge=0, le=1)
+    unsure_seam: float = param(0.3, "probability", "of a seam inside a front, from which it is asked about", ge=0, le=1)
     in_wall_m: float = param(0.04, "m", "of a front from a wall's plane", source="the shallowest wall unit sold is 0.2 m deep")
 
 
@@ -66,6 +70,7 @@ def find_contradictions(
         found += _disobeyed(track, prompt, params)
         found += _unlikely_sizes(track, category, params)
         found += _misplaced(track, category, walls, params)
+        found += _unsure_edges(track, params)
     return tuple(found)
 
 
@@ -186,6 +191,24 @@ def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], para
             objects=(track.name,),
             message=f"{track.name} lies in the plane of a wall, where no '{category.label}' has room behind its front",
             mend="delete it if it is the bare wall; set its depth if it is let into the wall",
+        )
+
+
+def _unsure_edges(track: MaskTrack, params: Params) -> Iterator[Contradiction]:
+    """Edges of fronts that hardly show, and seams that may be inside them."""
+    front = track.front
+    if front is None or not front.edges:
+        return
+    sides = [side for side, sure in zip(_SIDES, front.edges, strict=True) if sure < params.unsure_edge]
+    doubts = [f"its {' and '.join(sides)} edge{'s' * (len(sides) > 1)} hardly show{'s' * (len(sides) == 1)}"] if sides else []
+    if front.seam > params.unsure_seam:
+        doubts.append(f"there may be a seam inside it ({100 * front.seam:.0f} %)")
+    if doubts:
+        yield Contradiction(
+            rule="edge-unsure",
+            objects=(track.name,),
+            message=f"{track.name} ({100 * front.width_m:.0f} x {100 * front.height_m:.0f} cm): {', and '.join(doubts)}",
+            mend="click beside it, off it, to move an edge there; or draw it in the elevation",
         )
 
 

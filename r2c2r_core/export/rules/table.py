@@ -84,6 +84,7 @@ LIKENESS_RULES: dict[str, Rule] = {
     "size-unlikely": Rule("warning", "two doors built as one, or a part of one as a whole"),
     "in-the-air": Rule("warning", "the upper part of what stands on the floor, built as a whole"),
     "in-a-wall": Rule("warning", "a drawer that slides out of a bare wall"),
+    "edge-unsure": Rule("warning", "a front that ends where no edge shows, or holds a seam"),
     "travel-cut": Rule(
         "warning", "a joint that opens to less than half of what its kind does: something is in the wrong place"
     ),

@@ -14,10 +14,11 @@ from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, front_panel
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
+from r2c2r_core.segment.runs.edge_odds import edge_odds
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
 from r2c2r_core.segment.runs.lines import gather
-from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, blend, choose_frames, make_tile
-from r2c2r_core.segment.runs.relief import STEP, measure_relief
+from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, PlaneGrid, blend, choose_frames, make_tile
+from r2c2r_core.segment.runs.relief import measure_relief
 from r2c2r_core.segment.runs.run import STEADY_CELLS, Run
 from r2c2r_core.segment.scene import Scene
 
@@ -90,6 +91,7 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
         horizontal=horizontal,
         mosaic=mosaic,
         relief=relief,
+        odds=edge_odds(mosaic, relief, vertical, horizontal),
         seen=seen[: grid.rows, : grid.columns],
         cells=(cell,),
         handles=find_handles(mosaic, relief, (cell,), grid.cell_m),

@@ -11,12 +11,13 @@ from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.track import FrontHandle, FrontPanel
-from r2c2r_core.segment.fronts.units import drawer_cell, line_clarity, unit_cell
+from r2c2r_core.segment.fronts.units import line_clarity, unit_cell
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.runs.xy_cut import Line, LineField, halves
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -43,8 +44,8 @@ class Params:
     )
     steady_m: float = param(0.012, "m", "clicks this near a border are within pose error of it")
     border_m: float = param(0.035, "m", "clicks this near a border correct it: no panel is so narrow")
-    between_names: float = param(
-        0.5, "σ", "mean, of a line between two clicks of different names that parts them: the two names say that there is one"
+    two_names: float = param(
+        3.0, "nat", "by which two clicks of different names make a seam between them likelier", source="one in twenty is a slip"
     )
     hull_share: float = param(
         1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"
@@ -68,28 +69,16 @@ class Front:
 
 
 def find_front(
-    run: Run,
-    positives: Points,
-    negatives: Points,
-    *,
-    pair: bool,
-    unit: Category | None = None,
-    stacked: bool = False,
-    others: Points = NOWHERE,
+    run: Run, positives: Points, negatives: Points, *, pair: bool, kind: Category | None = None, others: Points = NOWHERE
 ) -> Front | None:
     """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
 
-    `pair` joins the two doors of a cabinet, `unit` says that it is one front of that kind, `stacked` that it is a drawer.
-    `others` are clicks on other objects: between two names on one panel there is a seam, where any line shows.
+    `pair` joins the two doors of a cabinet, `kind` says what was clicked; `others` are clicks on other objects.
     """
     on, off = run.grid.cells_of(near_plane(run, positives)), run.grid.cells_of(near_plane(run, negatives))
-    first = run.cell_at(float(on[0, 0]), float(on[0, 1])) if len(on) else None
+    first = _clicked(run, float(on[0, 0]), float(on[0, 1]), kind) if len(on) else None
     if first is None:
         return None
-    if unit is not None:
-        first = unit_cell(run, float(on[0, 0]), float(on[0, 1]), unit) or first
-    if stacked:
-        first = drawer_cell(run, first, float(on[0, 1]))
     cells = [first]
     partner = _partner(run, first) if pair else None
     cells += [partner] if partner is not None else []
@@ -101,7 +90,7 @@ def find_front(
         cell = _without(cell, float(column), float(row), run, on)
     for column, row in run.grid.cells_of(near_plane(run, others)):
         if cell.contains(float(column), float(row)):
-            cell = _cut_off(cell, float(column), float(row), run, on, tuned(Params).between_names)
+            cell = _parted(cell, float(column), float(row), run, on)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
     lab, seen = as_lab(run.mosaic)
     return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
@@ -121,6 +110,8 @@ def front_panel(front: Front) -> FrontPanel:
         handle=handle,
         confidence=float(np.mean(edge_strengths(front))),
         roll_rad=front.run.roll_rad,
+        edges=edge_strengths(front),
+        seam=seam_inside(front),
     )
 
 
@@ -160,6 +151,32 @@ def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
         if total > 200 and agree > 0.5 * total:
             found.append(side)
     return tuple(found)
+
+
+def _clicked(run: Run, column: float, row: float, kind: Category | None) -> Cell | None:
+    """The panel under a click; the one beside it where the click is near its border and what is under it is no such front."""
+    cell = run.cell_at(column, row)
+    if cell is None or kind is None:
+        return cell
+    if kind.one_front:
+        return unit_cell(run, column, row, kind) or cell
+    if _may_be(cell, run, kind):
+        return cell
+    near = tuned(Params).border_m / run.grid.cell_m
+    beside = [(_apart(other, column, row), other) for other in run.cells if _may_be(other, run, kind)]
+    return min((pair for pair in beside if pair[0] < near), key=lambda pair: pair[0], default=(0.0, cell))[1]
+
+
+def _may_be(cell: Cell, run: Run, kind: Category) -> bool:
+    """Whether a panel is as large as fronts of that kind, or as one of its two doors."""
+    width_m, height_m = cell.width * run.grid.cell_m, cell.height * run.grid.cell_m
+    return kind.height.holds(height_m) and (kind.width.holds(width_m) or (kind.may_be_pair and kind.width.holds(2 * width_m)))
+
+
+def _apart(cell: Cell, column: float, row: float) -> float:
+    """Distance of a grid position from a panel."""
+    beyond = max(cell.left - column, column - cell.right, 0.0), max(cell.top - row, row - cell.bottom, 0.0)
+    return float(np.hypot(*beyond))
 
 
 def _partner(run: Run, cell: Cell) -> Cell | None:
@@ -243,39 +260,34 @@ def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) 
     return corrected if corrected is not None else _cut_off(cell, column, row, run, kept)
 
 
-def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray, least: float = -np.inf) -> Cell:
-    """The part of the cell, of two along the clearest line between the clicks, that does not hold the click off it.
+def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The part of the cell, of two along the likeliest line between the clicks, that does not hold the click off it."""
+    line = _line_between(cell, column, row, run, kept)
+    return cell if line is None else _side_of(cell, line, kept)
 
-    The cell as it is where that line is not clearer than `least`, in σ.
-    """
-    options: list[tuple[float, Cell]] = []
+
+def _parted(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
+    """The cell without what another object was clicked on, where a seam between the two clicks is likely enough."""
+    line = _line_between(cell, column, row, run, kept)
+    return cell if line is None or line.odds < -tuned(Params).two_names else _side_of(cell, line, kept)
+
+
+def _line_between(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Line | None:
+    """The likeliest line that has all of the kept clicks on one side and the other click on the other."""
+    field, found = LineField(run.odds, run.grid.cell_m), []
     for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
-        profile = _profile(run, cell, axis)
-        low, high = (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
         below, above = on[on < off], on[on > off]
         if len(below) and len(above):
             continue  # a click off it between two on it: no straight cut along this axis
         start, stop = (float(below.max()), off) if len(below) else (off, float(above.min())) if len(above) else (off, off)
-        window = profile[max(round(start - low), 0) : max(round(stop - low), 0) + 1]
-        if len(window) < 2:
-            continue
-        position = low + max(round(start - low), 0) + int(np.argmax(window)) + 0.5
-        first = Cell(low, cell.top, position, cell.bottom) if axis == 0 else Cell(cell.left, low, cell.right, position)
-        second = Cell(position, cell.top, high, cell.bottom) if axis == 0 else Cell(cell.left, position, cell.right, high)
-        if window.max() > least:
-            options.append((float(window.max()), first if len(below) else second))
-    return max(options, key=lambda option: option[0])[1] if options else cell
+        found.append(field.best_between(cell, axis, start, stop))
+    return max((line for line in found if line is not None), key=lambda line: line.odds, default=None)
 
 
-def _profile(run: Run, cell: Cell, axis: int) -> np.ndarray:
-    """Mean line evidence across a cell, at each of its positions along an axis."""
-    evidence = run.vertical if axis == 0 else run.horizontal
-    low, high, across = (
-        (cell.left, cell.right, (cell.top, cell.bottom)) if axis == 0 else (cell.top, cell.bottom, (cell.left, cell.right))
-    )
-    first = int(across[0] // evidence.block)
-    last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
-    return np.asarray(evidence.score[first:last, round(low) : round(high)].mean(axis=0))
+def _side_of(cell: Cell, line: Line, kept: np.ndarray) -> Cell:
+    """The half of a cut that holds the kept clicks."""
+    first, second = halves(cell, line)
+    return first if kept[0, line.axis] < line.position else second
 
 
 def _supported(cell: Cell, run: Run) -> Cell:
@@ -318,6 +330,16 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
 def edge_strengths(front: Front) -> tuple[float, ...]:
     """How clearly each edge shows, 0..1: left, right, top, bottom."""
     return line_clarity(front.run, front.cell)
+
+
+def seam_inside(front: Front) -> float:
+    """The probability of the likeliest line inside a panel that was not cut."""
+    cell, field, found = front.cell, LineField(front.run.odds, front.run.grid.cell_m), []
+    inset = tuned(Params).border_m / front.run.grid.cell_m
+    for axis, (low, high) in enumerate(((cell.left, cell.right), (cell.top, cell.bottom))):
+        line = field.best_between(cell, axis, low + inset, high - inset) if high - low > 2 * inset else None
+        found += [line.odds] if line is not None else []
+    return float(1 / (1 + np.exp(-max(found)))) if found else 0.0
 
 
 def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:

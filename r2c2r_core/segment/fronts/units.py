@@ -1,4 +1,4 @@
-"""Panel choice with a prior on size: a dishwasher is one front whatever lines it carries, a drawer is one of a stack."""
+"""Panel choice with a prior on size: a dishwasher is one front, whatever lines it carries."""
 
 from dataclasses import dataclass
 
@@ -24,10 +24,6 @@ class Params:
     )
     row_m: float = param(0.015, "m", "how exactly the fronts of a row line up")
     tall_m: float = param(0.35, "m", "height from which a front is one of a row upright")
-    lowest_drawer_m: float = param(0.09, "m", "height of the lowest drawer that is looked for")
-    drawn_share: float = param(0.3, "share", "quantile over the blocks beside a handle: a seam shows in most of them")
-    prominent: float = param(5.0, "σ", "robust, of a seam over its surroundings")
-    least_z: float = param(0.35, "σ", "of a seam")
 
 
 def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
@@ -56,26 +52,19 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
     return max(outer, key=lambda option: option[0])[1] if outer else None
 
 
-def drawer_cell(run: Run, cell: Cell, row: float) -> Cell:
-    """The drawer at a row of a stack that was cut as one panel, its seams too faint where handles are."""
-    seam = _seam(run, cell)
-    if seam is None:
-        return cell
-    top, bottom = Cell(cell.left, cell.top, cell.right, seam), Cell(cell.left, seam, cell.right, cell.bottom)
-    return drawer_cell(run, top if row < seam else bottom, row)
+def edge_odds(run: Run, cell: Cell) -> tuple[float, ...]:
+    """Mean log-odds of each edge of a rectangle: left, right, top, bottom."""
+    return (
+        run.odds.along(0, cell.left, cell.top, cell.bottom),
+        run.odds.along(0, cell.right, cell.top, cell.bottom),
+        run.odds.along(1, cell.top, cell.left, cell.right),
+        run.odds.along(1, cell.bottom, cell.left, cell.right),
+    )
 
 
 def line_clarity(run: Run, cell: Cell) -> tuple[float, ...]:
-    """How clearly each edge of a rectangle shows, 0..1: left, right, top, bottom."""
-    values = []
-    for axis, position in ((0, cell.left), (0, cell.right), (1, cell.top), (1, cell.bottom)):
-        evidence = run.vertical if axis == 0 else run.horizontal
-        across = (cell.top, cell.bottom) if axis == 0 else (cell.left, cell.right)
-        first = int(across[0] // evidence.block)
-        last = max(first + 1, int(np.ceil(across[1] / evidence.block)))
-        at = min(max(round(position), 1), evidence.score.shape[1] - 2)
-        values.append(float(np.clip(evidence.score[first:last, at - 1 : at + 2].max(axis=1).mean() / 4, 0, 1)))
-    return tuple(values)
+    """How likely each edge of a rectangle is a front's, 0..1: left, right, top, bottom."""
+    return tuple(float(1 / (1 + np.exp(-odds))) for odds in edge_odds(run, cell))
 
 
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
@@ -98,35 +87,3 @@ def _in_row(run: Run, cell: Cell) -> int:
     return any(abs(other.top - cell.top) < slack for other in beside) + any(
         abs(other.bottom - cell.bottom) < slack for other in beside
     )
-
-
-def _seam(run: Run, cell: Cell) -> float | None:
-    """The row of the clearest line that shows on both sides of the handles; None when none stands out."""
-    params = tuned(Params)
-    profile = _beside_handles(run, cell)
-    smallest = round(params.lowest_drawer_m / run.grid.cell_m)
-    if len(profile) <= 2 * smallest:
-        return None
-    middle = float(np.median(profile))
-    spread = 1.4826 * float(np.median(np.abs(profile - middle))) + 0.03
-    inner = profile[smallest:-smallest]
-    at = int(np.argmax(inner))
-    if inner[at] < max(params.least_z, middle + params.prominent * spread):
-        return None
-    return round(cell.top) + smallest + at + 0.5
-
-
-def _beside_handles(run: Run, cell: Cell) -> np.ndarray:
-    """At each row of a panel, how surely a line runs through both its left and its right third."""
-    params = tuned(Params)
-    evidence = run.horizontal
-    first, last = round(cell.left / evidence.block), round(cell.right / evidence.block)
-    rows = slice(round(cell.top), round(cell.bottom))
-    third = max((last - first) // 3, 1)
-    sides = []
-    for blocks in (slice(first, first + third), slice(last - third, last)):
-        score = np.where(evidence.known[blocks, rows], evidence.score[blocks, rows], 0.0)
-        if not score.size:
-            return np.zeros(0)
-        sides.append(np.quantile(score, params.drawn_share, axis=0))
-    return np.asarray(np.minimum(*sides))

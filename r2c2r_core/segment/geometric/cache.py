@@ -13,13 +13,14 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.runs.handles import GridHandle
 from r2c2r_core.segment.runs.lines import Evidence
 from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid
+from r2c2r_core.segment.runs.panel_net import PanelOdds
 from r2c2r_core.segment.runs.relief import Relief
 from r2c2r_core.segment.runs.run import Run
 
 T = TypeVar("T")
 
 _UNREADABLE = (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile)
-_STORED = (Cell, Evidence, GridHandle, PlaneGrid, PlaneRegion, Relief, Run)
+_STORED = (Cell, Evidence, GridHandle, PlaneGrid, PlaneRegion, Relief, PanelOdds, Run)
 
 
 def kept(path: Path, compute: Callable[[], T]) -> T:

@@ -7,10 +7,22 @@ import numpy as np
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs.edge_odds import edge_odds
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
 from r2c2r_core.segment.runs.lines import Evidence, find_roll, frame_slide, gather
-from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, Tile, blend, choose_frames, make_grid, make_tile, support_on
-from r2c2r_core.segment.runs.relief import STEP, Relief, measure_relief
+from r2c2r_core.segment.runs.orthomosaic import (
+    STEP,
+    Cell,
+    PlaneGrid,
+    Tile,
+    blend,
+    choose_frames,
+    make_grid,
+    make_tile,
+    support_on,
+)
+from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.runs.relief import Relief, measure_relief
 from r2c2r_core.segment.runs.xy_cut import cut_panels
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -38,6 +50,7 @@ class Run:
     horizontal: Evidence
     mosaic: Image
     relief: Relief
+    odds: PanelOdds
     seen: np.ndarray  # grid cells the scan has depth for
     cells: tuple[Cell, ...]
     handles: tuple[GridHandle | None, ...]  # one a cell
@@ -89,12 +102,13 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
         for tile in tiles:
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles, max(frame_count // 2, 8))
-    cells = tuple(cut_panels(vertical, horizontal, mosaic, cell_m))
+    odds = edge_odds(mosaic, relief, vertical, horizontal)
+    cells = tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), cell_m))
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
     seen = seen[: grid.rows, : grid.columns]
     slides = {tile.frame_index: tile.shift for tile in tiles}
     handles = find_handles(mosaic, relief, cells, cell_m)
-    return Run(region, grid, roll, vertical, horizontal, mosaic, relief, seen, cells, handles, poses_agree, slides)
+    return Run(region, grid, roll, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
 
 
 def _tiles(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> list[Tile]:

@@ -114,3 +114,16 @@ def test_a_front_on_the_bare_wall() -> None:
     assert found((drawer, prompt("drawer_1", "drawer", 40.5))) == ()
     (said,) = found((track("drawer_1", "drawer", slice(0, 80), height_m=0.2, y=-0.01), prompt("drawer_1", "drawer", 40.5)))
     assert said.rule == "in-a-wall"
+
+
+def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about() -> None:
+    door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
+    assert door.front is not None
+    sure = replace(door, front=replace(door.front, edges=(0.9, 0.9, 0.6, 0.9), seam=0.1))
+    assert found((sure, clicked)) == ()
+    faint = replace(door, front=replace(door.front, edges=(0.9, 0.1, 0.2, 0.9), seam=0.45))
+    (doubt,) = found((faint, clicked))
+    assert doubt.rule == "edge-unsure"
+    assert (
+        "door_1 (50 x 70 cm): its right and upper edges hardly show, and there may be a seam inside it (45 %)" in doubt.message
+    )

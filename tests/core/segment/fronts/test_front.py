@@ -149,3 +149,12 @@ def test_neighbours_that_are_apart_dispute_nothing(session: GeometricSession, bo
 def two_doors(capture: Capture) -> list[ObjectPrompt]:
     places = list(DOORS.items())[:2]
     return [prompt(name, "cabinet", click_on(capture, (left + 0.2, FRONT_Y, 0.4), 60)) for name, (left, _) in places]
+
+
+def test_a_click_just_past_a_fronts_edge_means_the_front(session: GeometricSession, boxes: Boxes) -> None:
+    """Under it is a strip that no door is as low as: the plinth's shadow, or the gap below the worktop."""
+    left, width = DOORS["door_a"]
+    panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (left + 0.2, FRONT_Y, TOP_M + 0.008), 60))).panel()
+    assert panel is not None
+    assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M, abs=3e-3)
+    assert panel.width_m == pytest.approx(width, abs=3e-3)

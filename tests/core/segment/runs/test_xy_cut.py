@@ -1,74 +1,113 @@
-"""Cutting a run from line evidence alone: what is a seam, and what lies on a front."""
+"""Cutting a run from log-odds of edges alone: what is a cut, and where a line is when somebody says that there is one."""
 
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.segment.fronts.units import drawer_cell, unit_cell
-from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.runs.orthomosaic import Cell
-from r2c2r_core.segment.runs.xy_cut import cut_panels
+from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.runs.xy_cut import LineField, cut_panels
 
-CELL_M, BLOCK = 0.0025, 12
+CELL_M = 0.0025
 Line = tuple[int, int, int]  # position, and from where to where it runs, in cells
 
 
-def evidence(length: int, across: int, lines: list[Line], score: float = 6.0) -> Evidence:
-    """Lines at positions along `length`, each over a part of `across`."""
-    found = np.zeros((across // BLOCK, length), np.float32)
-    for position, start, stop in lines:
-        found[start // BLOCK : stop // BLOCK, position] = score
-    return Evidence(found, np.ones_like(found, bool), BLOCK)
+def odds(
+    width: int,
+    height: int,
+    upright: list[Line],
+    level: list[Line],
+    sure: float = 3.0,
+    handles: list[tuple[int, int]] | None = None,
+) -> PanelOdds:
+    """Nothing but fronts, with lines at positions, each over a part of the grid, and handles at columns and rows."""
+    across = [np.full((height // 2, width // 2), -4.0, np.float32) for _ in range(2)]
+    for layer, lines in ((across[0], upright), (across[1].T, level)):
+        for position, start, stop in lines:
+            layer[start // 2 : stop // 2, position // 2] = sure
+    handle = np.full_like(across[0], -4)
+    for column, row in handles or []:
+        handle[row // 2 : row // 2 + 4, column // 2 - 10 : column // 2 + 10] = 4
+    return PanelOdds(*across, handle=handle, front=np.full_like(across[0], 4))
 
 
 def cut(width: int, height: int, upright: list[Line], level: list[Line]) -> list[Cell]:
-    grey = np.full((height, width, 3), 128, np.uint8)
-    return cut_panels(evidence(width, height, upright), evidence(height, width, level), grey, CELL_M)
+    return cut_panels(odds(width, height, upright, level), Cell(0, 0, width, height), CELL_M)
 
 
-def test_a_line_from_edge_to_edge_is_a_seam_and_one_that_ends_short_of_both_is_not() -> None:
+def test_a_line_that_shows_over_most_of_its_span_is_a_cut_and_one_over_the_half_is_not() -> None:
     assert len(cut(240, 288, [], [(144, 0, 240)])) == 2
-    assert len(cut(240, 288, [], [(144, 36, 204)])) == 1  # the lower edge of a window
-    assert len(cut(240, 60, [(96, 12, 48)], [])) == 1  # the end of a drawer's handle
-
-
-def test_a_seam_stands_out_from_strong_grain_around_it() -> None:
-    rng = np.random.default_rng(0)
-    grain = evidence(480, 288, [])
-    grain.score[:] = np.clip(rng.normal(0.2, 0.6, (1, 480)), -0.5, 2.0)  # upright lines from end to end, faint
-    grain.score[:, 230:250] = 0.3
-    grain.score[:, 240] = 3.6  # the seam
-    cells = cut_panels(grain, evidence(288, 480, []), np.full((288, 480, 3), 128, np.uint8), CELL_M)
-    assert sorted((round(cell.left), round(cell.right)) for cell in cells) == [(0, 240), (240, 480)]
+    assert len(cut(240, 288, [], [(144, 0, 100), (144, 160, 240)])) == 2  # a handle hangs over it
+    assert len(cut(240, 288, [], [(144, 60, 180)])) == 1
 
 
 def test_handles_that_are_level_do_not_cut_two_units_at_once() -> None:
-    handles = [(90, 36, 204), (90, 276, 444)]
-    cells = cut(480, 288, [(240, 0, 288)], handles)
+    cells = cut(480, 288, [(240, 0, 288)], [(90, 36, 180), (90, 300, 444)])
     assert sorted((round(cell.left), round(cell.right), round(cell.height)) for cell in cells) == [
-        (0, 240, 288),
-        (240, 480, 288),
+        (0, 241, 288),
+        (241, 480, 288),
     ]
+
+
+def test_a_drawer_stack_is_cut_beside_a_door_that_goes_past_it() -> None:
+    cells = cut(480, 288, [(240, 0, 288)], [(96, 0, 240), (192, 0, 240)])
+    assert sorted((round(cell.left), round(cell.top)) for cell in cells) == [(0, 0), (0, 97), (0, 193), (241, 0)]
+
+
+def test_a_seam_that_poses_bend_is_one_cut_at_its_mean() -> None:
+    bent = odds(240, 288, [(112 + 2 * (row // 48), row, row + 48) for row in range(0, 288, 48)], [])
+    left, right = sorted(cut_panels(bent, Cell(0, 0, 240, 288), CELL_M), key=lambda cell: cell.left)
+    assert left.right == right.left == pytest.approx(118, abs=1.5)
+    jagged = odds(240, 288, [(112 + 30 * (row // 48 % 2), row, row + 48) for row in range(0, 288, 48)], [])
+    assert len(cut_panels(jagged, Cell(0, 0, 240, 288), CELL_M)) == 1
+
+
+def test_a_faint_seam_between_two_handles_is_a_cut_and_without_them_is_not() -> None:
+    whole = Cell(0, 0, 240, 144)
+    assert len(cut_panels(odds(240, 144, [], [(72, 0, 240)], sure=-0.3), whole, CELL_M)) == 1
+    assert len(cut_panels(odds(240, 144, [], [(72, 0, 240)], sure=-0.3, handles=[(120, 30), (120, 104)]), whole, CELL_M)) == 2
+
+
+def test_a_stile_with_the_handle_on_it_is_no_front() -> None:
+    """A faint line at 6 cm from a door's edge: a strip so narrow is hardly ever a front, nor the rest without handle."""
+    whole, line = Cell(0, 0, 200, 288), [(176, 0, 288)]
+    assert len(cut_panels(odds(200, 288, line, [], sure=1.0, handles=[(188, 60)]), whole, CELL_M)) == 1
+    assert len(cut_panels(odds(200, 288, line, [], sure=3.5, handles=[(188, 60)]), whole, CELL_M)) == 2  # a pull-out
+
+
+@pytest.mark.parametrize("grid", [Cell(0, 0, 8, 400), Cell(0, 0, 400, 8), Cell(0, 0, 2, 2), Cell(0, 0, 1, 1)])
+def test_what_is_too_small_to_cut_stays_whole(grid: Cell) -> None:
+    assert cut_panels(odds(400, 400, [(4, 0, 400)], [(4, 0, 400)]), grid, CELL_M) == [grid]
+
+
+def test_edges_far_from_any_front_cut_nothing() -> None:
+    tiles = odds(240, 288, [(120, 0, 288)], [])
+    tiles.front[:] = -4
+    assert len(cut_panels(tiles, Cell(0, 0, 240, 288), CELL_M)) == 1
+
+
+def test_an_unlikely_line_is_found_where_somebody_says_that_there_is_one() -> None:
+    faint = odds(240, 288, [(100, 0, 288)], [], sure=-1.0)
+    whole = Cell(0, 0, 240, 288)
+    assert cut_panels(faint, whole, CELL_M) == [whole]
+    line = LineField(faint, CELL_M).best_between(whole, 0, 60, 200)
+    assert line is not None
+    assert line.position == pytest.approx(101, abs=1)
+    assert line.odds == pytest.approx(-1.0)
 
 
 def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     window, frame = Cell(36, 96, 204, 240), Cell(0, 0, 240, 288)
     cells = (window, Cell(0, 0, 240, 96), Cell(0, 240, 240, 288), Cell(0, 96, 36, 240), Cell(204, 96, 240, 240))
-    upright = evidence(252, 300, [(0, 0, 288), (36, 96, 240), (204, 96, 240), (240, 0, 288)])
-    level = evidence(300, 252, [(0, 0, 240), (96, 36, 204), (240, 36, 204), (288, 0, 240)])
-    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), vertical=upright, horizontal=level)
+    lines = odds(
+        252,
+        300,
+        [(0, 0, 288), (36, 96, 240), (204, 96, 240), (240, 0, 288)],
+        [(0, 0, 240), (96, 36, 204), (240, 36, 204), (288, 0, 240)],
+    )
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines)
     assert unit_cell(run, 120.0, 150.0, category_of("oven")) == frame
-
-
-def test_a_drawer_is_parted_from_its_stack_by_a_seam_that_shows_only_beside_the_handles() -> None:
-    seams = [(90, 0, 72), (90, 168, 240), (180, 0, 72), (180, 168, 240)]
-    handles = [(45, 84, 156), (135, 84, 156), (225, 84, 156)]
-    level = evidence(270, 240, seams, score=1.0)
-    level.score[:] = np.maximum(level.score, evidence(270, 240, handles).score)
-    run: Any = SimpleNamespace(cells=(), grid=SimpleNamespace(cell_m=CELL_M), horizontal=level)
-    found = drawer_cell(run, Cell(0, 0, 240, 270), 120.0)
-    assert (round(found.top), round(found.bottom)) == (90, 180)
-    plain: Any = SimpleNamespace(cells=(), grid=run.grid, horizontal=evidence(270, 240, handles))
-    assert drawer_cell(plain, Cell(0, 0, 240, 270), 120.0) == Cell(0, 0, 240, 270)
