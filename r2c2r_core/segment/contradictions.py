@@ -70,7 +70,7 @@ def find_contradictions(
         found += _disobeyed(track, prompt, params)
         found += _unlikely_sizes(track, category, params)
         found += _misplaced(track, category, walls, params)
-        found += _unsure_edges(track, params)
+        found += _unsure_edges(track, category, params)
     return tuple(found)
 
 
@@ -194,14 +194,14 @@ def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], para
         )
 
 
-def _unsure_edges(track: MaskTrack, params: Params) -> Iterator[Contradiction]:
-    """Edges of fronts that hardly show, and seams that may be inside them."""
+def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Iterator[Contradiction]:
+    """Edges of fronts that hardly show, and seams that may be inside what should have none."""
     front = track.front
     if front is None or not front.edges:
         return
     sides = [side for side, sure in zip(_SIDES, front.edges, strict=True) if sure < params.unsure_edge]
     doubts = [f"its {' and '.join(sides)} edge{'s' * (len(sides) > 1)} hardly show{'s' * (len(sides) == 1)}"] if sides else []
-    if front.seam > params.unsure_seam:
+    if front.seam > params.unsure_seam and not _has_seams(category, front.width_m):
         doubts.append(f"there may be a seam inside it ({100 * front.seam:.0f} %)")
     if doubts:
         yield Contradiction(
@@ -210,6 +210,12 @@ def _unsure_edges(track: MaskTrack, params: Params) -> Iterator[Contradiction]:
             message=f"{track.name} ({100 * front.width_m:.0f} x {100 * front.height_m:.0f} cm): {', and '.join(doubts)}",
             mend="click beside it, off it, to move an edge there; or draw it in the elevation",
         )
+
+
+def _has_seams(category: Category, width_m: float) -> bool:
+    """Whether lines across such a front are nothing to ask about: two doors, a machine, a stack."""
+    pair = category.opens == "pair" or (category.wider is not None and width_m >= category.wider[0])
+    return pair or category.one_front or category.several_fronts
 
 
 def _range(size: Size) -> str:

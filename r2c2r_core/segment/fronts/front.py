@@ -333,13 +333,9 @@ def edge_strengths(front: Front) -> tuple[float, ...]:
 
 
 def seam_inside(front: Front) -> float:
-    """The probability of the likeliest line inside a panel that was not cut."""
-    cell, field, found = front.cell, LineField(front.run.odds, front.run.grid.cell_m), []
-    inset = tuned(Params).border_m / front.run.grid.cell_m
-    for axis, (low, high) in enumerate(((cell.left, cell.right), (cell.top, cell.bottom))):
-        line = field.best_between(cell, axis, low + inset, high - inset) if high - low > 2 * inset else None
-        found += [line.odds] if line is not None else []
-    return float(1 / (1 + np.exp(-max(found)))) if found else 0.0
+    """The probability of the likeliest seam inside a panel, which was not cut."""
+    odds = LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, tuned(Params).border_m)
+    return float(1 / (1 + np.exp(-odds)))
 
 
 def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:

@@ -134,6 +134,17 @@ class LineField:
         position = self._centre(cell, axis, first + paths.at[:, best], np.ones(len(paths.at), bool))
         return Line(mean * (span.stop - span.start), axis, position * STEP, mean)
 
+    def best_uncut(self, cell: Cell, inset_m: float) -> float:
+        """Log-odds, sizes and handles in mind, of the likeliest line this far within a cell; -inf where none fits."""
+        inset, best = inset_m / self.cell_m, -np.inf
+        for axis in (0, 1):
+            low, high = _across(cell, axis)
+            start, stop = round(low / STEP + inset), min(round(high / STEP - inset), self.odds[axis].shape[1])
+            paths = self._paths(cell, axis, start, stop)
+            if paths is not None:
+                best = max(best, float((paths.odds.mean(axis=0) + self._prior(cell, axis, start, stop)).max()))
+        return best
+
     def _best(self, cell: Cell, axis: int) -> Line | None:
         params = self.params
         low, high = _across(cell, axis)

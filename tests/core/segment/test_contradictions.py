@@ -127,3 +127,12 @@ def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about()
     assert (
         "door_1 (50 x 70 cm): its right and upper edges hardly show, and there may be a seam inside it (45 %)" in doubt.message
     )
+
+
+def test_the_seam_between_two_doors_is_not_asked_about() -> None:
+    pair = track("double_1", "double_door_cabinet", slice(0, 160))
+    assert pair.front is not None
+    said = found(
+        (replace(pair, front=replace(pair.front, edges=(0.9,) * 4, seam=0.9)), prompt("double_1", "double_door_cabinet", 40.5))
+    )
+    assert not any(contradiction.rule == "edge-unsure" for contradiction in said)
