@@ -115,9 +115,8 @@ def _usd(scene: Path) -> dict[str, Any]:
         raise _NotThereError("not installed: pip install usd-core")
     if not scene.is_file():
         raise FileNotFoundError(f"{scene.name} is not in the bundle")
-    from r2c2r_core.export.probes.usd import read_back
-
-    return read_back(scene)
+    # Not in this process: its libraries ask for the GIL while they are loaded, and another thread that loads one holds it.
+    return _probe([sys.executable, str(_PROBES / "usd.py")], scene)
 
 
 def _probe(command: list[str], scene: Path) -> dict[str, Any]:

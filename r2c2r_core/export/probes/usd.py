@@ -1,5 +1,7 @@
 """Read scene.usda with the USD library: what it holds, and what the library's own validators say of it."""
 
+import json
+import sys
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -63,8 +65,8 @@ def _joint(prim: Any, cache: Any) -> dict[str, Any]:
     physx = f"physxJointAxis:{instance}:"
     return {
         "type": kind,
-        "axis_world": world_from_joint[:3, "XYZ".index(joint.GetAxisAttr().Get())],
-        "origin_world": world_from_joint[:3, 3],
+        "axis_world": world_from_joint[:3, "XYZ".index(joint.GetAxisAttr().Get())].tolist(),
+        "origin_world": world_from_joint[:3, 3].tolist(),
         "lower": _value(joint.GetLowerLimitAttr()) * unit,
         "upper": _value(joint.GetUpperLimitAttr()) * unit,
         "damping": _value(drive.GetDampingAttr()) / unit,
@@ -84,10 +86,10 @@ def _body(prim: Any, cache: Any) -> dict[str, Any]:
     com = world_from_body @ [*mass.GetCenterOfMassAttr().Get(), 1.0]
     return {
         "mass_kg": _value(mass.GetMassAttr()),
-        "com_world": com[:3],
-        "inertia_world": principal @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ principal.T,
-        "rotation_world": turn,
-        "origin_world": world_from_body[:3, 3],
+        "com_world": com[:3].tolist(),
+        "inertia_world": (principal @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ principal.T).tolist(),
+        "rotation_world": turn.tolist(),
+        "origin_world": world_from_body[:3, 3].tolist(),
         "colliders": sum(child.HasAPI(UsdPhysics.CollisionAPI) for child in prim.GetChildren()),
     }
 
@@ -126,3 +128,7 @@ def _frame(prim: Any, cache: Any, body: Any, position: Any, rotation: Any) -> np
     if targets:
         local = local * cache.GetLocalToWorldTransform(prim.GetStage().GetPrimAtPath(targets[0]))
     return np.array(local).T
+
+
+if __name__ == "__main__":
+    Path(sys.argv[2]).write_text(json.dumps(read_back(Path(sys.argv[1]))))

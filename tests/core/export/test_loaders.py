@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -26,6 +28,21 @@ def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: 
         assert found[name].state == "passed", found[name]
         assert "4 joints, 9 links" in found[name].detail
     assert found["MuJoCo (MJCF)"].detail.endswith("it keeps no joint velocity")
+
+
+def test_usd_is_loaded_in_a_process_of_its_own(good_folder: Path) -> None:
+    """Its libraries ask for the GIL while they are loaded: beside another thread that loads one, both waited forever."""
+    code = """
+import sys
+from pathlib import Path
+from r2c2r_core.export.loaders import try_loaders
+from r2c2r_core.export.reading import read_urdf
+folder = Path(sys.argv[1])
+found = {result.loader: result.state for result in try_loaders(folder, read_urdf(folder / "scene.urdf"))}
+print(found["USD"], "pxr" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code, str(good_folder)], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-2:] == ["passed", "False"]
 
 
 def test_a_loader_that_is_not_there_is_not_tried(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
