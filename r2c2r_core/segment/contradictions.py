@@ -53,8 +53,8 @@ class Params:
         "above the floor, that what stands on it may seem to be",
         source="0.03 m is the worst seen on the sample kitchens",
     )
-    unsure_edge: float = param(0.3, "probability", "of an edge, below which it is asked about", ge=0, le=1)
-    unsure_seam: float = param(0.3, "probability", "of a seam inside a front, from which it is asked about", ge=0, le=1)
+    unsure_edge: float = param(0.3, "share", "of certainty of an edge, below which it is asked about", ge=0, le=1)
+    unsure_seam: float = param(0.3, "share", "of certainty of a seam inside a front, from which it is asked about", ge=0, le=1)
     in_wall_m: float = param(0.04, "m", "of a front from a wall's plane", source="the shallowest wall unit sold is 0.2 m deep")
 
 

@@ -45,7 +45,7 @@ class Params:
     steady_m: float = param(0.012, "m", "clicks this near a border are within pose error of it")
     border_m: float = param(0.035, "m", "clicks this near a border correct it: no panel is so narrow")
     two_names: float = param(
-        3.0, "nat", "by which two clicks of different names make a seam between them likelier", source="one in twenty is a slip"
+        3.0, "log", "by which two clicks of different names make a seam between them likelier", source="one in twenty is a slip"
     )
     hull_share: float = param(
         1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"

@@ -18,10 +18,10 @@ _SOURCE = "chosen on development kitchens of both generators"
 class Params:
     """What lines and ends add to the network's odds."""
 
-    line_weight: float = param(0.7, "nat/σ", "that a line adds where the network holds an edge possible", source=_SOURCE)
+    line_weight: float = param(0.7, "log", "a σ that a line adds where the network holds an edge possible", source=_SOURCE)
     line_from: float = param(1.0, "σ", "from where a line adds", source=_SOURCE)
     line_most: float = param(4.0, "σ", "beyond that, of which more adds nothing", source=_SOURCE)
-    possible: float = param(-3.5, "nat", "of an edge by the network, below which a line is a front's profile", source=_SOURCE)
+    possible: float = param(-3.5, "log", "of an edge by the network, below which a line is a front's profile", source=_SOURCE)
     block_m: float = param(0.03, "m", "along a line, over which depth is pooled", gt=0)
     end_from: float = param(2.0, "σ", "of 6, from where depth shows an end")
 

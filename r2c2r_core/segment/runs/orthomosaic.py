@@ -30,7 +30,7 @@ class Params:
         0.08, "m", "nearer by more hides the plane from a view", source="handles (5 cm) and the fused surface's error do not"
     )
     in_front_m: float = param(0.05, "m", "nearer than the plane by more is an occluder", source="handles are not")
-    odd_lab: float = param(25.0, "levels of Lab", "off what most frames show, from where a frame counts little", gt=0)
+    odd_lab: float = param(25.0, "grey", "off what most frames show, from where a frame counts little", gt=0)
     odd_weight: float = param(0.02, "share", "of its weight that such a frame keeps", gt=0)
     least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
 

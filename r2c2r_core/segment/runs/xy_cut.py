@@ -21,18 +21,18 @@ class Params:
     end_m: float = param(0.01, "m", "about where fronts end, within which their edge is", gt=0)
     shortest_m: float = param(0.06, "m", "of a line's span along fronts", gt=0)
     block_m: float = param(0.03, "m", "along a line, over which its odds are pooled and it stays at one place", gt=0)
-    step: float = param(0.5, "nat", "of a block, that a line's step aside by one cell costs: poses and lenses bend lines")
+    step: float = param(0.5, "log", "of a block, that a line's step aside by one cell costs: poses and lenses bend lines")
     usual_width_m: float = param(0.5, "m", "of a front, median", gt=0, source="units sold are 0.3 to 0.6 m wide")
     usual_height_m: float = param(0.45, "m", "of a front, median", gt=0, source="drawers 0.14 m, doors 0.72 m, tall doors 2 m")
-    width_spread: float = param(0.5, "nat", "standard deviation of the logarithm of fronts' widths", gt=0)
-    height_spread: float = param(0.9, "nat", "standard deviation of the logarithm of fronts' heights", gt=0)
+    width_spread: float = param(0.5, "log", "standard deviation of the logarithm of fronts' widths", gt=0)
+    height_spread: float = param(0.9, "log", "standard deviation of the logarithm of fronts' heights", gt=0)
     odd_share: float = param(0.05, "share", "of parts of any size: fillers, end panels, wide fronts", gt=0, lt=1)
     size_weight: float = param(0.5, "ratio", "of what sizes say: what the network was trained on knows a part of it")
     handle_weight: float = param(1, "ratio", "of what handles say, likewise")
     no_handle: float = param(0.5, "share", "of fronts without a handle", gt=0, lt=1)
     two_handles: float = param(0.01, "share", "of fronts with two", gt=0, lt=1)
     more_handles: float = param(0.25, "ratio", "of the share of fronts with one handle more", gt=0, lt=1)
-    handle_cells: int = param(4, "cells", "of the odds, that a handle has at least", gt=0)
+    handle_cells: int = param(4, "count", "of cells of the odds, that a handle has at least", gt=0)
 
 
 class Line(NamedTuple):

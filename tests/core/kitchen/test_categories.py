@@ -53,7 +53,7 @@ def test_every_line_is_whole(category: Category) -> None:
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
 def test_every_name_is_the_same_in_every_stage(category: Category, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, Any] = {}
-    monkeypatch.setattr(finders, "region_at", lambda planes, point: object())
+    monkeypatch.setattr(finders, "regions_at", lambda planes, point: [object()])
     monkeypatch.setattr(finders, "find_front", lambda run, on, off, **how: asked.update(how))
     bench: Any = type("Bench", (), {"planes": (), "run_of": lambda self, region: object()})()
     item = built_as(category.name, category)
@@ -64,8 +64,7 @@ def test_every_name_is_the_same_in_every_stage(category: Category, monkeypatch: 
         # segment: what is looked for
         finders._front(bench, found, np.zeros((1, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         assert asked["pair"] == (category.name in PAIRED or category.name.endswith("refrigerator"))
-        assert asked["unit"] is (category if category.one_front else None)
-        assert asked["stacked"] == (category.name == "drawer")
+        assert asked["kind"] is category
         assert sized_as(found).radius_m == min(category.longest_m / 2, 1.0)
         # generate: how deep it is, and which wall may be behind it
         depths = depths_behind(capture((wall,)), front, 0.6, 0.6, found)
