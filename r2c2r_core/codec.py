@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from r2c2r_core.geometry import camera, masks, transforms
-from r2c2r_core.model import capture, inputs, mesh, placement, reconstruction, report, scene, track
+from r2c2r_core.model import capture, inputs, mesh, motion, placement, reconstruction, report, scene, track
 
-_MODULES = (camera, masks, transforms, capture, inputs, mesh, placement, reconstruction, report, scene, track)
+_MODULES = (camera, masks, transforms, capture, inputs, mesh, motion, placement, reconstruction, report, scene, track)
 
 
 Classes = Mapping[str, type]

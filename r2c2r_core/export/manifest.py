@@ -11,6 +11,7 @@ import numpy as np
 from r2c2r_core.export.plan import Body, Plan
 from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.model.mesh import CandidateSet
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.placement import Placement, Spread
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import JointResult
@@ -117,6 +118,21 @@ def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
         "uncut": _plain(joint.uncut),
         "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
         "confidence": _plain(joint.confidence),
+        "motion": None if joint.motion is None else _motion_entry(joint.motion),
+    }
+
+
+def _motion_entry(motion: JointMotion) -> dict[str, Any]:
+    return {
+        "source": motion.source,
+        "covariance": _plain(motion.covariance),
+        "largest": _plain(motion.largest),
+        "stop_seen": motion.stop_seen,
+        "states": [
+            {"frame": frame, "value": _plain(state.value), "sigma": _plain(state.sigma)}
+            for frame, state in sorted(motion.states.items())
+        ],
+        "inside": None if motion.inside is None else _plain(asdict(motion.inside)),
     }
 
 

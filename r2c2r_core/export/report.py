@@ -175,7 +175,8 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
         "scan to mesh",
         "F at 1 cm",
     ]
-    legend = '<p class="quiet">m measured · i inferred · d default of the category · p given by a person. '
+    legend = '<p class="quiet">m measured · ≥ as far as it was seen to open · i inferred · d default of the category · '
+    legend += "p given by a person. "
     legend += (
         "Scan to mesh: median distance of the depth points to the closed model; F: points and visible surface within 1 cm. "
     )
@@ -305,4 +306,4 @@ def _text(value: object) -> str:
     return html.escape(shown(str(value)), quote=True)
 
 
-_SHORT = {"measured": "m", "inferred": "i", "default": "d", "person": "p"}
+_SHORT = {"measured": "m", "at_least": "≥", "inferred": "i", "default": "d", "person": "p"}

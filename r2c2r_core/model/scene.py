@@ -6,8 +6,8 @@ from typing import Literal
 from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.model.motion import JointMotion, Source
 
-Source = Literal["measured", "inferred", "default", "person"]
 JointType = Literal["revolute", "prismatic"]
 Role = Literal["front", "handle", "carcass", "inner"]
 """What a board is to the unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
@@ -77,6 +77,7 @@ class Joint:
     sources: dict[str, Source]  # axis, origin, limits
     uncut: float | None = None  # the upper limit before an obstacle cut it short; None where nothing did
     confidence: float | None = None  # in the side it is hinged on, 0..1; None where the category leaves no choice
+    motion: JointMotion | None = None  # as it was filmed; None where it was not seen to move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, Strict
 
 from r2c2r_core.model.contradiction import ContradictionRule
-from r2c2r_core.model.scene import Source
+from r2c2r_core.model.motion import Source
 from r2c2r_core.schema.document import Document
 from r2c2r_core.schema.prompts import PromptsFilePoint, Version
 
@@ -30,7 +30,7 @@ class ManifestJointSource(Document):
 
     axis: Source = Field(description="measured, inferred, default or person")
     origin: Source = Field(description="measured, inferred, default or person")
-    limits: Source = Field(description="measured, inferred, default or person")
+    limits: Source = Field(description="measured, at_least (as far as it was seen to open), inferred, default or person")
 
 
 class ManifestBlocker(Document):
@@ -39,6 +39,38 @@ class ManifestBlocker(Document):
     name: str = Field(description="an object, or another joint")
     kind: Literal["thing", "joint"] = Field(description="thing or joint")
     position: float = Field(description="rad or m of the blocked joint at which they meet")
+
+
+class ManifestState(Document):
+    """Where a front stood in a frame that shows it."""
+
+    frame: int = Field(ge=0, description="the frame's number in the recording")
+    value: float | None = Field(description="rad or m, 0 is closed; null where it is in view and not known")
+    sigma: float | None = Field(description="its standard deviation, rad or m")
+
+
+class ManifestInside(Document):
+    """What was seen behind an open front, clear lengths in m; null where it was not seen."""
+
+    depth_m: float | None = Field(description="from the back of the closed front to the face of the rear board")
+    width_m: float | None = Field(description="between the sides")
+    height_m: float | None = Field(description="from the bottom to the rim of a drawer's sides, or to the top board")
+    shelves_m: list[float] = Field(description="upper faces of the shelves above the bottom's face")
+    board_m: float | None = Field(description="thickness of the sides")
+    front_m: float | None = Field(description="thickness of the front")
+
+
+class ManifestMotion(Document):
+    """The joint as it was filmed."""
+
+    source: Source = Field(description="of axis and origin: measured, inferred or person")
+    covariance: list[list[float]] | None = Field(
+        description="6x6: of a small rotation of the axis about the world's axes (rad), then of the origin (m)"
+    )
+    largest: float = Field(description="the widest state seen, rad or m")
+    stop_seen: bool = Field(description="whether it was held still at the end of its motion")
+    states: list[ManifestState] = Field(description="one of every frame that shows the front")
+    inside: ManifestInside | None = Field(description="what was seen behind it")
 
 
 class ManifestJoint(Document):
@@ -55,6 +87,7 @@ class ManifestJoint(Document):
     )
     source: ManifestJointSource = Field(description="where its numbers come from")
     confidence: float | None = Field(description="of the hinge's side, 0 to 1; null where there is no choice")
+    motion: ManifestMotion | None = Field(default=None, description="as it was filmed; null where it was not seen to move")
     blocked_by: list[ManifestBlocker] = Field(default_factory=list, description="what is in its way when it opens")
 
 

@@ -22,8 +22,8 @@ from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.model.motion import Source
 from r2c2r_core.model.placement import Placement
-from r2c2r_core.model.scene import Source
 from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
 from r2c2r_core.synthesize.fixtures.spec import Lap
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh

@@ -11,7 +11,7 @@ import numpy as np
 from r2c2r_core.calibration import FITTED, calibrated
 from r2c2r_core.failing import spared
 from r2c2r_core.model.inputs import HingeSide, Overrides
-from r2c2r_core.model.scene import Source
+from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.tuning import param, tuned
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.model.scene import Source
+from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.facets import Colour, Facets, most_common
 from r2c2r_core.synthesize.slabs import Params as SlabsParams

@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.boxes import box_corners
-from r2c2r_core.model.scene import Source
+from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.facets import Colour
 from r2c2r_core.synthesize.unit_runs import Interval
 from r2c2r_core.tuning import param, tuned

@@ -15,8 +15,9 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
 from r2c2r_core.model.materials import JointFeel
 from r2c2r_core.model.mesh import MeshAsset
+from r2c2r_core.model.motion import Source
 from r2c2r_core.model.placement import Placement
-from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject, Source
+from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.scene import Source
+from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject, distance_to_wall
 from r2c2r_core.synthesize.facets import Colour, Facets, most_common
 from r2c2r_core.synthesize.facets import Params as FacetsParams

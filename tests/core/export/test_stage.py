@@ -88,7 +88,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     door = document["objects"][0]
     keys = "name category dimensions_m world_from_object joint dimension_source mask candidates chosen placement warp meshes"
     assert set(keys.split()) | {"mass_kg", "warnings"} <= set(door)
-    joint_keys = "name type axis origin lower upper uncut source confidence blocked_by"
+    joint_keys = "name type axis origin lower upper uncut source confidence motion blocked_by"
     assert set(door["joint"]) == set(joint_keys.split())
     assert door["joint"]["blocked_by"] == []
     assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]

@@ -2,20 +2,23 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
 from app import schemas
+from r2c2r_core.codec import decode_noun, encode_noun
 from r2c2r_core.commands.schema import NAMES, document_of, schema_text
 from r2c2r_core.config import ReconstructConfig, config_from
 from r2c2r_core.errors import InputError
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
-from r2c2r_core.schema.manifest import Manifest
+from r2c2r_core.model.motion import Inside, JointMotion, State
+from r2c2r_core.schema.manifest import Manifest, ManifestMotion
 from r2c2r_core.schema.prompts import PromptsFile
 from tests.core.export.kitchen import kitchen, reconstruction
 
@@ -95,3 +98,27 @@ def test_the_manifest_that_is_written_is_the_one_described() -> None:
 
 def test_the_app_reads_prompts_by_the_same_description() -> None:
     assert schemas.PromptsFile is PromptsFile
+
+
+def test_a_manifest_says_of_a_filmed_joint_what_the_fit_found() -> None:
+    scene = kitchen()
+    motion = JointMotion(
+        kind="revolute",
+        axis_world=np.array([0.0, 0.0, 1.0]),
+        pivot_world=np.zeros(3),
+        covariance=1e-6 * np.eye(6),
+        states={7: State(value=0.5, sigma=0.01), 3: State(value=None, sigma=None)},
+        largest=0.5,
+        stop_seen=False,
+        source="measured",
+        inside=Inside(depth_m=0.43, shelves_m=(0.2, 0.4)),
+    )
+    index = next(i for i, item in enumerate(scene.objects) if item.joints)
+    item = scene.objects[index]
+    filmed = replace(item, joints=(replace(item.joints[0], motion=motion), *item.joints[1:]))
+    scene = replace(scene, objects=(*scene.objects[:index], filmed, *scene.objects[index + 1 :]))
+    kept = decode_noun(encode_noun(scene, {}))[0]
+    entry = manifest_of(reconstruction(kept), plan_bundle(kept), None)["objects"][index]["joint"]["motion"]
+    assert entry["states"] == [{"frame": 3, "value": None, "sigma": None}, {"frame": 7, "value": 0.5, "sigma": 0.01}]
+    assert (entry["inside"]["depth_m"], entry["inside"]["shelves_m"], entry["inside"]["board_m"]) == (0.43, [0.2, 0.4], None)
+    assert ManifestMotion.model_validate(json.loads(json.dumps(entry))).largest == 0.5
