@@ -14,7 +14,7 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "sample", sample)
     added.add_argument("out", type=Path)
     added.add_argument("--seed", type=seed, default=0)
-    added.add_argument("--opened", action="store_true", help="a drawer and a door stand open in the later frames")
+    added.add_argument("--opened", action="store_true", help="fronts are opened and closed while it is filmed")
     add_size(added)
     added.formatter_class = argparse.RawDescriptionHelpFormatter
     added.add_argument("--style", choices=STYLES, metavar="NAME", help="how fronts are made, as listed below")

@@ -1,6 +1,6 @@
 """All surfaces painted and lit into one texture, so that a frame is a single lookup."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -34,6 +34,8 @@ class LitScene:
     face_normals: np.ndarray  # (m, 3) outward
     face_offsets: np.ndarray  # (m,) of the faces' planes
     emitters: tuple["Emitter", ...]
+    mover_of_patch: tuple[str, ...] = ()
+    body_patch: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # (patches,) of what moves: not its front
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,6 +88,8 @@ def light_scene(patches: list[Patch], rng: np.random.Generator) -> LitScene:
         face_normals=normals,
         face_offsets=np.einsum("ij,ij->i", normals, first),
         emitters=tuple(_emitter(patch) for patch in patches if patch.paint.kind == "emitter"),
+        mover_of_patch=tuple(patch.mover for patch in patches),
+        body_patch=np.array([patch.is_body for patch in patches]),
     )
 
 

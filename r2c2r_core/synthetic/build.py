@@ -8,26 +8,40 @@ import numpy as np
 
 from r2c2r_core.synthetic.fixed import fixed_patches
 from r2c2r_core.synthetic.fronts import handle_patches, leaf_patches
-from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Carcass, Furniture, Handle, Kitchen, Paint, Run
-from r2c2r_core.synthetic.opening import holds_opened, hollow, opened_front
-from r2c2r_core.synthetic.patches import Patch, box, lathe, quad, shifted, turned
+from r2c2r_core.synthetic.insides import (
+    Hollow,
+    carcass_behind,
+    facing_quads,
+    hollow_patches,
+    pierced_front,
+    tray_patches,
+)
+from r2c2r_core.synthetic.kitchen import Appliance, Bottle, Carcass, Furniture, Handle, Kitchen, Leaf, Paint, Run
+from r2c2r_core.synthetic.patches import Patch, box, inner_walls, lathe, moving, quad, shifted, turned
 from r2c2r_core.synthetic.props import crockery, prop_patches, sink_bounds, window_frame
 
 _SHADOW = Paint(kind="plain", colour=(0.05, 0.05, 0.05), texel_m=0.004)
 
 
-def build_kitchen(kitchen: Kitchen, opened: Mapping[str, float] = MappingProxyType({})) -> list[Patch]:
-    """All surfaces, with instance ids 1 + position in `kitchen.object_names` (0: background); `opened` as in opening.py."""
+Hollows = Mapping[str, Hollow]
+_NONE: Hollows = MappingProxyType({})
+
+
+def build_kitchen(kitchen: Kitchen, hollows: Hollows = _NONE) -> list[Patch]:
+    """All surfaces with every front closed, and instance ids 1 + position in `kitchen.object_names` (0: background).
+
+    `hollows` are the insides that can be seen, by the name of the unit or of the machine's joint; all else is solid.
+    """
     ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
     patches = _room(kitchen)
     for number, run in enumerate(kitchen.runs):
-        own = _run(kitchen, run, ids, opened)
+        own = _run(kitchen, run, ids, hollows)
         if number and run.has_wall:
             own += _splashback(kitchen, run)
         patches += _posed(own, run)
-    patches += _fridge(kitchen, ids[kitchen.fridge.name])
+    patches += _fridge(kitchen, ids[kitchen.fridge.name], hollows)
     if kitchen.microwave is not None:
-        patches += _microwave(kitchen, kitchen.microwave, ids[kitchen.microwave.name])
+        patches += _microwave(kitchen, kitchen.microwave, ids[kitchen.microwave.name], hollows)
     for run in kitchen.runs:
         for prop in run.props:
             patches += _posed(prop_patches(kitchen, prop), run)
@@ -36,15 +50,15 @@ def build_kitchen(kitchen: Kitchen, opened: Mapping[str, float] = MappingProxyTy
     return patches
 
 
-def _run(kitchen: Kitchen, run: Run, ids: Mapping[str, int], opened: Mapping[str, float]) -> list[Patch]:
+def _run(kitchen: Kitchen, run: Run, ids: Mapping[str, int], hollows: Hollows) -> list[Patch]:
     style = kitchen.style
-    patches = [*_base_body(kitchen, run, opened), *_upper_body(kitchen, run)]
+    patches = [*_base_body(kitchen, run, hollows), *_upper_body(kitchen, run, hollows)]
     for board in run.boards:
         patches += box(board.low, board.high, board.paint, lumel_m=0.01)
     for furniture in run.base:
-        patches += _furniture(kitchen, furniture, style.base_front, ids[furniture.name], opened.get(furniture.name))
+        patches += _furniture(kitchen, furniture, style.base_front, ids[furniture.name], hollows.get(furniture.name))
     for furniture in run.upper:
-        patches += _furniture(kitchen, furniture, style.wall_front, ids[furniture.name])
+        patches += _furniture(kitchen, furniture, style.wall_front, ids[furniture.name], hollows.get(furniture.name))
     for thing in run.fixed:
         patches += fixed_patches(thing, style, ids[thing.name])
     return patches
@@ -112,14 +126,14 @@ def _lights(kitchen: Kitchen) -> list[Patch]:
     return [lamp_quad, window, *window_frame(window)]
 
 
-def _base_body(kitchen: Kitchen, run: Run, opened: Mapping[str, float]) -> list[Patch]:
+def _base_body(kitchen: Kitchen, run: Run, hollows: Hollows) -> list[Patch]:
     style, left, right = kitchen.style, *run.ends
     patches: list[Patch] = []
     for carcass in run.base_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
-        if holds_opened(carcass, run, opened):
-            patches += box(low, high, style.carcass, faces="left right") + hollow(low, high, style.carcass)
+        if behind := _behind(carcass, run, hollows):
+            patches += box(low, high, style.carcass, faces="left right") + _opened_carcass(carcass, behind, style.carcass)
         else:
             patches += box(low, high, style.carcass, faces="front left right")
     front = -kitchen.base_depth_m
@@ -151,13 +165,27 @@ def _worktop_surface(kitchen: Kitchen, run: Run, front: float) -> list[Patch]:
     ]
 
 
-def _upper_body(kitchen: Kitchen, run: Run) -> list[Patch]:
+def _behind(carcass: Carcass, run: Run, hollows: Hollows) -> list[Hollow]:
+    """The compartments of a carcass that can be seen."""
+    units = [unit for unit in (*run.base, *run.upper) if unit.name in hollows]
+    return [hollows[unit.name] for unit in units if carcass_behind(run, unit) is carcass]
+
+
+def _opened_carcass(carcass: Carcass, hollows: list[Hollow], paint: Paint) -> list[Patch]:
+    """The front edges of a carcass's boards, and what is between them."""
+    return [*pierced_front(carcass, hollows, paint), *(patch for each in hollows for patch in hollow_patches(each))]
+
+
+def _upper_body(kitchen: Kitchen, run: Run, hollows: Hollows) -> list[Patch]:
     patches: list[Patch] = []
     for carcass in run.upper_carcasses:
         low = (carcass.x, -carcass.depth_m, carcass.z)
         high = (carcass.x + carcass.width_m, 0.0, carcass.z + carcass.height_m)
         if carcass.glazed:
             patches += box(low, high, kitchen.style.carcass, faces="left right top bottom") + _glazed(carcass, kitchen)
+        elif behind := _behind(carcass, run, hollows):
+            patches += box(low, high, kitchen.style.carcass, faces="left right top bottom")
+            patches += _opened_carcass(carcass, behind, kitchen.style.carcass)
         else:
             patches += box(low, high, kitchen.style.carcass, faces="front left right top bottom")
     return patches
@@ -169,7 +197,7 @@ def _glazed(carcass: Carcass, kitchen: Kitchen) -> list[Patch]:
     x0, x1 = carcass.x + wall, carcass.x + carcass.width_m - wall
     z0, z1 = carcass.z + wall, carcass.z + carcass.height_m - wall
     low, high = (x0, -carcass.depth_m, z0), (x1, -0.01, z1)
-    patches = hollow(low, high, inside)
+    patches = inner_walls(low, high, inside)
     for edge_low, edge_high in (
         ((carcass.x, carcass.z), (x0, carcass.z + carcass.height_m)),
         ((x1, carcass.z), (carcass.x + carcass.width_m, carcass.z + carcass.height_m)),
@@ -185,15 +213,18 @@ def _glazed(carcass: Carcass, kitchen: Kitchen) -> list[Patch]:
 
 
 def _furniture(
-    kitchen: Kitchen, furniture: Furniture, paint: Paint, object_id: int, opening: float | None = None
+    kitchen: Kitchen, furniture: Furniture, paint: Paint, object_id: int, behind: Hollow | None = None
 ) -> list[Patch]:
     style = kitchen.style
     face = -furniture.depth_m
     patches: list[Patch] = []
     for leaf in furniture.leaves:
-        patches += leaf_patches(leaf, face, style.front_thickness_m, paint, style.handle, object_id)
-    if opening is not None:
-        patches = opened_front(furniture, patches, opening, style.front_thickness_m, style.carcass, object_id)
+        front = leaf_patches(leaf, face, style.front_thickness_m, paint, style.handle, object_id)
+        if behind is not None:
+            front += _back(leaf, face + style.front_thickness_m, style.carcass, object_id)
+        patches += moving(front, furniture.joint_name(leaf))
+    if behind is not None:
+        patches += tray_patches(behind, furniture.joint_name(furniture.leaves[0]), object_id)
     first, last = furniture.leaves[0], furniture.leaves[-1]
     back = face + style.front_thickness_m
     edge = style.gap_m / 2 + 0.0005  # the carcass is as wide as the unit, the front a gap narrower
@@ -207,23 +238,51 @@ def _furniture(
     return patches
 
 
-def _fridge(kitchen: Kitchen, object_id: int) -> list[Patch]:
+def _back(leaf: Leaf, y: float, paint: Paint, object_id: int) -> list[Patch]:
+    """The inner face of a front."""
+    low, high = (leaf.x, y - 0.001, leaf.z), (leaf.x + leaf.width_m, y, leaf.z + leaf.height_m)
+    return box(low, high, paint, faces="back", object_id=object_id)
+
+
+def _fridge(kitchen: Kitchen, object_id: int, hollows: Hollows) -> list[Patch]:
     fridge = kitchen.fridge
     x0, x1, y0, y1, _, z1 = _bounds(fridge)
     z0 = 0.018  # above its feet
     seal = y0 + fridge.door_thickness_m
     patches = []
-    for left, right, low, high in _fridge_fronts(fridge, x0, x1, z0, z1):
-        patches += box((left, y0, low), (right, seal, high), fridge.door, object_id=object_id)
+    for (left, right, low, high), name in zip(_fridge_fronts(fridge, x0, x1, z0, z1), fridge.fronts, strict=True):
+        patches += moving(box((left, y0, low), (right, seal, high), fridge.door, object_id=object_id), name)
     patches += box(
         (x0 + 0.008, seal, z0), (x1 - 0.008, seal + 0.012, z1 - 0.008), _SHADOW, faces="left right top", object_id=object_id
     )
-    patches += box((x0, seal + 0.012, z0), (x1, y1, z1), fridge.body, object_id=object_id)
+    patches += _machine_body(fridge, (x0, seal + 0.012, z0), (x1, y1, z1), object_id, hollows)
     foot = Paint(kind="plain", colour=(0.03, 0.03, 0.03), texel_m=0.004)
     patches += box((x0 + 0.02, y0 + 0.07, 0.0), (x1 - 0.02, y1, z0), foot, faces="front left right", object_id=object_id)
-    for handle in _fridge_handles(fridge):
-        patches += handle_patches(handle, np.array([x0, y0, 0.0]), _appliance_handle(fridge), object_id)
+    for handle, name in zip(_fridge_handles(fridge), fridge.fronts, strict=True):
+        own = handle_patches(handle, np.array([x0, y0, 0.0]), _appliance_handle(fridge), object_id)
+        patches += moving(own, name)
     return patches
+
+
+def _machine_body(
+    thing: Appliance, low: tuple[float, float, float], high: tuple[float, float, float], object_id: int, hollows: Hollows
+) -> list[Patch]:
+    """The box behind a machine's fronts, open to the compartments that can be seen, with the drawers in them."""
+    seen = {name: hollows[name] for name in thing.fronts if name in hollows}
+    if not seen:
+        return box(low, high, thing.body, object_id=object_id)
+    patches = box(low, high, thing.body, faces="back left right top bottom", object_id=object_id)
+    centre = np.array(thing.centre)
+    compartments = sorted({id(each): each for each in seen.values()}.values(), key=lambda each: each.low[2])
+    spans, z = [], low[2]
+    for each in compartments:
+        (left, _, bottom), (right, _, top) = np.array(each.low) + centre, np.array(each.high) + centre
+        spans += [(low[0], high[0], z, bottom), (low[0], left, bottom, top), (right, high[0], bottom, top)]
+        z = top
+    patches += facing_quads([*spans, (low[0], high[0], z, high[2])], low[1], thing.body, object_id)
+    inner = [patch for each in compartments for patch in hollow_patches(each, object_id)]
+    inner += [patch for name, each in seen.items() for patch in tray_patches(each, name, object_id)]
+    return patches + shifted(inner, centre)
 
 
 def _fridge_fronts(fridge: Appliance, x0: float, x1: float, z0: float, z1: float) -> list[tuple[float, float, float, float]]:
@@ -244,7 +303,7 @@ def _fridge_handles(fridge: Appliance) -> list[Handle]:
     return [*doors, replace(fridge.handle, vertical=False, x=middle, z=fridge.drawer_m - 0.06)]
 
 
-def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int) -> list[Patch]:
+def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int, hollows: Hollows) -> list[Patch]:
     """Door on the hinge side, control panel beside it; turned by its yaw on the worktop."""
     x0, x1, y0, y1, z0, z1 = _bounds(oven)
     z0 += 0.012  # above its feet
@@ -253,9 +312,10 @@ def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int) -> list[Patch]
     door_x = (x0, x0 + oven.door_width_m - 0.001) if left_hinged else (x1 - oven.door_width_m + 0.001, x1)
     panel_x = (x0 + oven.door_width_m + 0.001, x1) if left_hinged else (x0, x1 - oven.door_width_m - 0.001)
     controls = Paint(kind="controls", colour=oven.body.colour, accent=_contrast(oven.body.colour), gloss=0.3, texel_m=0.001)
-    patches = box((door_x[0], y0, z0), (door_x[1], split, z1), {"front": oven.door, "": oven.body}, object_id=object_id)
+    door = box((door_x[0], y0, z0), (door_x[1], split, z1), {"front": oven.door, "": oven.body}, object_id=object_id)
+    patches = moving(door, oven.fronts[0])
     patches += box((panel_x[0], y0, z0), (panel_x[1], split, z1), {"front": controls, "": oven.body}, object_id=object_id)
-    patches += box((x0, split + 0.002, z0), (x1, y1, z1), oven.body, object_id=object_id)
+    patches += _machine_body(oven, (x0, split + 0.002, z0), (x1, y1, z1), object_id, hollows)
     patches += box(
         (x0 + 0.004, split, z0 + 0.004),
         (x1 - 0.004, split + 0.002, z1 - 0.004),
@@ -267,7 +327,8 @@ def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int) -> list[Patch]
         for foot_y in (y0 + 0.03, y1 - 0.05):
             foot = (foot_x, foot_y, kitchen.worktop_top_m), (foot_x + 0.02, foot_y + 0.02, z0)
             patches += box(*foot, _SHADOW, faces="front left right", object_id=object_id)
-    patches += handle_patches(oven.handle, np.array([door_x[0], y0, z0]), _appliance_handle(oven), object_id)
+    own = handle_patches(oven.handle, np.array([door_x[0], y0, z0]), _appliance_handle(oven), object_id)
+    patches += moving(own, oven.fronts[0])
     return turned(patches, oven.yaw_rad, (oven.centre[0], oven.centre[1]))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 
-Hinge = Literal["left", "right", "bottom"]
+Hinge = Literal["left", "right", "bottom", "top"]
 Way = Literal["left", "right"]
 HandleKind = Literal["bar", "flat", "bow", "knob", "cup", "finger"]
 Filling = Literal["panel", "glass", "frosted"]
@@ -77,6 +77,10 @@ class Furniture:
     shows_left_side: bool = False
     shows_right_side: bool = False
 
+    def joint_name(self, leaf: Leaf) -> str:
+        """Of the joint that moves one of its leaves."""
+        return f"{self.name}_joint{f'_{leaf.hinge}' if len(self.leaves) > 1 else ''}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Carcass:
@@ -126,6 +130,11 @@ class Appliance:
     open_limit: float
     body: Paint
     door: Paint
+
+    @property
+    def fronts(self) -> tuple[str, ...]:
+        """The names of its joints: of its door; or of the left one, the right one, and the drawer under them."""
+        return tuple(f"{self.name}_joint{part}" for part in (("_left", "_right", "_drawer") if self.drawer_m else ("",)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

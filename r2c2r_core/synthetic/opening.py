@@ -1,57 +1,329 @@
-"""What stands open in the later part of a recording: one drawer and one door, each at its stop."""
+"""A recording in which fronts are opened: which ones, when, how far, and what is seen behind them.
+
+After a walk past everything closed, fronts are opened one after the other, where it can be two of them overlapping in time; one
+stands open when the film begins and one is left open when it ends. Some are held still where they
+stop, the others turn back before it.
+"""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from r2c2r_core.synthetic.kitchen import Carcass, Furniture, Kitchen, Leaf, Paint, Run
-from r2c2r_core.synthetic.patches import Patch, box, shifted, turned
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.synthetic.insides import Hollow, appliance_hollow, carcass_behind, unit_hollow
+from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Run
+from r2c2r_core.synthetic.truth import TrueJoint, TrueObject, true_objects
 
-OPENED_FROM = 0.55  # of the recording: on the way back along the run
-_TRAY_WALL_M, _TRAY_HEIGHT, _TRAY_SPARE_M = 0.013, 0.6, 0.05
-
-
-def opened_units(kitchen: Kitchen) -> dict[str, float]:
-    """Name and opening (metres, radians) of a drawer and a single door of the base run, as far apart as it has them."""
-    drawers = [f for f in kitchen.base if f.category == "drawer"]
-    doors = [f for f in kitchen.base if f.category == "cabinet"]
-    if not drawers or not doors:
-        return {f.name: f.leaves[0].open_limit for f in (drawers[:1] or doors[:1])}
-    pairs = [(a, b) for a in drawers for b in doors]
-    drawer, door = max(pairs, key=lambda pair: abs(pair[0].leaves[0].x - pair[1].leaves[0].x))
-    return {f.name: f.leaves[0].open_limit for f in (drawer, door)}
+WALK_FROM, WALK_TO = 0.12, 0.46  # of the recording: past everything, before the first front is opened
+START_CLOSED = 0.085  # by when what stood open at the start is closed
+_FRAMES_EACH = 38  # of the recording, for each front that is opened
+_MOST = 7
+_RARE = ("lateral", "appliance drawer", "bottom", "top", "pair")  # kinds that come first where a kitchen has them
+_CLEAR_M = 0.01  # kept from the room's walls
+_HELD_SHARE = 0.6
+_TOGETHER_M = 1.4  # between two fronts that one view shows
 
 
-def opened_front(
-    furniture: Furniture, front: list[Patch], opening: float, thickness_m: float, inside: Paint, object_id: int
-) -> list[Patch]:
-    """The front (panel and handle) where it stands opened, with its back, and a drawer's tray."""
-    leaf, face = furniture.leaves[0], -furniture.depth_m
-    back = face + thickness_m
-    low, high = (leaf.x, back - 0.001, leaf.z), (leaf.x + leaf.width_m, back, leaf.z + leaf.height_m)
-    moving = [*front, *box(low, high, inside, faces="back", object_id=object_id)]
-    if leaf.hinge is None:
-        moving += _tray(leaf, back, back + opening + _TRAY_SPARE_M, inside, object_id)
-        return shifted(moving, np.array([0.0, -opening, 0.0]))
-    edge = leaf.x if leaf.hinge == "left" else leaf.x + leaf.width_m
-    return turned(moving, -opening if leaf.hinge == "left" else opening, (edge, face))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Front:
+    """One front that can move, in the kitchen's frame."""
+
+    owner: str  # the object's name
+    joint: TrueJoint
+    kind: str
+    corners: np.ndarray  # (8, 3) of its box, closed
+    run: Run | None  # None: of a free-standing machine
+    hollow_key: str  # of the compartment it closes, as build.py names it
+
+    @property
+    def middle(self) -> np.ndarray:
+        """The middle of its box."""
+        return np.asarray(self.corners.mean(axis=0))
+
+    def pose(self, state: float) -> Rigid3:
+        """How it has moved from its closed place, in the kitchen's frame."""
+        return joint_pose(self.joint, state)
 
 
-def hollow(low: tuple[float, float, float], high: tuple[float, float, float], inside: Paint) -> list[Patch]:
-    """The inner walls of a box open at the front."""
-    return box(high, low, inside, faces="front left right top bottom")  # corners swapped: each wall faces inwards
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """One front's way: closed until `rises[0]`, at its widest from `rises[1]` to `falls[0]`, closed from `falls[1]` on.
+
+    Times are shares of the recording; what stands open at its beginning rose before 0, what is left open falls after 1.
+    """
+
+    joint: str
+    widest: float  # rad or m
+    rises: tuple[float, float]
+    falls: tuple[float, float]
+    held: bool  # still, at the end of its motion, for longer than a person takes to turn round
+
+    def state(self, time: float) -> float:
+        """Rad or m at a time."""
+        return self.widest * (_ease(time, *self.rises) - _ease(time, *self.falls))
+
+    def moves(self, time: float) -> bool:
+        """Whether a hand is on it."""
+        return self.rises[0] < time < self.rises[1] or self.falls[0] < time < self.falls[1]
 
 
-def holds_opened(carcass: Carcass, run: Run, opened: Mapping[str, float]) -> bool:
-    """Whether a carcass of the run stands behind an opened front."""
-    middles = [f.leaves[0].x + f.leaves[0].width_m / 2 for f in run.base if f.name in opened]
-    return any(carcass.x < middle < carcass.x + carcass.width_m for middle in middles)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Film:
+    """All that is opened in one recording."""
+
+    kitchen: Kitchen
+    fronts: Mapping[str, Front]  # every front that could move, by its joint's name
+    openings: tuple[Opening, ...]  # in the order in which the camera goes to them
+    hollows: Mapping[str, Hollow]
+
+    def states(self, time: float) -> dict[str, float]:
+        """What every front's joint stands at, rad or m."""
+        found = dict.fromkeys(self.fronts, 0.0)
+        return found | {opening.joint: opening.state(time) for opening in self.openings}
+
+    def frames_open(self, owner: str, frames: int) -> frozenset[int]:
+        """The frames in which a front of that object is not in its place."""
+        mine = [opening for opening in self.openings if self.fronts[opening.joint].owner == owner]
+        return frozenset(i for i in range(frames) if any(o.state(share_of(i, frames)) > 0 for o in mine))
 
 
-def _tray(leaf: Leaf, front_y: float, back_y: float, inside: Paint, object_id: int) -> list[Patch]:
-    low = (leaf.x + 0.02, front_y, leaf.z + 0.02)
-    high = (leaf.x + leaf.width_m - 0.02, back_y, leaf.z + 0.02 + _TRAY_HEIGHT * (leaf.height_m - 0.02))
-    wall = _TRAY_WALL_M
-    inner_low, inner_high = (low[0] + wall, low[1], low[2] + wall), (high[0] - wall, high[1] - wall, high[2])
-    outer = box(low, high, inside, faces="left right bottom back", object_id=object_id)
-    return outer + box(inner_high, inner_low, inside, faces="front left right top", object_id=object_id)
+def share_of(frame: int, frames: int) -> float:
+    """A frame's time as a share of the recording."""
+    return frame / max(frames - 1, 1)
+
+
+def plan_film(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> Film:
+    """The film of a kitchen in so many frames: the more frames, the more fronts."""
+    kitchen = _with_lift(kitchen, rng)
+    fronts = {front.joint.name: front for front in _fronts(kitchen)}
+    free = [front for front in fronts.values() if _is_free(front, kitchen)]
+    chosen = _choose(free, int(np.clip(frames // _FRAMES_EACH, 2, _MOST)), rng)
+    openings = _schedule(kitchen, chosen, rng)
+    hollows: dict[str, Hollow] = {}
+    for opening in openings:
+        key = fronts[opening.joint].hollow_key
+        if key not in hollows:
+            hollows |= _hollows_of(kitchen, fronts[opening.joint], rng)
+    return Film(kitchen=kitchen, fronts=fronts, openings=openings, hollows=hollows)
+
+
+def joint_pose(joint: TrueJoint, state: float) -> Rigid3:
+    """How a joint has moved its part, in the frame the joint is in."""
+    if joint.type == "prismatic":
+        return Rigid3(np.eye(3), state * joint.axis)
+    rotation = np.asarray(Rotation.from_rotvec(state * joint.axis).as_matrix())
+    return Rigid3(rotation, joint.origin - rotation @ joint.origin)
+
+
+def _ease(time: float, start: float, end: float) -> float:
+    """From 0 to 1 as a hand moves things: the path of least jerk (Flash and Hogan 1985)."""
+    t = float(np.clip((time - start) / (end - start), 0.0, 1.0))
+    return t**3 * (10 - 15 * t + 6 * t**2)
+
+
+def _with_lift(kitchen: Kitchen, rng: np.random.Generator) -> Kitchen:
+    """The kitchen with one single-door wall unit of its first run hinged at the top, its handle at the lower edge."""
+    run = kitchen.runs[0]
+    single = [unit for unit in run.upper if len(unit.leaves) == 1 and not carcass_behind(run, unit).glazed]
+    if not single:
+        return kitchen
+    chosen = single[int(rng.integers(len(single)))]
+    leaf = chosen.leaves[0]
+    handle = leaf.handle
+    if handle is not None:
+        length = min(handle.length_m, 0.7 * leaf.width_m)
+        handle = replace(handle, vertical=False, length_m=length, x=leaf.width_m / 2, z=0.05)
+    limit = round(float(np.radians(rng.uniform(75, 110))), 3)
+    lifted = replace(chosen, leaves=(replace(leaf, hinge="top", handle=handle, open_limit=limit),))
+    upper = tuple(lifted if unit is chosen else unit for unit in run.upper)
+    return replace(kitchen, runs=(replace(run, upper=upper), *kitchen.runs[1:]))
+
+
+def _fronts(kitchen: Kitchen) -> list[Front]:
+    objects = {thing.name: thing for thing in true_objects(kitchen)}
+    found = []
+    for run in kitchen.runs:
+        for unit in (*run.base, *run.upper):
+            found += _unit_fronts(unit, run, objects[unit.name], kitchen.style.front_thickness_m)
+    for machine in (kitchen.fridge, kitchen.microwave):
+        if machine is not None:
+            found += _machine_fronts(machine, objects[machine.name])
+    return found
+
+
+def _unit_fronts(unit: Furniture, run: Run, thing: TrueObject, thickness: float) -> list[Front]:
+    fronts = []
+    for leaf, joint in zip(unit.leaves, thing.joints, strict=True):
+        low = np.array([leaf.x, -unit.depth_m, leaf.z])
+        high = low + np.array([leaf.width_m, thickness, leaf.height_m])
+        kind = "pair" if len(unit.leaves) > 1 else leaf.hinge or ("lateral" if leaf.slides else "drawer")
+        corners = run.kitchen_from_run.apply(_corners(low, high))
+        fronts.append(Front(owner=unit.name, joint=joint, kind=kind, corners=corners, run=run, hollow_key=unit.name))
+    return fronts
+
+
+def _machine_fronts(machine: Appliance, thing: TrueObject) -> list[Front]:
+    (width, depth, height), doors = machine.size_m, machine.drawer_m > 0
+    fronts = []
+    for name, joint in zip(machine.fronts, thing.joints, strict=True):
+        left, right, bottom, top = -width / 2, width / 2, -height / 2, height / 2
+        if doors:
+            is_drawer = name.endswith("_drawer")
+            bottom, top = (bottom, bottom + machine.drawer_m) if is_drawer else (bottom + machine.drawer_m, top)
+            left, right = (left, 0.0) if name.endswith("_left") else (0.0, right) if name.endswith("_right") else (left, right)
+        elif machine.door_width_m < width:
+            left, right = (
+                (left, left + machine.door_width_m) if machine.hinge == "left" else (right - machine.door_width_m, right)
+            )
+        low, high = np.array([left, -depth / 2, bottom]), np.array([right, -depth / 2 + machine.door_thickness_m, top])
+        kind = "appliance drawer" if name.endswith("_drawer") else "pair" if doors else machine.category
+        corners = thing.kitchen_from_object.apply(_corners(low, high))
+        key = machine.fronts[0] if name.endswith("_right") else name
+        fronts.append(Front(owner=machine.name, joint=joint, kind=kind, corners=corners, run=None, hollow_key=key))
+    return fronts
+
+
+def _corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def _is_free(front: Front, kitchen: Kitchen) -> bool:
+    """Whether nothing is in its way, nothing hangs on it, and a person with a phone can stand before it."""
+    way = swept(front)
+    x0, x1, y0, _, _ = kitchen.room
+    if way[:, 0].min() < x0 + _CLEAR_M or way[:, 0].max() > x1 - _CLEAR_M or way[:, 1].min() < y0 + 0.5:
+        return False
+    if front.run is None:
+        return front.kind != "microwave" or _worktop_is_clear(way, kitchen)
+    if len(kitchen.runs) == 3 and front.run is kitchen.runs[1]:  # an island's far side is another room
+        return False
+    unit = next(u for u in (*front.run.base, *front.run.upper) if u.name == front.owner)
+    return not _carries(unit, front.run) and not carcass_behind(front.run, unit).glazed
+
+
+def swept(front: Front, upto: float | None = None) -> np.ndarray:
+    """(n, 3) where the corners of a front come by on its way to a state, or to its limit."""
+    states = np.linspace(0.0, front.joint.upper if upto is None else upto, 9)
+    return np.concatenate([front.pose(float(state)).apply(front.corners) for state in states])
+
+
+def _carries(unit: Furniture, run: Run) -> bool:
+    """Whether a towel or a sheet of paper hangs on a unit's front: it would be left behind."""
+    leaf = unit.leaves[0]
+    return any(
+        board.low[1] < -unit.depth_m - 1e-4
+        and board.low[0] < leaf.x + leaf.width_m
+        and board.high[0] > leaf.x
+        and board.low[2] < leaf.z + leaf.height_m
+        and board.high[2] > leaf.z
+        for board in run.boards
+    )
+
+
+def _worktop_is_clear(way: np.ndarray, kitchen: Kitchen) -> bool:
+    """Whether nothing on the worktop stands where a microwave's door comes by."""
+    low, high = way[:, :2].min(axis=0) - 0.06, way[:, :2].max(axis=0) + 0.06
+    standing = [(b.x, b.y) for b in kitchen.bottles] + [
+        (p.x, p.y) for p in kitchen.runs[0].props if p.z == 0 and p.kind != "hob"
+    ]
+    return not any((low < place).all() and (place < high).all() for place in np.array(standing).reshape(-1, 2))
+
+
+def _choose(free: list[Front], count: int, rng: np.random.Generator) -> list[list[Front]]:
+    """Groups of fronts that open together, of as many kinds as there are: a pair's two leaves are one group."""
+    kinds: dict[str, list[Front]] = {}
+    for front in free:
+        kinds.setdefault(front.kind, []).append(front)
+    common = [kind for kind in kinds if kind not in _RARE]
+    order = [kind for kind in _RARE if kind in kinds] + [common[i] for i in rng.permutation(len(common))]
+    chosen: list[list[Front]] = []
+    taken: set[str] = set()
+    while sum(len(group) for group in chosen) < count and any(kinds.values()):
+        for kind in order:
+            rest = [front for front in kinds[kind] if front.owner not in taken and front.hollow_key not in taken]
+            kinds[kind] = rest
+            if not rest or sum(len(group) for group in chosen) >= count:
+                continue
+            first = rest[int(rng.integers(len(rest)))]
+            group = [front for front in rest if front.owner == first.owner] if kind == "pair" else [first]
+            taken.add(first.owner)
+            kinds[kind] = [front for front in rest if front not in group and not _shares_carcass(front, first)]
+            chosen.append(group)
+    return chosen
+
+
+def _shares_carcass(a: Front, b: Front) -> bool:
+    """Two doors that slide past each other close one compartment."""
+    return a.kind == b.kind == "lateral" and a.run is b.run
+
+
+def _schedule(kitchen: Kitchen, groups: list[list[Front]], rng: np.random.Generator) -> tuple[Opening, ...]:
+    """One group already open at the start, the others in turn after the walk; the last stays open."""
+    single = [group for group in groups if len(group) == 1 and (group[0].run is None or group[0].run is kitchen.runs[0])]
+    start = single[int(rng.integers(len(single)))] if len(groups) > 1 and single else None
+    turns = _overlapped(_in_reach([group for group in groups if group is not start], kitchen))
+    openings = []
+    if start is not None:
+        (front,) = start
+        widest = round(float(rng.uniform(0.55, 0.85)) * front.joint.upper, 3)
+        openings.append(
+            Opening(joint=front.joint.name, widest=widest, rises=(-2.0, -1.0), falls=(0.035, START_CLOSED), held=False)
+        )
+    length = (1.0 - WALK_TO) / max(len(turns), 1)
+    for number, group in enumerate(turns):
+        at, last = WALK_TO + number * length, number == len(turns) - 1
+        for leaf, front in enumerate(group):
+            held = last or bool(rng.random() < _HELD_SHARE)
+            openings.append(_turn(front, at + 0.1 * leaf * length, length, held, last, rng))
+    return tuple(openings)
+
+
+def _turn(front: Front, at: float, length: float, held: bool, last: bool, rng: np.random.Generator) -> Opening:
+    """One opening within its part of the film: the way there, then out, a rest or none, and back."""
+    pace = float(rng.uniform(0.8, 1.05))
+    out = at + 0.28 * length, at + (0.28 + 0.26 * pace) * length
+    rest = float(rng.uniform(0.16, 0.22)) * length if held else 0.0
+    back = (3.0, 4.0) if last else (out[1] + rest, out[1] + rest + 0.26 * pace * length)
+    widest = front.joint.upper if held else round(float(rng.uniform(0.5, 0.85)) * front.joint.upper, 3)
+    return Opening(joint=front.joint.name, widest=widest, rises=out, falls=back, held=held)
+
+
+def _in_reach(groups: list[list[Front]], kitchen: Kitchen) -> list[list[Front]]:
+    """The groups in the order of a short way, from the main run's middle on."""
+    here, rest, order = np.array([sum(kitchen.runs[0].ends) / 2, -1.5]), list(groups), []
+    while rest:
+        nearest = min(rest, key=lambda group: float(np.linalg.norm(group[0].middle[:2] - here)))
+        here = nearest[0].middle[:2]
+        order.append(nearest)
+        rest = [group for group in rest if group is not nearest]
+    return order
+
+
+def _overlapped(groups: list[list[Front]]) -> list[list[Front]]:
+    """The groups; where none has two fronts, the first two that one view shows and that keep clear of each other are one."""
+    if any(len(group) > 1 for group in groups):
+        return groups
+    for (number, (a,)), (other, (b,)) in combinations(enumerate(groups), 2):
+        near = float(np.linalg.norm(a.middle - b.middle)) < _TOGETHER_M
+        if near and a.run is b.run and _apart(swept(a), swept(b)):
+            rest = [group for position, group in enumerate(groups) if position not in (number, other)]
+            return [*rest[:number], [a, b], *rest[number:]]
+    return groups
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether the boxes round two ways share nothing."""
+    return bool(((one.max(axis=0) < other.min(axis=0)) | (other.max(axis=0) < one.min(axis=0))).any())
+
+
+def _hollows_of(kitchen: Kitchen, front: Front, rng: np.random.Generator) -> dict[str, Hollow]:
+    """The compartment behind a front; of french doors both leaves' one."""
+    if front.run is not None:
+        unit = next(u for u in (*front.run.base, *front.run.upper) if u.name == front.owner)
+        return {front.hollow_key: unit_hollow(kitchen, front.run, unit, rng)}
+    machine = kitchen.fridge if front.owner == kitchen.fridge.name else kitchen.microwave
+    assert machine is not None
+    return {front.hollow_key: appliance_hollow(machine, front.hollow_key, rng)}

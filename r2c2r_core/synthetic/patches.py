@@ -19,6 +19,9 @@ class Patch:
     object_id: int = 0  # 0: background
     is_handle: bool = False
     lumel_m: float = 0.025  # spacing of the baked light
+    mover: str = ""  # the joint that it moves with; "": it stands still
+    is_body: bool = False  # of what moves: not the front itself, but the drawer behind it
+    is_inner: bool = False  # of a compartment: seen when its front is open
 
 
 Vector = tuple[float, float, float]
@@ -73,6 +76,11 @@ def box(
     return patches
 
 
+def inner_walls(low: Vector, high: Vector, paint: Paint, object_id: int = 0) -> list[Patch]:
+    """The walls of a box open at the front, seen from within."""
+    return box(high, low, paint, faces="front left right top bottom", object_id=object_id)  # corners swapped: facing inwards
+
+
 def lathe(centre: Vector, profile: list[tuple[float, float]], paint: Paint, *, object_id: int = 0, sides: int = 28) -> Patch:
     """A surface of revolution about the vertical through `centre`; profile of (radius, z) from top to bottom."""
     radius, z = np.array(profile).T
@@ -125,6 +133,11 @@ def turned(patches: list[Patch], yaw_rad: float, centre: tuple[float, float]) ->
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pivot = np.array([*centre, 0.0])
     return [replace(p, grid=(p.grid - pivot) @ rotation.T + pivot) for p in patches]
+
+
+def moving(patches: list[Patch], mover: str, *, is_body: bool = False) -> list[Patch]:
+    """The patches as parts of what a joint moves."""
+    return [replace(p, mover=mover, is_body=is_body) for p in patches]
 
 
 def shifted(patches: list[Patch], by: np.ndarray) -> list[Patch]:

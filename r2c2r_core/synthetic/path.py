@@ -27,9 +27,18 @@ class Shot:
 
 def walk(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> list[Shot]:
     """Along the run and back, looking up and down at the fronts from both sides."""
+    eyes, targets = key_poses(kitchen, rng)
+    return film_along(even_pace(eyes, targets), eyes, targets, frames, rng)
+
+
+def key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Eye positions and points looked at on the walk past everything, in the kitchen's frame."""
+    return _key_poses(kitchen, rng) if len(kitchen.runs) == 1 else round_poses(kitchen, rng)
+
+
+def film_along(knots: np.ndarray, eyes: np.ndarray, targets: np.ndarray, frames: int, rng: np.random.Generator) -> list[Shot]:
+    """A hand-held camera that comes by each pose at its knot (0..1 of the recording)."""
     times = np.linspace(0.0, SECONDS, frames)
-    eyes, targets = _key_poses(kitchen, rng) if len(kitchen.runs) == 1 else round_poses(kitchen, rng)
-    knots = _knots(eyes, targets)
     eye = Akima1DInterpolator(knots, eyes, method="makima")(times / SECONDS)
     target = Akima1DInterpolator(knots, targets, method="makima")(times / SECONDS)
     eye += _tremor(rng, times, 3, 0.35) * 0.012 + _tremor(rng, times, 3, 0.08) * 0.0015
@@ -48,7 +57,7 @@ def walk(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> list[Shot]:
     ]
 
 
-def _knots(positions: np.ndarray, aims: np.ndarray) -> np.ndarray:
+def even_pace(positions: np.ndarray, aims: np.ndarray) -> np.ndarray:
     """Times 0..1 of the poses, for an even pace of walking and looking."""
     pace = np.linalg.norm(np.diff(positions, axis=0), axis=1) + 0.6 * np.linalg.norm(np.diff(aims, axis=0), axis=1) + 0.2
     knots = np.concatenate([[0.0], np.cumsum(pace)])

@@ -2,7 +2,8 @@
 
 import json
 import shutil
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -14,15 +15,22 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.synthetic.atlas import LitScene, light_scene
 from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.choices import SEEDS_OWN, Choice
+from r2c2r_core.synthetic.hands import grip_of, hand_mover, hand_patches, hand_pose
+from r2c2r_core.synthetic.kitchen import Kitchen
 from r2c2r_core.synthetic.layout import plan_kitchen
-from r2c2r_core.synthetic.opening import OPENED_FROM, opened_units
+from r2c2r_core.synthetic.mesh import join_patches
+from r2c2r_core.synthetic.motions import Sight, motion_entries, sights
+from r2c2r_core.synthetic.opened_path import walk_and_open
+from r2c2r_core.synthetic.opening import Film, plan_film, share_of
 from r2c2r_core.synthetic.path import SECONDS, Shot, walk
+from r2c2r_core.synthetic.posed import Stage, moved_patches
 from r2c2r_core.synthetic.record3d import Record3DWriter
-from r2c2r_core.synthetic.render import photograph, render_view
+from r2c2r_core.synthetic.render import View, photograph, render_view
 from r2c2r_core.synthetic.sensor import scan_depth
 from r2c2r_core.synthetic.styled import plan_styled_kitchen
 from r2c2r_core.synthetic.truth import Sightings, capture_from_kitchen, prompts_document, true_objects, truth_document
 
+_AJAR = 0.6  # of the way to its widest: where the light on a front that opens is worked out
 _FOCAL_PER_LONG_SIDE = 0.757  # 726.6 px at 960 px: a real iPhone recording
 
 _QUICK_PNG = [
@@ -57,7 +65,7 @@ def write_sample(
 ) -> SamplePaths:
     """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
 
-    With `opened`, a drawer and a door stand open in the later part of the recording.
+    With `opened`, fronts are opened and closed while it is filmed (opening.py).
     """
     paths = SamplePaths(
         scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
@@ -66,28 +74,70 @@ def write_sample(
     shutil.rmtree(paths.masks, ignore_errors=True)
     progress.at(0.0, "building the kitchen")
     kitchen = plan_kitchen(seed) if choice == SEEDS_OWN else plan_styled_kitchen(seed, choice)
-    openings = opened_units(kitchen) if opened else {}
-    opened_from = round(OPENED_FROM * frames) if openings else frames
-    closed = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
-    later = light_scene(build_kitchen(kitchen, openings), np.random.default_rng([seed, 2])) if openings else closed
-    shots = walk(kitchen, frames, np.random.default_rng([seed, 3]))
+    film = plan_film(kitchen, frames, np.random.default_rng([seed, 12])) if opened else None
+    kitchen = kitchen if film is None else film.kitchen
+    scenes = _still(kitchen, seed) if film is None else _moving(film, seed)
+    path_rng = np.random.default_rng([seed, 3])
+    shots = walk(kitchen, frames, path_rng) if film is None else walk_and_open(film, frames, path_rng)
     objects = true_objects(kitchen)
     to_capture = capture_from_kitchen(kitchen, shots[0].kitchen_from_camera.translation)
-    sightings = Sightings(objects, moved={name: opened_from for name in openings})
+    sightings = Sightings(
+        objects, moved={} if film is None else {thing.name: film.frames_open(thing.name, frames) for thing in objects}
+    )
     folders = [paths.masks / thing.name for thing in objects]
     for folder in folders:
         folder.mkdir(parents=True)
     poses = _drifting_poses(shots, to_capture, np.random.default_rng([seed, 4]))
     cameras = _cameras(size, frames, np.random.default_rng([seed, 5]))
     white = _white_balance(np.random.default_rng([seed, 6]))
+    seen: list[dict[str, Sight]] = []
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
         for number in progress.part(0.1, 1.0).each(range(frames), "frame"):
             rng = np.random.default_rng([seed, 7, number])
-            scene = closed if number < opened_from else later
-            _add_frame(writer, scene, shots[number], cameras[number], poses[number], white, rng, number, sightings, folders)
-    _write_json(paths.truth, truth_document(objects, to_capture, sightings, openings, opened_from))
+            scene, shot, camera = scenes(number, shots[number], frames), shots[number], cameras[number]
+            view = _add_frame(writer, scene, shot, camera, poses[number], white, rng, number, sightings, folders)
+            if film is not None:
+                states = film.states(share_of(number, frames))
+                seen.append(sights(film, states, scene, view, camera, shot.kitchen_from_camera.inverse))
+    motions = {} if film is None else motion_entries(film, seen)
+    _write_json(paths.truth, truth_document(objects, to_capture, sightings, motions))
     _write_json(paths.prompts, prompts_document(objects, sightings, np.random.default_rng([seed, 8])))
     return paths
+
+
+Scenes = Callable[[int, Shot, int], LitScene]  # of a frame, its shot, and how many frames there are
+
+
+def _still(kitchen: Kitchen, seed: int) -> Scenes:
+    """A kitchen in which nothing moves."""
+    scene = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
+    return lambda number, shot, frames: scene
+
+
+def _moving(film: Film, seed: int) -> Scenes:
+    """A kitchen whose fronts are opened, with a hand on each while it moves."""
+    joints, opened = list(film.openings), {opening.joint for opening in film.openings}
+    patches = build_kitchen(film.kitchen, film.hollows)
+    grips = {name: grip_of(film.fronts[name], patches) for name in opened}
+    patches += [patch for opening in joints for patch in hand_patches(opening.joint)]
+    away = {hand_mover(name): Rigid3(np.eye(3), np.array([0.0, 0.0, -9.0])) for name in opened}  # lights and shades nothing
+    ajar = {o.joint: film.fronts[o.joint].pose(_AJAR * o.widest) for o in joints}
+    closed = light_scene(moved_patches(patches, away), np.random.default_rng([seed, 2]))
+    half = light_scene(moved_patches(patches, away | ajar), np.random.default_rng([seed, 2]))
+    at_rest = replace(closed, vertices=join_patches(patches).vertices)
+    stage = Stage.of(at_rest, half, np.array([patch.is_inner for patch in patches]))
+
+    def scene_at(number: int, shot: Shot, frames: int) -> LitScene:
+        time, camera = share_of(number, frames), shot.kitchen_from_camera
+        poses: dict[str, Rigid3 | None] = {}
+        for opening in joints:
+            front, state = film.fronts[opening.joint], opening.state(time)
+            poses[opening.joint] = front.pose(state)
+            hand = hand_pose(front, grips[opening.joint], state, camera.translation, camera.rotation[:, 0])
+            poses[hand_mover(opening.joint)] = hand if opening.moves(time) else None
+        return stage.at(poses, {o.joint: o.state(time) / (_AJAR * o.widest) for o in joints})
+
+    return scene_at
 
 
 def _add_frame(
@@ -101,7 +151,7 @@ def _add_frame(
     number: int,
     sightings: Sightings,
     folders: list[Path],
-) -> None:
+) -> View:
     camera_from_kitchen = shot.kitchen_from_camera.inverse
     view = render_view(scene, camera, camera_from_kitchen)
     blur_px = shot.blur_px * camera.width / 960
@@ -114,6 +164,7 @@ def _add_frame(
     for index in np.unique(ids[ids > 0]):
         mask = (ids == index).astype(np.uint8) * np.uint8(255)
         cv2.imwrite(str(folders[index - 1] / f"{number:06d}.png"), mask, _QUICK_PNG)
+    return view
 
 
 def _cameras(size: tuple[int, int], frames: int, rng: np.random.Generator) -> list[Intrinsics]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import cv2
 import numpy as np
@@ -73,10 +74,10 @@ def capture_from_kitchen(kitchen: Kitchen, first_eye: np.ndarray) -> Rigid3:
 class Sightings:
     """What the frames showed of every object: seen extents and possible clicks, gathered frame by frame.
 
-    `moved` says from which frame on an object's front stands elsewhere: those frames show nothing of its place.
+    `moved` has the frames in which a front of an object stands elsewhere: they show nothing of its place.
     """
 
-    def __init__(self, objects: tuple[TrueObject, ...], moved: Mapping[str, int] = MappingProxyType({})) -> None:
+    def __init__(self, objects: tuple[TrueObject, ...], moved: Mapping[str, frozenset[int]] = MappingProxyType({})) -> None:
         self._objects = objects
         self._moved = moved
         self._bins = np.zeros((len(objects), 3, _BINS), np.int64)
@@ -96,7 +97,7 @@ class Sightings:
         v, u = np.mgrid[_SAMPLE_STEP // 2 : camera.height : _SAMPLE_STEP, _SAMPLE_STEP // 2 : camera.width : _SAMPLE_STEP]
         seen, body = ids[v, u], ~is_handle[v, u]
         for index, thing in enumerate(self._objects):
-            if frame >= self._moved.get(thing.name, frame + 1):
+            if frame in self._moved.get(thing.name, ()):
                 continue
             chosen = (seen == index + 1) & body
             if np.count_nonzero(chosen) < 12:
@@ -143,13 +144,12 @@ def truth_document(
     objects: tuple[TrueObject, ...],
     capture_from_kitchen: Rigid3,
     sightings: Sightings,
-    openings: Mapping[str, float] = MappingProxyType({}),
-    opened_from: int = 0,
+    motions: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> dict[str, object]:
-    """truth.json; what stands open by `openings` (joint values) does so from frame `opened_from` on."""
+    """truth.json; `motions` is what is said further of a joint, by its name, where fronts are opened."""
     entries = []
     for index, thing in enumerate(objects):
-        joints = [_joint_entry(joint, capture_from_kitchen) for joint in thing.joints]
+        joints = [{**_joint_entry(joint, capture_from_kitchen), **motions.get(joint.name, {})} for joint in thing.joints]
         hinges = {joint.hinge for joint in thing.joints}
         entries.append(
             {
@@ -162,7 +162,7 @@ def truth_document(
                 "hinge": hinges.pop() if len(hinges) == 1 else None,
                 "symmetry": "axial" if thing.is_round else None,
                 "observed_axes": sightings.observed_axes(index),
-                "opened": {"from_frame": opened_from, "value": openings[thing.name]} if thing.name in openings else None,
+                "opened": [joint.name for joint in thing.joints if any(motions.get(joint.name, {}).get("states", ()))] or None,
             }
         )
     return {"version": 1, "objects": entries}
@@ -211,7 +211,6 @@ def _posed(joint: TrueJoint, kitchen_from_run: Rigid3) -> TrueJoint:
 
 def _leaf_joint(furniture: Furniture, leaf: Leaf) -> TrueJoint:
     """In the frame of its run."""
-    suffix = f"_{leaf.hinge}" if len(furniture.leaves) > 1 else ""
     middle_z, face = leaf.z + leaf.height_m / 2, -furniture.depth_m
     centre = np.array([leaf.x + leaf.width_m / 2, face, middle_z])
     if leaf.slides is not None:
@@ -220,6 +219,8 @@ def _leaf_joint(furniture: Furniture, leaf: Leaf) -> TrueJoint:
         origin, axis, kind = centre, np.array([0.0, -1.0, 0.0]), "prismatic"
     elif leaf.hinge == "bottom":
         origin, axis, kind = np.array([centre[0], face, leaf.z]), np.array([1.0, 0.0, 0.0]), "revolute"
+    elif leaf.hinge == "top":
+        origin, axis, kind = np.array([centre[0], face, leaf.z + leaf.height_m]), np.array([-1.0, 0.0, 0.0]), "revolute"
     else:
         # A door hinged on the left turns its free edge towards -Y: negative about +Z.
         edge = leaf.x if leaf.hinge == "left" else leaf.x + leaf.width_m
@@ -229,7 +230,7 @@ def _leaf_joint(furniture: Furniture, leaf: Leaf) -> TrueJoint:
             "revolute",
         )
     return TrueJoint(
-        name=f"{furniture.name}_joint{suffix}",
+        name=furniture.joint_name(leaf),
         type=kind,
         axis=axis,
         origin=origin,
@@ -243,12 +244,13 @@ def _appliance(thing: Appliance) -> TrueObject:
     _, depth, height = thing.size_m
     pose = Rigid3(rotation_about_z(thing.yaw_rad), np.array(thing.centre))
     hinges: tuple[Hinge, ...] = ("left", "right") if thing.drawer_m else (thing.hinge,)
-    joints = [_swinging(thing, pose, hinge, f"{thing.name}_joint{f'_{hinge}' if thing.drawer_m else ''}") for hinge in hinges]
+    joints = [_swinging(thing, pose, hinge, name) for hinge, name in zip(hinges, thing.fronts, strict=False)]
     if thing.drawer_m:
         face = pose.apply(np.array([[0.0, -depth / 2, (thing.drawer_m - height) / 2]]))[0]
         out = pose.turn(np.array([[0.0, -1.0, 0.0]]))[0]
-        name = f"{thing.name}_joint_drawer"
-        joints.append(TrueJoint(name=name, type="prismatic", axis=out, origin=face, lower=0.0, upper=0.6 * depth, hinge=None))
+        joints.append(
+            TrueJoint(name=thing.fronts[-1], type="prismatic", axis=out, origin=face, lower=0.0, upper=0.6 * depth, hinge=None)
+        )
     return TrueObject(
         name=thing.name,
         category=thing.category,

@@ -1,37 +1,154 @@
-"""What stands open in the later frames stands where its joint says."""
+"""What is opened in a film stands in every frame where its joint says, and what is seen behind it is as deep as it says."""
 
+import json
+import zipfile
+from pathlib import Path
+
+import cv2
 import numpy as np
 import pytest
 
 from r2c2r_core.synthetic.build import build_kitchen
-from r2c2r_core.synthetic.kitchen import Kitchen
+from r2c2r_core.synthetic.choices import Choice
 from r2c2r_core.synthetic.layout import plan_kitchen
-from r2c2r_core.synthetic.opening import opened_units
+from r2c2r_core.synthetic.mesh import join_patches
+from r2c2r_core.synthetic.opened_path import walk_and_open
+from r2c2r_core.synthetic.opening import Film, Front, plan_film, share_of
+from r2c2r_core.synthetic.stage import SamplePaths, write_sample
+from r2c2r_core.synthetic.styled import plan_styled_kitchen
+
+FRAMES = 240
+KITCHENS = [(2, None), (5, "galley"), (8, "l"), (1, "island")]
 
 
-def furthest_out(kitchen: Kitchen, name: str, opened: dict[str, float]) -> float:
-    """How far a unit's surfaces reach in front of its closed face, handle apart, metres."""
-    number = kitchen.object_names.index(name) + 1
-    unit = next(f for f in kitchen.base if f.name == name)
-    patches = [p for p in build_kitchen(kitchen, opened) if p.object_id == number and not p.is_handle]
-    return float(-min(p.grid[..., 1].min() for p in patches) - unit.depth_m)
+@pytest.fixture(params=KITCHENS, ids=lambda case: f"{case[1]}-{case[0]}")
+def film(request: pytest.FixtureRequest) -> Film:
+    return film_of(*request.param)
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-def test_a_drawer_and_a_door_stand_open_as_far_as_the_truth_says(seed: int) -> None:
-    kitchen = plan_kitchen(seed)
-    opened = opened_units(kitchen)
-    units = {f.name: f for f in kitchen.base if f.name in opened}
-    assert sorted(f.category for f in units.values()) == ["cabinet", "drawer"]
-    for name, unit in units.items():
-        leaf = unit.leaves[0]
-        assert furthest_out(kitchen, name, {}) == pytest.approx(0.0, abs=1e-6)
-        swings = leaf.hinge is not None
-        reach = leaf.width_m * np.sin(opened[name]) if swings else opened[name]
-        thickness = kitchen.style.front_thickness_m if swings else 0.0  # beyond a right angle the leaf's back is further out
-        assert furthest_out(kitchen, name, opened) == pytest.approx(reach, abs=thickness + 1e-6)
+def film_of(seed: int, layout: str | None) -> Film:
+    kitchen = plan_kitchen(seed) if layout is None else plan_styled_kitchen(seed, Choice(layout=layout))
+    return plan_film(kitchen, FRAMES, np.random.default_rng([seed, 12]))
 
 
-def test_a_kitchen_with_nothing_opened_is_the_kitchen_it_was() -> None:
-    kitchen = plan_kitchen(1)
-    assert all(np.array_equal(a.grid, b.grid) for a, b in zip(build_kitchen(kitchen), build_kitchen(kitchen, {}), strict=True))
+def front_to_rear(film: Film, front: Front) -> float:
+    """Metres from the back of a closed front straight in, to the furthest surface of its drawer or of its compartment."""
+    import open3d as o3d
+
+    hollow = film.hollows[front.hollow_key]
+    behind = [p for p in build_kitchen(film.kitchen, film.hollows) if (p.mover == front.joint.name and p.is_body) or p.is_inner]
+    mesh = join_patches([p for p in behind if p.is_body == (hollow.tray is not None)])
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32)))
+    out = np.array([0.0, -1.0, 0.0]) if front.run is None else front.run.kitchen_from_run.rotation @ [0.0, -1.0, 0.0]
+    back = front.middle - out * hollow.front_m / 2
+    low, high = front.corners[:, 2].min(), front.corners[:, 2].max()
+    if hollow.tray is not None:  # between the top of its bottom board and the rim of its sides
+        level = 0.0 if front.run is not None else film.kitchen.fridge.centre[2]
+        low, high = level + hollow.tray.low[2] + 0.01, level + hollow.tray.high[2] - 0.002
+    rays = [[*back[:2], z, *-out] for z in np.linspace(low, high, 40)]
+    hits = scene.cast_rays(o3d.core.Tensor(np.array(rays, np.float32)))["t_hit"].numpy()
+    return float(hits[np.isfinite(hits) & (hits < 1.0)].max())
+
+
+def test_films_open_all_kinds_of_fronts_in_turn_together_from_the_start_and_to_the_end() -> None:
+    films = [film_of(*case) for case in KITCHENS]
+    kinds = {film.fronts[o.joint].kind for film in films for o in film.openings}
+    assert {"left", "right", "drawer", "bottom", "top", "lateral", "pair", "appliance drawer"} <= kinds
+    together = 0
+    for film in films:
+        assert len(film.openings) >= 5
+        states = np.array([list(film.states(share_of(i, FRAMES)).values()) for i in range(FRAMES)])
+        assert (states[0] > 0).sum() == 1
+        assert 1 <= (states[-1] > 0).sum() <= 2
+        assert (states[int(0.2 * FRAMES) : int(0.4 * FRAMES)] == 0).all()
+        together += bool(((states > 0).sum(axis=1) >= 2).any())
+    assert together >= len(films) - 1  # fronts that one view shows and that keep clear of each other are not everywhere
+
+
+def test_a_front_opens_no_further_than_its_joint_and_is_still_only_there(film: Film) -> None:
+    for opening in film.openings:
+        upper = film.fronts[opening.joint].joint.upper
+        assert opening.widest == upper if opening.held else 0.4 * upper < opening.widest < 0.9 * upper
+
+
+def test_insides_are_as_deep_as_they_say(film: Film) -> None:
+    for opening in film.openings:
+        front = film.fronts[opening.joint]
+        if front.owner == "microwave":  # it stands askew on the worktop
+            continue
+        assert front_to_rear(film, front) == pytest.approx(film.hollows[front.hollow_key].inside.depth_m, abs=2e-3)
+
+
+def test_the_camera_is_before_what_is_opened_and_out_of_its_way(film: Film) -> None:
+    shots = walk_and_open(film, FRAMES, np.random.default_rng(0))
+    for number, shot in enumerate(shots):
+        time, eye = share_of(number, FRAMES), shot.kitchen_from_camera.translation
+        x0, x1, y0, y1, _ = film.kitchen.room
+        assert x0 < eye[0] < x1
+        assert y0 < eye[1] < y1
+        fridge = film.kitchen.fridge
+        assert (np.abs(eye[:2] - fridge.centre[:2]) > np.array(fridge.size_m[:2]) / 2).any()
+        for opening in film.openings:
+            if (state := opening.state(time)) > 0.02:
+                front = film.fronts[opening.joint]
+                corners = front.pose(state).apply(front.corners)
+                assert np.linalg.norm(corners[:, :2] - eye[:2], axis=1).min() > 0.3
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> SamplePaths:
+    return write_sample(tmp_path_factory.mktemp("opened"), seed=3, frames=24, size=(240, 180), opened=True)
+
+
+def test_the_truth_says_of_every_joint_where_it_stands_in_every_frame(sample: SamplePaths) -> None:
+    truth = json.loads(sample.truth.read_text())
+    joints = [joint for thing in truth["objects"] for joint in thing["joints"]]
+    moved = [joint for joint in joints if any(joint["states"])]
+    assert moved
+    for joint in joints:
+        assert len(joint["states"]) == len(joint["seen_px"]) == len(joint["seen_share"]) == 24
+        assert all(0 <= state <= joint["upper"] + 1e-6 for state in joint["states"])
+        assert (joint["inside"] is None) == (joint not in moved)
+    assert [thing["name"] for thing in truth["objects"] if thing["opened"]] == [
+        thing["name"] for thing in truth["objects"] if any(any(joint["states"]) for joint in thing["joints"])
+    ]
+
+
+def test_masks_and_depth_follow_the_front(sample: SamplePaths) -> None:
+    import lzfse
+
+    truth = json.loads(sample.truth.read_text())
+    with zipfile.ZipFile(sample.scan) as scan:
+        meta = json.loads(scan.read("metadata"))
+        for thing in truth["objects"]:
+            for joint in thing["joints"]:
+                wide = [
+                    i for i, state in enumerate(joint["states"]) if state > 0.9 * joint["upper"] and joint["seen_px"][i] > 900
+                ]
+                for i in wide[-1:]:
+                    mask = cv2.imread(str(sample.masks / thing["name"] / f"{i:06d}.png"), cv2.IMREAD_GRAYSCALE) > 0
+                    assert np.count_nonzero(mask) >= joint["seen_px"][i]
+                    depth = np.frombuffer(lzfse.decompress(scan.read(f"rgbd/{i}.depth")), "<f4").reshape(meta["dh"], meta["dw"])
+                    inner = cv2.resize(cv2.erode(mask.astype(np.uint8), np.ones((9, 9))), depth.shape[::-1]) > 0
+                    rows, columns = np.nonzero(inner & np.isfinite(depth))
+                    points = in_capture(meta, i, rows, columns, depth[rows, columns])
+                    pose = np.array(thing["capture_from_object"])
+                    local = (points - pose[:3, 3]) @ pose[:3, :3]
+                    assert (local[:, 1] < -thing["dimensions_m"][1] / 2 - 0.05).mean() > 0.3, thing["name"]  # out of its box
+
+
+def in_capture(meta: dict, frame: int, rows: np.ndarray, columns: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Points of a depth image in the capture frame."""
+    from scipy.spatial.transform import Rotation
+
+    fx, fy, cx, cy = np.array(meta["perFrameIntrinsicCoeffs"][frame]) * meta["dw"] / meta["w"]
+    rays = np.column_stack([(columns - cx) / fx, -(rows - cy) / fy, -np.ones(len(rows))]) * depth[:, None]
+    *quaternion, x, y, z = meta["poses"][frame]
+    return rays @ Rotation.from_quat(quaternion).as_matrix().T + [x, y, z]
+
+
+def test_the_same_seed_opens_the_same_in_the_same_bytes(sample: SamplePaths, tmp_path: Path) -> None:
+    again = write_sample(tmp_path, seed=3, frames=24, size=(240, 180), opened=True)
+    assert again.scan.read_bytes() == sample.scan.read_bytes()
+    assert again.truth.read_bytes() == sample.truth.read_bytes()

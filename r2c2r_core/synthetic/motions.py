@@ -1,0 +1,75 @@
+"""What is true of every joint of a film: where it stands in each frame, how much of its front is seen, its stop, its inside."""
+
+from dataclasses import asdict, dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.synthetic.atlas import LitScene
+from r2c2r_core.synthetic.opening import Film, Front, share_of
+from r2c2r_core.synthetic.render import View
+
+_BEHIND_M = 0.05
+_FEWEST_STILL = 3  # frames that show a front at rest, for its stop to be seen
+MIN_SEEN_PX = 400  # as of the masks that evaluate compares
+MIN_SEEN_SHARE = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """How much of a front one frame shows."""
+
+    seen_px: int
+    seen_share: float  # of its whole outline, what hides it and the frame's edges taken away
+
+    @property
+    def shows(self) -> bool:
+        """Whether a person would say that the frame shows it."""
+        return self.seen_px >= MIN_SEEN_PX and self.seen_share >= MIN_SEEN_SHARE
+
+
+def sights(
+    film: Film, states: dict[str, float], scene: LitScene, view: View, camera: Intrinsics, camera_from_kitchen: Rigid3
+) -> dict[str, Sight]:
+    """Of every front, by its joint's name."""
+    names = np.array(scene.mover_of_patch)
+    counts = np.bincount(view.patch[view.patch >= 0], minlength=len(names)) * ~scene.body_patch
+    found = {}
+    for name, front in film.fronts.items():
+        seen = int(counts[names == name].sum())
+        whole = _outline_px(front, states[name], camera, camera_from_kitchen)
+        found[name] = Sight(seen_px=seen, seen_share=round(min(seen / whole, 1.0), 4) if whole else 0.0)
+    return found
+
+
+def motion_entries(film: Film, seen: list[dict[str, Sight]]) -> dict[str, dict[str, object]]:
+    """The keys that truth.json gains per joint."""
+    frames = len(seen)
+    times = [share_of(i, frames) for i in range(frames)]
+    states = [film.states(time) for time in times]
+    still = {o.joint: [o.rises[1] <= t <= o.falls[0] and o.rises[0] >= 0 for t in times] for o in film.openings if o.held}
+    entries: dict[str, dict[str, object]] = {}
+    for name, front in film.fronts.items():
+        rests = [i for i, rests in enumerate(still.get(name, [])) if rests and seen[i][name].shows]
+        values = [round(each[name], 6) for each in states]
+        opens = any(values)
+        entries[name] = {
+            "states": values,
+            "seen_px": [each[name].seen_px for each in seen],
+            "seen_share": [each[name].seen_share for each in seen],
+            "stop_seen": len(rests) >= _FEWEST_STILL,
+            "largest": max((value for value, each in zip(values, seen, strict=True) if each[name].shows), default=0.0),
+            "inside": asdict(film.hollows[front.hollow_key].inside) if opens else None,
+        }
+    return entries
+
+
+def _outline_px(front: Front, state: float, camera: Intrinsics, camera_from_kitchen: Rigid3) -> float:
+    """The area of a front's outline, as if the picture had no edges; 0 where a part of it is behind the camera."""
+    corners = camera_from_kitchen.apply(front.pose(state).apply(front.corners))
+    if corners[:, 2].min() < _BEHIND_M:
+        return 0.0
+    uv = corners[:, :2] / corners[:, 2:] * [camera.fx, camera.fy]
+    return float(cv2.contourArea(cv2.convexHull(uv.astype(np.float32))))
