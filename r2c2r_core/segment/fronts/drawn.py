@@ -16,8 +16,8 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
 from r2c2r_core.segment.runs.edge_odds import edge_odds
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
-from r2c2r_core.segment.runs.lines import gather
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, PlaneGrid, blend, choose_frames, make_tile
+from r2c2r_core.segment.runs.lines import gather, scored
+from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, PlaneGrid, blend, choose_frames, frame_quality, make_tile
 from r2c2r_core.segment.runs.relief import measure_relief
 from r2c2r_core.segment.runs.run import STEADY_CELLS, Run
 from r2c2r_core.segment.scene import Scene
@@ -68,14 +68,15 @@ def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]
 def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
     """What `make_run` gives, of one known panel."""
     region = _region(grid, cell)
-    chosen = choose_frames(grid, region, scene, frame_count)
+    chosen = choose_frames(frame_quality(grid, region, scene), scene, frame_count)
     tiles = [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
     if not tiles:
         raise ObjectNotSeen(
             f"the drawn front is seen in 0 of {len(scene.frames)} frames, at least 1 expected", hint="draw it where the scan is"
         )
     relief = measure_relief(grid, scene, chosen)
-    vertical, horizontal = (gather(tiles, axis, grid.cell_m) for axis in (0, 1))
+    lines = [scored(tile, grid.cell_m) for tile in tiles]
+    vertical, horizontal = (gather(lines, axis, grid.cell_m) for axis in (0, 1))
     spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
     poses_agree = bool(spread <= STEADY_CELLS)
     if poses_agree:

@@ -1,6 +1,8 @@
 """Line evidence on an orthomosaic: a robust score of a straight gap or edge at each column (or row), block by block."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -36,14 +38,28 @@ class Evidence:
     ends: np.ndarray | None = None  # the part of the score that depth gave: where the plane begins or ends
 
 
-def gather(tiles: list[Tile], axis: int, cell_m: float, allowed: np.ndarray | None = None) -> Evidence:
+class Scores(NamedTuple):
+    """One tile's robust z-scores (blocks, positions) and their weights, 0 where unseen."""
+
+    score: np.ndarray
+    weight: np.ndarray
+
+
+class ScoredTile(NamedTuple):
+    """A tile with the scores of its vertical and of its horizontal lines."""
+
+    tile: Tile
+    scores: tuple[Scores, Scores]
+
+
+def gather(tiles: Sequence[ScoredTile], axis: int, cell_m: float) -> Evidence:
     """Evidence of all tiles, each first slid (at most 3 cm) onto those before it; sets the tiles' shifts.
 
     Axis 0 looks for vertical lines (positions are columns), axis 1 for horizontal ones. The slide is one-dimensional on
     purpose: two-dimensional correlation on flat panels suffers from the aperture problem.
     """
     reach = round(tuned(Params).max_shift_m / cell_m)
-    scored = [tile_scores(tile, axis, cell_m, allowed) for tile in tiles]
+    scored = [tile.scores[axis] for tile in tiles]
     placed: list[np.ndarray] = []  # of each tile: its weighted score and its weight, slid
     slides: list[int] = []
     total = np.zeros((2, *scored[0][0].shape))
@@ -61,7 +77,7 @@ def gather(tiles: list[Tile], axis: int, cell_m: float, allowed: np.ndarray | No
         placed[i] = np.roll(np.stack([score * weight, weight]), slides[i], axis=2)
         total += placed[i]
     middle = round(float(np.median(slides)))
-    for tile, slide in zip(tiles, slides, strict=True):
+    for (tile, _), slide in zip(tiles, slides, strict=True):
         tile.shift = (float(slide - middle), tile.shift[1]) if axis == 0 else (tile.shift[0], float(slide - middle))
     scores, weights = np.roll(np.sum(placed, axis=0), -middle, axis=2)
     return Evidence(scores / np.maximum(weights, 1e-6), weights > 0, _block(cell_m))
@@ -73,13 +89,19 @@ def _placed_on(score: np.ndarray, weight: np.ndarray, reference: np.ndarray, rea
     return (0, weight * 0.15) if agreement < 0.25 else (slide, weight)
 
 
-def tile_scores(tile: Tile, axis: int, cell_m: float, allowed: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """One tile's z-scores (blocks, positions) and their weights, 0 where unseen."""
-    lab = cv2.GaussianBlur(tile.lab, (0, 0), 0.8).astype(np.float32)
+def scored(tile: Tile, cell_m: float, allowed: np.ndarray | None = None) -> ScoredTile:
+    """A tile with its scores, of the cells (rows, columns) that are allowed."""
     weight = tile.weight if allowed is None else tile.weight * allowed
+    lab = cv2.GaussianBlur(tile.lab, (0, 0), 0.8).astype(np.float32)
+    weighted = cv2.multiply(lab, cv2.merge([weight] * 3))
+    return ScoredTile(tile, (_scores(weighted, weight, 0, cell_m), _scores(weighted, weight, 1, cell_m)))
+
+
+def _scores(weighted: np.ndarray, weight: np.ndarray, axis: int, cell_m: float) -> Scores:
+    """Of colours (rows, columns, 3) times their weights (rows, columns)."""
     block = _block(cell_m)
     weights = _pooled(weight, block, axis)
-    means = _pooled(lab * weight[..., None], block, axis) / np.maximum(weights, 1e-6 / block)[..., None]
+    means = _pooled(weighted, block, axis) / np.maximum(weights, 1e-6 / block)[..., None]
     seen = _pooled((weight > 0).astype(np.float32), block, axis) > 0.6
     total = weights * block
     strength, known = _strength(means, seen, cell_m)
@@ -88,7 +110,7 @@ def tile_scores(tile: Tile, axis: int, cell_m: float, allowed: np.ndarray | None
     spread = 1.4826 * _row_medians(np.abs(strength - middle), known) + tuned(Params).noise_floor
     score = np.where(known, np.clip((strength - middle) / spread, -2, 6), np.float32(0))
     quality = float(np.median(total[known])) if known.any() else 0.0
-    return score, np.where(known, np.float32(quality), np.float32(0))
+    return Scores(score, np.where(known, np.float32(quality), np.float32(0)))
 
 
 def _pooled(values: np.ndarray, block: int, axis: int) -> np.ndarray:
@@ -155,9 +177,9 @@ def _rolled(values: np.ndarray, slides: np.ndarray) -> np.ndarray:
     return values[at] if values.ndim == 1 else np.take_along_axis(values, at, axis=1)
 
 
-def frame_slide(tile: Tile, axis: int, cell_m: float, evidence: Evidence) -> float:
+def frame_slide(tile: ScoredTile, axis: int, cell_m: float, evidence: Evidence) -> float:
     """The slide in cells that lays one more frame onto finished evidence (0 when nothing decides)."""
-    score, weight = tile_scores(tile, axis, cell_m)
+    score, weight = tile.scores[axis]
     seen = np.where(weight > 0, np.clip(score, 0, 4), 0)
     reference = np.where(evidence.known, np.clip(evidence.score, 0, 4), 0)
     reach = round(tuned(Params).max_shift_m / cell_m)

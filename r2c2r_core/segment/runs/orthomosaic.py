@@ -1,6 +1,5 @@
 """Orthomosaic of a vertical plane: every frame warped by a homography onto one metric grid, occluders left out."""
 
-import warnings
 from dataclasses import dataclass, field
 
 import cv2
@@ -134,19 +133,23 @@ def support_on(grid: PlaneGrid, region: PlaneRegion, reach_m: float) -> np.ndarr
     return cv2.resize(seen, (grid.columns, grid.rows), interpolation=cv2.INTER_NEAREST) > 0
 
 
-def choose_frames(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> list[int]:
-    """The frames that see the region best: for each coarse part of it, the largest, sharpest and most frontal views."""
+def frame_quality(grid: PlaneGrid, region: PlaneRegion, scene: Scene) -> np.ndarray:
+    """How well each frame sees each coarse part of a region (frames, parts): large, sharp and frontal is best, 0 not at all."""
     spacing = min(0.1, region.width_m / 2, region.height_m / 2) / grid.cell_m
     column, row = np.meshgrid(np.arange(spacing / 2, grid.columns, spacing), np.arange(spacing / 2, grid.rows, spacing))
     points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
     points = points[region.supports(points, 0.03)]
     if len(points) == 0:
-        return []
-    quality = np.stack([_view_quality(points, grid.outward, frame, scene) for frame in scene.frames])
+        return np.zeros((len(scene.frames), 0))
+    return np.stack([_view_quality(points, grid.outward, frame, scene) for frame in scene.frames])
+
+
+def choose_frames(quality: np.ndarray, scene: Scene, count: int) -> list[int]:
+    """The frames that see a region best by their `frame_quality`: those that see each part of it best, together."""
     per_point = max(3, count // 4)
     ranks = np.argsort(-quality, axis=0, kind="stable")[:per_point]
     score = np.zeros(len(scene.frames))
-    for point in range(len(points)):
+    for point in range(quality.shape[1]):
         score[ranks[:, point]] += quality[ranks[:, point], point]
     best = np.argsort(-score, kind="stable")[:count]
     return [scene.frames[i].index for i in best if score[i] > 0]
@@ -224,9 +227,11 @@ def blend(tiles: list[Tile], count: int) -> Image:
     total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
     weights = np.zeros(tiles[0].weight.shape, np.float32)
     for colour, weight in moved:
-        off = np.abs(colour.astype(np.float32) - usual).max(axis=2)
+        lab = colour.astype(np.float32)
+        lightness, a, b = cv2.split(cv2.absdiff(lab, usual))
+        off = cv2.max(lightness, cv2.max(a, b))
         weight = weight * (params.odd_weight + np.exp(-((off / params.odd_lab) ** 2)))
-        total += colour * weight[..., None]
+        total += cv2.multiply(lab, cv2.merge([weight] * 3))
         weights += weight
     lab = (total / np.maximum(weights, 1e-9)[..., None]).clip(0, 255).astype(np.uint8)
     image = cv2.cvtColor(lab, cv2.COLOR_LAB2RGB)
@@ -243,11 +248,14 @@ def _moved(tile: Tile) -> tuple[np.ndarray, np.ndarray]:
 
 def _usual(moved: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """The median colour (rows, columns, 3) of the tiles that show a cell, on cells of STEP."""
-    coarse = np.stack([colour[::STEP, ::STEP] for colour, _ in moved]).astype(np.float32)
-    coarse[np.stack([weight[::STEP, ::STEP] for _, weight in moved]) <= 0] = np.nan
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # cells that none shows
-        middle = np.nan_to_num(np.nanmedian(coarse, axis=0))
+    coarse = np.stack([colour[::STEP, ::STEP] for colour, _ in moved])
+    shown = np.stack([weight[::STEP, ::STEP] for _, weight in moved]) > 0
+    coarse[~shown] = 255  # sorts behind all that is shown
+    coarse.sort(axis=0)
+    count = shown.sum(axis=0)
+    pair = np.stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(coarse) - 1)])
+    middle = np.take_along_axis(coarse, pair[..., None], axis=0).astype(np.float32).mean(axis=0)
+    middle[count == 0] = 0
     rows, columns = moved[0][1].shape
     return np.asarray(cv2.resize(middle, (columns, rows), interpolation=cv2.INTER_LINEAR))
 

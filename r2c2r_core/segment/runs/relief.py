@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.camera import depth_points, project
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.runs.orthomosaic import STEP, PlaneGrid
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -88,7 +89,10 @@ def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> R
     for index in frame_indices:
         frame = scene.frame(index)
         depth = scene.depth(index)
-        points = depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64)
+        near_grid = _window(grid, frame, params)
+        known = np.zeros(depth.shape, bool)
+        known[near_grid] = depth[near_grid] > 0
+        points = depth_points(depth, frame.depth_camera)[known].astype(np.float64)
         local = (grid.world_from_plane.inverse @ frame.world_from_camera).apply(points)
         lift = -local[:, 1]
         column = np.floor((local[:, 0] - grid.left_m) / (grid.cell_m * step)).astype(int)
@@ -108,6 +112,20 @@ def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> R
         (lifts / np.maximum(raised, 1)).reshape(shape),
         (level / np.maximum(count - raised, 1)).reshape(shape),
     )
+
+
+def _window(grid: PlaneGrid, frame: Frame, params: Params) -> tuple[slice, slice]:
+    """The rows and columns of a frame's depth image in which the space about a grid that is kept may be seen."""
+    camera, ends = frame.depth_camera, np.array([(x, y) for x in (0, grid.columns + STEP) for y in (0, grid.rows + STEP)])
+    corners = np.concatenate([grid.points_at(ends, depth) for depth in (-params.highest_m, params.deepest_m)])
+    local = frame.world_from_camera.inverse.apply(corners)
+    if local[:, 2].min() < 0.05:
+        return slice(None), slice(None)
+    low, high = (limit(project(local, camera), axis=0) for limit in (np.min, np.max))
+    (left, top), (right, bottom) = (
+        np.clip(edge, 0, (camera.width, camera.height)).astype(int) for edge in (np.floor(low) - 1, np.ceil(high) + 1)
+    )
+    return slice(top, bottom), slice(left, right)
 
 
 def _windows(values: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:

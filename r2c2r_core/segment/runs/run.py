@@ -9,14 +9,14 @@ from r2c2r_core.arrays import Image
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.runs.edge_odds import edge_odds
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
-from r2c2r_core.segment.runs.lines import Evidence, find_roll, frame_slide, gather
+from r2c2r_core.segment.runs.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
 from r2c2r_core.segment.runs.orthomosaic import (
     STEP,
     Cell,
     PlaneGrid,
-    Tile,
     blend,
     choose_frames,
+    frame_quality,
     make_grid,
     make_tile,
     support_on,
@@ -67,10 +67,10 @@ class Run:
             return 0.0, 0.0
         if frame_index not in self.slides:
             tile = make_tile(self.grid, scene, frame_index)
-            self.slides[frame_index] = (0.0, 0.0) if tile is None else self._measure(tile)
+            self.slides[frame_index] = (0.0, 0.0) if tile is None else self._measure(scored(tile, self.grid.cell_m))
         return self.slides[frame_index]
 
-    def _measure(self, tile: Tile) -> tuple[float, float]:
+    def _measure(self, tile: ScoredTile) -> tuple[float, float]:
         return (
             frame_slide(tile, 0, self.grid.cell_m, self.vertical),
             frame_slide(tile, 1, self.grid.cell_m, self.horizontal),
@@ -80,21 +80,20 @@ class Run:
 def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, margin_m: float = 0.0) -> Run | None:
     """Warp, gather evidence, level the axes to the lines, cut. `margin_m` reaches beyond what the scan saw of the plane."""
     params = tuned(Params)
-    grid = make_grid(region, cell_m, 0.0, margin_m)
-    tiles = _tiles(grid, region, scene, max(frame_count // 2, 4))
-    if not tiles:
+    views = _Views(make_grid(region, cell_m, 0.0, margin_m), region, scene, margin_m)
+    few = max(frame_count // 2, 4)
+    if not views.tiles(few):
         return None
-    vertical, horizontal = _evidence(tiles, grid, region, margin_m)
-    roll = find_roll(vertical, horizontal)
+    roll = find_roll(*views.evidence(few))
     if abs(roll) > params.roll_worth_rad:
-        grid = make_grid(region, cell_m, roll, margin_m)
+        views = _Views(make_grid(region, cell_m, roll, margin_m), region, scene, margin_m)
     else:
         roll = 0.0
-    tiles = _tiles(grid, region, scene, frame_count)
+    grid, tiles = views.grid, [tile for tile, _ in views.tiles(frame_count)]
     if not tiles:
         return None
-    relief = measure_relief(grid, scene, choose_frames(grid, region, scene, params.relief_frames))
-    vertical, horizontal = _evidence(tiles, grid, region, margin_m)
+    relief = measure_relief(grid, scene, views.chosen(params.relief_frames))
+    vertical, horizontal = views.evidence(frame_count)
     vertical, horizontal = _with_edges(vertical, relief, 0, grid), _with_edges(horizontal, relief, 1, grid)
     spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
     poses_agree = bool(spread <= STEADY_CELLS)
@@ -111,14 +110,34 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     return Run(region, grid, roll, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
 
 
-def _tiles(grid: PlaneGrid, region: PlaneRegion, scene: Scene, count: int) -> list[Tile]:
-    chosen = choose_frames(grid, region, scene, count)
-    return [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
+class _Views:
+    """The frames that show a plane on its grid, best first; each is warped and scored once, however many are asked for."""
 
+    def __init__(self, grid: PlaneGrid, region: PlaneRegion, scene: Scene, margin_m: float) -> None:
+        self.grid, self._scene = grid, scene
+        self._quality = frame_quality(grid, region, scene)
+        near = support_on(grid, region, tuned(Params).allowed_m + margin_m).astype(np.float32)
+        self._allowed = cv2.blur(near, (3, 3)) > 0.5
+        self._made: dict[int, ScoredTile | None] = {}
 
-def _evidence(tiles: list[Tile], grid: PlaneGrid, region: PlaneRegion, margin_m: float) -> tuple[Evidence, Evidence]:
-    allowed = cv2.blur(support_on(grid, region, tuned(Params).allowed_m + margin_m).astype(np.float32), (3, 3)) > 0.5
-    return gather(tiles, 0, grid.cell_m, allowed), gather(tiles, 1, grid.cell_m, allowed)
+    def chosen(self, count: int) -> list[int]:
+        """The numbers of the frames that see it best, so many at most."""
+        return choose_frames(self._quality, self._scene, count)
+
+    def tiles(self, count: int) -> list[ScoredTile]:
+        """Of the chosen frames, those that show enough."""
+        return [tile for index in self.chosen(count) if (tile := self._tile(index)) is not None]
+
+    def evidence(self, count: int) -> tuple[Evidence, Evidence]:
+        """Of vertical and of horizontal lines; sets the tiles' shifts."""
+        tiles = self.tiles(count)
+        return gather(tiles, 0, self.grid.cell_m), gather(tiles, 1, self.grid.cell_m)
+
+    def _tile(self, frame_index: int) -> ScoredTile | None:
+        if frame_index not in self._made:
+            tile = make_tile(self.grid, self._scene, frame_index)
+            self._made[frame_index] = None if tile is None else scored(tile, self.grid.cell_m, self._allowed)
+        return self._made[frame_index]
 
 
 def _with_edges(evidence: Evidence, relief: Relief, axis: int, grid: PlaneGrid) -> Evidence:
