@@ -218,7 +218,7 @@ def test_a_neighbours_masks_are_drawn_anew_and_every_tab_hears_why(panels: Calla
             web.until(lambda: spans(web, project, number, second["id"]) == [(0, 40), (40, 80)])
 
 
-@pytest.mark.parametrize("change", ["delete", "undo", "move", "remove"])
+@pytest.mark.parametrize("change", ["delete", "undo", "move", "remove", "thing"])
 def test_a_front_is_whole_again_also_where_the_server_was_started_anew_meanwhile(
     panels: Callable[..., Any], change: str
 ) -> None:
@@ -235,6 +235,8 @@ def test_a_front_is_whole_again_also_where_the_server_was_started_anew_meanwhile
             web.post(f"/api/projects/{project}/undo", {"object": second["id"]})
         elif change == "move":
             web.patch(f"{address}/points/{second['points'][0]['id']}", {"x": 100.5})
+        elif change == "thing":
+            web.patch(address, {"name": "towel", "category": "towel"})  # it hangs on the front
         else:
             web.delete(f"{address}/points/{second['points'][0]['id']}")
         web.until(lambda: spans(web, project, first["id"]) == [(0, 80)])

@@ -158,8 +158,9 @@ class GeometricSession:
         return find_object(self, prompt, hint, positives, negatives, others)
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
-        """Clicks of others on the same front, by the front's name."""
-        clicks = [(prompt, click) for prompt in prompts for click in prompt.points if click.label == 1]
+        """Clicks on other fronts and machines that fall on the same front, by its name; things lie or hang on fronts."""
+        beside = [prompt for prompt in prompts if category_of(prompt.category).kind != "thing"]
+        clicks = [(prompt, click) for prompt in beside for click in prompt.points if click.label == 1]
         hits = [(prompt, click, point) for prompt, click in clicks if (point := self._hit(click)) is not None]
         found: dict[str, tuple[PromptPoint, ...]] = {}
         for prompt in prompts:

@@ -44,7 +44,8 @@ class Panels:
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
         found = {}
         for prompt in prompts:
-            clicks = [point for other in prompts if other is not prompt for point in other.points]
+            others = [other for other in prompts if other is not prompt and category_of(other.category).kind != "thing"]
+            clicks = [point for other in others for point in other.points]
             within = tuple(click for click in clicks if _half(click) == _half(prompt.points[0]))
             if within and category_of(prompt.category).kind == "front":
                 found[prompt.name] = within

@@ -132,6 +132,8 @@ def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Pat
     again = [dataclasses.replace(door, category="base_cabinet") for door in doors]  # found anew
     both = [session.panel(door) for door in again]
     assert [panel is not None and panel.width_m > 0.9 for panel in both] == [True, True]
+    towel = dataclasses.replace(again[1], category="towel")
+    assert session.disputed([again[0], towel]) == {}  # it hangs on the door
     disputed = session.disputed(again)
     assert disputed == {doors[0].name: doors[1].points, doors[1].name: doors[0].points}
     for door, own in zip(again, apart, strict=True):
