@@ -15,7 +15,7 @@ export async function saving(change, key, tell) {
   tell({ text: "saving…", tone: "" });
   try {
     const answer = await outbox.send(change, key);
-    tell({ text: `saved ${new Date().toLocaleTimeString()}`, tone: "" });
+    if (!outbox.waiting) tell({ text: `saved ${new Date().toLocaleTimeString()}`, tone: "" }); // else more is on its way
     return answer;
   } catch (error) {
     tell({ text: "not saved", tone: "bad" });

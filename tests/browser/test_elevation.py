@@ -113,6 +113,70 @@ def test_fronts_are_drawn_split_typed_merged_and_taken_back(browser: Browser, se
     context.close()
 
 
+def names(page: Page) -> list[str]:
+    return fronts(page).locator(".what").all_inner_texts()
+
+
+def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Elevation").click()
+    expect(page.locator(".elevation .tip")).to_contain_text("D divides it")
+    drag(page, (0.1, 0.1), (1.0, 0.8))
+    expect(fronts(page)).to_have_count(1)
+    page.keyboard.press("d")
+    page.keyboard.type("500")
+    page.keyboard.press("Enter")
+    expect(fronts(page)).to_have_count(2)
+    expect(fronts(page).first).to_contain_text("500 × 700")
+    page.mouse.click(*at(page, 0.3, 0.4))
+    page.keyboard.press("Shift+D")
+    page.keyboard.type("3 / 20")
+    page.keyboard.press("Enter")
+    expect(fronts(page)).to_have_count(4)
+    expect(fronts(page).filter(has_text="500 × 220")).to_have_count(3)
+    page.mouse.click(*at(page, 0.8, 0.4))
+    page.keyboard.press("r")
+    expect(fronts(page)).to_have_count(5)
+    expect(fronts(page).filter(has_text="400 × 700")).to_have_count(2)
+
+    drag_over = (0.02, 0.02), (1.1, 0.88)
+    page.keyboard.down("Shift")
+    drag(page, *drag_over)
+    page.keyboard.up("Shift")
+    expect(page.locator(".front-list [aria-pressed=true]")).to_have_count(4)
+    page.keyboard.press("Control+a")
+    expect(page.locator(".front-list [aria-pressed=true]")).to_have_count(5)
+    stored(page)
+    page.keyboard.press("t")
+    page.keyboard.type("pantry door")
+    page.keyboard.press("Enter")
+    expect(fronts(page).first).to_contain_text("pantry_door_1")
+    assert names(page) == [f"pantry_door_{number}" for number in range(1, 6)]
+    assert sorted(entry["name"] for entry in stored(page)) == names(page)
+    picture(page, "elevation-rows")
+    page.mouse.click(*at(page, 0.8, 0.4))
+    page.keyboard.press("t")
+    page.keyboard.type("pan_1")
+    page.keyboard.press("Control+Enter")  # and the next one's
+    page.keyboard.type("pan_2")
+    page.keyboard.press("Enter")
+    expect(fronts(page).nth(4)).to_contain_text("pan_2")
+    assert names(page)[3:] == ["pan_1", "pan_2"]
+    stored(page)
+    for _ in range(2):  # one name, then the other
+        page.keyboard.press("Control+z")
+    expect(fronts(page).nth(3)).to_contain_text("pantry_door_4")
+    page.keyboard.press("Control+z")  # all names at once
+    expect(fronts(page).filter(has_text="pantry")).to_have_count(0)
+    page.keyboard.press("Control+z")
+    expect(fronts(page)).to_have_count(4)
+    page.keyboard.press("Control+z")
+    expect(fronts(page)).to_have_count(2)
+    context.close()
+
+
 def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(browser: Browser, server: Server) -> None:
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = signed_in(context, server, "ann")

@@ -133,3 +133,12 @@ test("what a front is follows from its shape and height", () => {
   assert.equal(likelyCategory({ ...RECT, bottom: 0.3 }, 0.9), "drawer");
   assert.equal(likelyCategory(RECT, 2.2), "wall_cabinet");
 });
+
+test("an edge let go among lines that are all clear stays where the hand was, and a far one draws it off no near one", () => {
+  const cell = 0.0025;
+  const at = (/** @type {(i: number) => number} */ clear) => ({ positions: Float32Array.from({ length: 400 }, (_, i) => clear(i)), cell });
+  const wide = at((i) => (i > 180 && i < 220 ? 1 : 0));
+  assert.ok(Math.abs(snapped(0.501, 0.012, [], wide) - 0.501) < 0.002); // half a cell, and the cell's middle
+  const two = at((i) => (i === 200 ? 0.8 : i === 204 ? 1 : 0));
+  assert.ok(Math.abs(snapped(0.502, 0.012, [], two) - 200.5 * cell) < 1e-9);
+});

@@ -1,5 +1,5 @@
 /**
- * A plane of the scan with the fronts on it. Emits "draw" Rect, "pick" {key, side, also}, "move-edge" {key, side, at},
+ * A plane of the scan with the fronts on it. Emits "draw" Rect, "enclose" Rect (Shift-drag), "pick" {key, side, also}, "move-edge" {key, side, at},
  * "move-front" {key, dx, dy}, "use-tool" {x, y}, all in metres from the plane's top left corner.
  * Zoom with the wheel or two fingers, pan with the middle button, Space-drag or two fingers; Alt leaves edges where they are put.
  */
@@ -299,7 +299,7 @@ export class ElevationCanvas extends LiveElement {
       this.#preview =
         motion.kind === "carry"
           ? this.#carried(motion.held, motion.at, event.altKey)
-          : this.#drawn(motion.to, event.altKey);
+          : this.#drawn(motion.to, event.altKey || event.shiftKey);
     this.draw();
   }
 
@@ -309,6 +309,7 @@ export class ElevationCanvas extends LiveElement {
     const preview = this.#preview;
     this.stop();
     if (meant?.kind === "drop" && preview?.key) this.emit("move", { key: preview.key, rect: preview.rect });
+    else if (meant?.kind === "box" && preview && event.shiftKey) this.emit("enclose", preview.rect);
     else if (meant?.kind === "box" && preview && !this.tooled && isLarge(preview.rect)) this.emit("draw", preview.rect);
     else if (meant?.kind === "pick") this.emit("pick", { key: meant.held.key, side: meant.held.side, also: false });
     else if (meant?.kind === "click") this.#click(toImage(this.#view, meant.at), event);
@@ -359,7 +360,12 @@ export class ElevationCanvas extends LiveElement {
     return { key, rect: withEdge(rect, side, free ? put : this.snap(side, put, rect, key, this.#reach)) };
   }
 
-  /** A front that is moved as a whole: the edge with the least way to go snaps. @param {Rect} rect @param {string} key @param {boolean} free */
+  /** Where a new front of that size settles: on the lines that are near. @param {Rect} rect */
+  settled(rect) {
+    return this.#placed(rect, null, false);
+  }
+
+  /** A front that is moved as a whole: the edge with the least way to go snaps. @param {Rect} rect @param {string | null} key @param {boolean} free */
   #placed(rect, key, free) {
     if (free) return rect;
     const ways = (/** @type {Side[]} */ sides) =>

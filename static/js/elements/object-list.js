@@ -5,7 +5,7 @@
 
 import { h, icon, LiveElement, renew } from "../dom.js";
 import { inkOn } from "../lib/colour.js";
-import { counted } from "../lib/format.js";
+import { counted, usableName } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => string[] }} View */
@@ -115,9 +115,10 @@ export class ObjectList extends LiveElement {
       const input = h("input", { type: "text", value, "aria-label": `${label} of ${object.name}`, ...props });
       input.dataset.at = `${name}:${object.id}`;
       input.addEventListener("change", () => {
-        if (!input.value.trim() || input.value === value) return;
+        input.value = name === "name" ? usableName(input.value) : input.value.trim();
+        if (!input.value || input.value === value) return;
         const type = name === "name" ? "rename" : "categorise";
-        this.emit(type, { id: object.id, [name]: input.value.trim(), version: object.version });
+        this.emit(type, { id: object.id, [name]: input.value, version: object.version });
       });
       input.addEventListener("keydown", (event) => {
         if (event.key === "Enter") input.blur();

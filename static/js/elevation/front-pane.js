@@ -1,10 +1,12 @@
 /**
  * The chosen front in numbers and words, and the fronts of the plane. Says "choose" key, "size" {side, metres}, "category",
- * "name", "hinge", "handle" with what is wanted, and "adopt".
+ * "name", "hinge", "handle" with what is wanted, "divide" {way, text}, "next" and "adopt".
  */
 
 import { h, renew } from "../dom.js";
 import { heightOf, widthOf } from "../lib/elevation.js";
+import { usableName } from "../lib/format.js";
+import { inOrder } from "../lib/front-rows.js";
 
 /** @typedef {import("../api-types").Category} Category */
 /** @typedef {import("../elevation/fronts.js").Front} Front */
@@ -19,6 +21,8 @@ export class FrontPane extends EventTarget {
   #name = h("input", { type: "text", spellcheck: false });
   #width = h("input", { type: "number", min: "20", max: "10000", step: "1" });
   #height = h("input", { type: "number", min: "20", max: "10000", step: "1" });
+  #across = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 600 450 600" });
+  #down = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 140 280 280" });
   #category = h("select");
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
   #handle = h("select", {}, ...options({ "": "looked for", none: "none", drawn: "drawn" }));
@@ -33,6 +37,8 @@ export class FrontPane extends EventTarget {
     label("Height mm", this.#height),
     label("Handle", this.#handle),
     label("Hinge", this.#hinge),
+    label("Divide width", this.#across),
+    label("Divide height", this.#down),
   );
   element = h("aside", { class: "fronts", "aria-label": "Fronts" }, this.#fields, this.#adopt, this.#list);
   /** @type {Placed | null} */
@@ -40,20 +46,41 @@ export class FrontPane extends EventTarget {
 
   constructor() {
     super();
-    const number = (/** @type {HTMLInputElement} */ input, /** @type {"width" | "height"} */ side) => {
-      input.addEventListener("change", () => this.#size(input, side));
-      input.addEventListener("keydown", ({ key }) => ["Enter", "Escape"].includes(key) && input.blur());
-    };
-    number(this.#width, "width");
-    number(this.#height, "height");
-    this.#name.addEventListener("change", () => this.#say("name", this.#name.value.trim()));
-    this.#name.addEventListener("keydown", ({ key }) => key === "Enter" && this.#name.blur());
+    this.#field(this.#width, () => this.#size(this.#width, "width"));
+    this.#field(this.#height, () => this.#size(this.#height, "height"));
+    this.#field(this.#name, () => {
+      this.#name.value = usableName(this.#name.value);
+      if (this.#name.value) this.#say("name", this.#name.value);
+    });
+    this.#field(this.#across, () => this.#divide(this.#across, "upright"));
+    this.#field(this.#down, () => this.#divide(this.#down, "level"));
     this.#category.addEventListener("change", () => this.#say("category", this.#category.value));
     this.#hinge.addEventListener("change", () => this.#say("hinge", this.#hinge.value || null));
     this.#handle.addEventListener(
       "change",
       () => this.#handle.value !== "drawn" && this.#say("handle", this.#handle.value || null),
     );
+  }
+
+  /** Enter takes what was typed, Ctrl+Enter goes on to the next front, Escape leaves what was there. @param {HTMLInputElement} input @param {() => void} take */
+  #field(input, take) {
+    input.addEventListener("change", take);
+    input.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
+      if (key === "Escape") input.value = input.defaultValue;
+      if (key !== "Enter" && key !== "Escape") return;
+      input.blur();
+      if (key === "Enter" && (ctrlKey || metaKey)) {
+        this.#say("next");
+        this.#type(input);
+      }
+    });
+  }
+
+  /** @param {HTMLInputElement} input @param {"upright" | "level"} way */
+  #divide(input, way) {
+    const text = input.value.trim();
+    input.value = "";
+    if (text) this.#say("divide", { way, text });
   }
 
   /** @param {Category[]} categories */
@@ -71,9 +98,16 @@ export class FrontPane extends EventTarget {
     if (name && this.#shown) this.#say("category", name);
   }
 
-  /** Let the number be typed. @param {"width" | "height"} side */
-  type(side) {
-    const input = side === "width" ? this.#width : this.#height;
+  /** Let it be typed. @param {"name" | "width" | "height" | "across" | "down"} what */
+  type(what) {
+    if (!this.#fields.disabled)
+      this.#type(
+        { name: this.#name, width: this.#width, height: this.#height, across: this.#across, down: this.#down }[what],
+      );
+  }
+
+  /** @param {HTMLInputElement} input */
+  #type(input) {
     input.focus();
     input.select();
   }
@@ -83,6 +117,7 @@ export class FrontPane extends EventTarget {
     this.#shown = leading;
     this.#fields.disabled = leading === null;
     const set = (/** @type {HTMLInputElement | HTMLSelectElement} */ field, /** @type {string} */ value) => {
+      if (field instanceof HTMLInputElement) field.defaultValue = value;
       if (document.activeElement !== field) field.value = value;
     };
     if (leading && ![...this.#category.options].some(({ value }) => value === leading.category))
@@ -95,8 +130,7 @@ export class FrontPane extends EventTarget {
     set(this.#handle, leading?.handle === "none" ? "none" : leading?.handle && leading.drawn ? "drawn" : "");
     this.#adopt.hidden = cut === 0;
     this.#adopt.textContent = cut === 1 ? "Take the cut panel (A)" : `Take ${cut} cut panels (A)`;
-    const rows = fronts.toSorted((a, b) => a.rect.left - b.rect.left || a.rect.top - b.rect.top);
-    renew(this.#list, ...rows.map((front) => this.#row(front, chosen.has(front.key), paint(front))));
+    renew(this.#list, ...inOrder(fronts).map((front) => this.#row(front, chosen.has(front.key), paint(front))));
   }
 
   /** @param {Placed} front @param {boolean} chosen @param {string} paint */

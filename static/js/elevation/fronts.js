@@ -13,7 +13,7 @@ import { saving } from "../saving.js";
 /** @typedef {import("../api-types").FoundFront} FoundFront */
 /** @typedef {import("../api-types").PromptsFileFrontOutput} Drawn */
 /** @typedef {{ name?: string, category?: string, front?: Drawn }} Wanted */
-/** @typedef {{ category: string, corners: number[][], handle?: "none" | null }} Making */
+/** @typedef {{ category: string, corners: number[][], handle?: "none" | null, hinge?: Drawn["hinge"] }} Making */
 /**
  * `seen` is the handle that was found; `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
  * @typedef {{
@@ -107,6 +107,12 @@ export class Fronts extends EventTarget {
     this.#say("choose");
   }
 
+  /** @param {string[]} keys the last one leads */
+  chooseAll(keys) {
+    this.#chosen = keys;
+    this.#say("choose");
+  }
+
   /**
    * New fronts, changed ones and ones that go, as one gesture; one that changes nothing is none: there is nothing to take back.
    * @param {{ make?: Making[], change?: { front: Front, wanted: Wanted }[], remove?: Front[] }} gesture
@@ -169,7 +175,7 @@ export class Fronts extends EventTarget {
   }
 
   /** @param {Making} making */
-  #make({ category, corners, handle = null }) {
+  #make({ category, corners, handle = null, hinge = null }) {
     const key = `n${++this.#made}-${newKey()}`;
     const sent = newKey();
     const name = `${category} …`;
@@ -184,7 +190,7 @@ export class Fronts extends EventTarget {
       corners,
       handle,
       seen: null,
-      hinge: null,
+      hinge,
       drawn: true,
       pending: 1,
     };

@@ -13,6 +13,7 @@ export const SIDES = ["left", "top", "right", "bottom"];
 export const SMALLEST_M = 0.02;
 const OFF_PLANE_M = 0.03; // of a front that is still on the plane
 const CLEAR = 0.2; // of a line that is worth snapping to
+const HAND = 0.4; // of the reach: standard deviation of where a hand lets go about the line it means
 const DOOR_M = 0.4; // in height, from which a front is a door rather than a drawer
 const HANDLE_M = { long: 0.16, thick: 0.02 };
 const SAME_M = 1e-4; // finer than any scan: what differs by less is the same
@@ -89,14 +90,15 @@ export function decoded(lines) {
 }
 
 /**
- * Where an edge goes that a person let go near `at`: onto another front's edge, else onto the clearest line within reach.
+ * Where an edge goes that a person let go near `at`: onto another front's edge, else onto the line within reach that is most
+ * likely meant: a clear one, and near. Where many lines are as clear as can be said, as beside a worktop, it stays put.
  * @param {number} at metres
  * @param {number} reach metres
  * @param {number[]} edges of other fronts
  * @param {Profile | null} profile
  */
 export function snapped(at, reach, edges, profile) {
-  const line = profile ? clearestLine(at, reach, profile) : null;
+  const line = profile ? likeliestLine(at, reach, profile) : null;
   const edge = edges.reduce(
     (best, one) => (Math.abs(one - at) < Math.abs(best - at) ? one : best),
     Number.POSITIVE_INFINITY,
@@ -111,16 +113,18 @@ export function snapped(at, reach, edges, profile) {
  * @param {number} reach
  * @param {Profile} profile
  */
-function clearestLine(at, reach, { positions, cell }) {
-  let best = -1;
+function likeliestLine(at, reach, { positions, cell }) {
+  const line = { at: 0, likely: 0 };
   const low = Math.max(Math.floor((at - reach) / cell), 1);
   const high = Math.min(Math.ceil((at + reach) / cell), positions.length - 2);
   for (let i = low; i <= high; i++) {
     const here = positions[i] ?? 0;
     const peak = here >= (positions[i - 1] ?? 0) && here >= (positions[i + 1] ?? 0);
-    if (here >= CLEAR && peak && here > (positions[best] ?? 0)) best = i;
+    const middle = (i + 0.5) * cell;
+    const likely = here * Math.exp(-0.5 * ((middle - at) / (HAND * reach)) ** 2);
+    if (here >= CLEAR && peak && likely > line.likely) Object.assign(line, { at: middle, likely });
   }
-  return best < 0 ? null : (best + 0.5) * cell;
+  return line.likely ? line.at : null;
 }
 
 /**

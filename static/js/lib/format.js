@@ -52,3 +52,8 @@ export function centimetres(metres) {
 export function jointValue(type, value) {
   return type === "revolute" ? `${Math.round((value * 180) / Math.PI)}°` : `${(100 * value).toFixed(0)} cm`;
 }
+
+/** A name as simulators accept it: what people put between words becomes an underscore. @param {string} typed */
+export function usableName(typed) {
+  return typed.trim().replaceAll(/[\s.-]+/g, "_");
+}

@@ -10,6 +10,7 @@ import { drawnOf, Fronts } from "../elevation/fronts.js";
 import { PlaneList } from "../elevation/plane-list.js";
 import { Commands, isForPage } from "../keyboard.js";
 import * as plane from "../lib/elevation.js";
+import * as rows from "../lib/front-rows.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
@@ -18,12 +19,14 @@ import { remember } from "../router.js";
 /** @typedef {import("../elevation/fronts.js").Front} Front */
 /** @typedef {import("../lib/elevation.js").Rect} Rect */
 /** @typedef {import("../lib/elevation.js").Side} Side */
+/** @typedef {import("../lib/front-rows.js").Way} Way */
 /** @typedef {"seam" | "level-seam" | "handle" | "hinge"} Tool */
 /** @typedef {Front & { rect: Rect }} Placed */
 
 const NEW_M = { width: 0.6, height: 0.72 }; // of a front that is added by keyboard
 const STEP_M = { usual: 0.01, fine: 0.001 };
-const EMPTY = "Drag over a front to draw it; its edges snap to lines. S splits it at the pointer, W types its width.";
+const EMPTY =
+  "Drag over a front to draw it; its edges snap to lines. S splits it at the pointer, D divides it, R repeats it, W types its width.";
 /** @type {[Tool, string, string][]} */
 const TOOLS = [
   ["seam", "Seam │", "Click a front: an upright seam there (S at the pointer)"],
@@ -98,6 +101,7 @@ export class ElevationPage extends LiveElement {
     on(this.#canvas, "draw", (rect) => this.#add(rect));
     on(this.#canvas, "move", ({ key, rect }) => this.#place(key, rect));
     on(this.#canvas, "pick", ({ key, side, also }) => this.#pick(key, side, also));
+    on(this.#canvas, "enclose", (rect) => this.#chooseWithin(rect));
     on(this.#canvas, "use-tool", (at) => this.#useTool(at));
     on(this.#planes, "choose", (id) => this.#open(id));
     on(this.#fronts, "change", () => this.#draw());
@@ -111,7 +115,9 @@ export class ElevationPage extends LiveElement {
     on(this.#pane, "choose", (key) => this.#pick(key, null, false));
     on(this.#pane, "size", ({ side, metres }) => this.#resize(side, metres));
     on(this.#pane, "category", (category) => this.#change((front) => front.category !== category && { category }));
-    on(this.#pane, "name", (name) => this.#change((front) => front.name !== name && { name }));
+    on(this.#pane, "name", (name) => this.#name(name));
+    on(this.#pane, "divide", ({ way, text }) => this.#divide(way, text));
+    on(this.#pane, "next", () => this.#next(1));
     on(this.#pane, "hinge", (hinge) =>
       this.#change((front) => front.hinge !== hinge && { front: { ...drawnOf(front), hinge } }),
     );
@@ -300,11 +306,10 @@ export class ElevationPage extends LiveElement {
     this.#place(front.key, rect);
   }
 
-  /** @param {"upright" | "level"} way @param {{ x: number, y: number }} [at] */
+  /** @param {Way} way @param {{ x: number, y: number }} [at] */
   #split(way, at = this.#aim()) {
-    const elevation = this.#elevation;
     const front = this.#at(at);
-    if (!front || !elevation || !at) return say("Choose a front first, or point at one.");
+    if (!front || !at) return say("Choose a front first, or point at one.");
     const side = way === "upright" ? "left" : "top";
     const parts = plane.split(
       front.rect,
@@ -312,19 +317,67 @@ export class ElevationPage extends LiveElement {
       this.#snap(side, way === "upright" ? at.x : at.y, front.rect, front.key, this.#canvas.reach),
     );
     if (!parts) return say("There is no room for a seam there.");
-    const [first, second] = parts.map((rect) => plane.cornersOf(elevation, rect));
+    return this.#part(front, way, parts);
+  }
+
+  /** By sizes that were typed. @param {Way} way @param {string} text */
+  #divide(way, text) {
+    const front = this.#leading();
+    const parts = front && rows.divided(front.rect, way, text);
+    if (parts) this.#part(front, way, parts);
+    else say(`“${text}” does not fit: type 3 for equal parts, or sizes in mm as 600 450 600; / 3 leaves 3 mm between.`);
+  }
+
+  /** The first part keeps its name; the last one is chosen. @param {Front} front @param {Way} way @param {Rect[]} parts */
+  #part(front, way, parts) {
+    const elevation = this.#elevation;
     const kept = this.#fronts.get(front.key);
-    if (!first || !second || !kept) return undefined;
+    if (!elevation || !kept) return;
     /** @type {"none" | null} */
-    const handle = kept.handle === "none" ? "none" : null; // where it was is the middle of neither part
-    const kinds = parts.map((rect) => (way === "level" ? plane.likelyCategory(rect, elevation.top_m) : front.category));
+    const handle = kept.handle === "none" ? "none" : null; // where it was is the middle of none of the parts
+    const [first, ...others] = parts.map((rect) => ({
+      category: way === "level" ? plane.likelyCategory(rect, elevation.top_m) : front.category,
+      corners: plane.cornersOf(elevation, rect),
+      handle,
+    }));
+    if (!first) return;
     const wanted = {
-      front: { ...drawnOf(kept), corners_m: first, handle },
-      ...(kinds[0] === front.category ? {} : { category: kinds[0] }),
+      front: { ...drawnOf(kept), corners_m: first.corners, handle },
+      ...(first.category === front.category ? {} : { category: first.category }),
     };
-    const make = [{ category: kinds[1] ?? front.category, corners: second, handle }];
-    const [made] = this.#fronts.do({ change: [{ front: kept, wanted }], make });
+    const made = this.#fronts.do({ change: [{ front: kept, wanted }], make: others });
+    this.#pick(made.at(-1)?.key ?? null, null, false);
+  }
+
+  /** As large as the chosen one, moved onto the lines that are near. @param {Way} way */
+  #repeat(way) {
+    const elevation = this.#elevation;
+    const front = this.#leading();
+    if (!elevation || !front) return say("Choose a front first.");
+    const rect = this.#canvas.settled(rows.again(front.rect, way));
+    const { category, handle, hinge } = front;
+    const corners = plane.cornersOf(elevation, rect);
+    const [made] = this.#fronts.do({ make: [{ category, corners, handle: handle === "none" ? "none" : null, hinge }] });
     return this.#pick(made?.key ?? null, null, false);
+  }
+
+  /** Several are numbered, from left to right and from the top down. @param {string} name */
+  async #name(name) {
+    const chosen = new Set(this.#fronts.chosen.map(({ key }) => key));
+    await outbox.settled; // until then nobody knows what new ones are called
+    const mine = rows.inOrder(this.#here.filter(({ key }) => chosen.has(key)));
+    const taken = this.#fronts.all.filter(({ key }) => !chosen.has(key)).map((front) => front.name);
+    const change = rows.renamed(mine, name, taken).flatMap(({ key, name }) => {
+      const front = this.#fronts.get(key);
+      return front ? [{ front, wanted: { name } }] : [];
+    });
+    this.#fronts.do({ change });
+  }
+
+  /** @param {Rect} rect */
+  #chooseWithin(rect) {
+    const within = this.#here.filter((front) => plane.holds(rect, plane.middleOf(front.rect)));
+    this.#fronts.chooseAll(rows.inOrder(within).map(({ key }) => key));
   }
 
   #merge() {
@@ -422,7 +475,7 @@ export class ElevationPage extends LiveElement {
 
   /** @param {1 | -1} way */
   #next(way) {
-    const here = this.#here.toSorted((a, b) => a.rect.left - b.rect.left || a.rect.top - b.rect.top);
+    const here = rows.inOrder(this.#here);
     const at = here.findIndex(({ key }) => key === this.#fronts.leading?.key);
     const next = here[(at + way + here.length) % here.length];
     if (next) this.#pick(next.key, this.#canvas.edge, false);
@@ -497,6 +550,12 @@ export class ElevationPage extends LiveElement {
       seam: () => this.#split("upright"),
       "level-seam": () => this.#split("level"),
       merge: () => this.#merge(),
+      divide: () => this.#pane.type("across"),
+      "level-divide": () => this.#pane.type("down"),
+      repeat: () => this.#repeat("upright"),
+      "repeat-below": () => this.#repeat("level"),
+      "choose-all": () => this.#fronts.chooseAll(rows.inOrder(this.#here).map(({ key }) => key)),
+      "front-name": () => this.#pane.type("name"),
       "delete-front": () => this.#remove(),
       width: () => this.#pane.type("width"),
       height: () => this.#pane.type("height"),
