@@ -17,12 +17,13 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _MOST_PIXELS = 64_000_000  # as of a recording's images
 
 
-def mask_errors(truth: Path, found: Path) -> tuple[Metric, ...]:
+def mask_errors(truth: Path, found: Path, opened: frozenset[int] = frozenset()) -> tuple[Metric, ...]:
     """Mean IoU of the frames whose true mask has at least 400 px, and the share of those frames that have a mask at all.
 
-    Both are folders of <frame:06d>.png with 0 or 255; a frame without a found mask counts as IoU 0.
+    Both are folders of <frame:06d>.png with 0 or 255; a frame without a found mask counts as IoU 0. The mean over the frames in
+    which a front of it stands open (`opened`) comes beside it.
     """
-    overlaps, present = [], []
+    overlaps, present, ajar = [], [], []
     for file in sorted(truth.glob("*.png")):
         true_mask = read_mask(file)
         if np.count_nonzero(true_mask) < MIN_TRUTH_PX:
@@ -30,6 +31,8 @@ def mask_errors(truth: Path, found: Path) -> tuple[Metric, ...]:
         other = found / file.name
         present.append(other.exists())
         overlaps.append(mask_iou(true_mask, read_mask(other, like=true_mask)) if other.exists() else 0.0)
+        if file.stem.isdecimal() and int(file.stem) in opened:
+            ajar.append(overlaps[-1])
     note = f"{len(overlaps)} frames" if overlaps else f"no frame shows {MIN_TRUTH_PX} px of it"
     return (
         Metric(name="mask_iou", value=_mean(overlaps), unit="share", better="higher", tolerance=0.01, note=note),
@@ -41,6 +44,7 @@ def mask_errors(truth: Path, found: Path) -> tuple[Metric, ...]:
             tolerance=0.02,
             note=note,
         ),
+        _open_iou(_mean(ajar), f"{len(ajar)} frames" if ajar else "no frame shows it open"),
     )
 
 
@@ -49,7 +53,12 @@ def mask_not_given(reason: str) -> tuple[Metric, ...]:
     return (
         Metric(name="mask_iou", value=None, unit="share", better="higher", tolerance=0.01, note=reason),
         Metric(name="mask_frames", value=None, unit="share", better="higher", tolerance=0.02, note=reason),
+        _open_iou(None, reason),
     )
+
+
+def _open_iou(value: float | None, note: str) -> Metric:
+    return Metric(name="mask_iou_open", value=value, unit="share", better="higher", tolerance=0.02, note=note)
 
 
 def read_mask(file: Path, *, like: Mask | None = None) -> Mask:

@@ -11,7 +11,7 @@ def joint_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]
     """The means over the object's joints; a missing or surplus joint counts as a wrong type."""
     if not truth.joints and not found.joints:
         return _metrics([1.0], [], [], [], [], [], [], note="no joint, and none found")
-    pairs = _pair(truth.joints, found.joints)
+    pairs = pair_joints(truth.joints, found.joints)
     surplus = max(len(found.joints) - len(truth.joints), 0)
     types = [float(b is not None and a.type == b.type) for a, b in pairs] + [0.0] * surplus
     same = [(a, b) for a, b in pairs if b is not None and a.type == b.type]
@@ -22,7 +22,7 @@ def joint_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]
     return _metrics(
         types,
         hinges,
-        [_axis_deg(a, b) for a, b in same],
+        [axis_deg(a, b) for a, b in same],
         [1000 * line_distance(a.origin, a.axis, b.origin, b.axis) for a, b in hinged],
         [float(np.degrees(abs(_range(a) - _range(b)))) for a, b in hinged],
         [1000 * abs(_range(a) - _range(b)) for a, b in sliding],
@@ -45,7 +45,9 @@ def line_distance(origin_a: np.ndarray, axis_a: np.ndarray, origin_b: np.ndarray
     return abs(float(apart @ normal)) / length
 
 
-def _pair(truths: tuple[JointRecord, ...], found: tuple[JointRecord, ...]) -> list[tuple[JointRecord, JointRecord | None]]:
+def pair_joints(
+    truths: tuple[JointRecord, ...], found: tuple[JointRecord, ...]
+) -> list[tuple[JointRecord, JointRecord | None]]:
     """Each true joint with its own found one, so that the origins are nearest in total."""
     if not found:
         return [(joint, None) for joint in truths]
@@ -72,7 +74,8 @@ def _side(thing: ObjectRecord, joint: JointRecord) -> str:
     return "bottom" if origin[2] < 0 else "top"
 
 
-def _axis_deg(a: JointRecord, b: JointRecord) -> float:
+def axis_deg(a: JointRecord, b: JointRecord) -> float:
+    """The angle between two axes, whichever way each points, degrees."""
     return float(np.degrees(np.arccos(np.clip(abs(float(a.axis @ b.axis)), 0.0, 1.0))))
 
 

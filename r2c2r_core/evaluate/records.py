@@ -16,7 +16,25 @@ from r2c2r_core.geometry.transforms import Rigid3
 
 _TRUTH = "give the truth.json that belongs to the recording; r2c2r sample writes one"
 _FARTHEST = 1e6  # metres; a kitchen has no such number, and squares of larger ones overflow
+MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25
+"""From which a frame shows a front: as many of its pixels, and as much of its outline, as a person needs to see its state."""
 _POSE_KEYS = ("capture_from_object", "world_from_object", "pose")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionRecord:
+    """How a joint moved in the recording, true or found; states in rad or m, 0 closed."""
+
+    states: Mapping[int, float | None]  # by frame number; None: not known
+    shown: frozenset[int]  # truth only: the frames that show its front
+    largest: float
+    stop_seen: bool
+    inside: Mapping[str, float]  # lengths in m, by the names of model/motion.py
+
+    @property
+    def opens(self) -> bool:
+        """Whether a frame shows it open."""
+        return any((self.states[i] or 0.0) > 0 for i in self.shown)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,6 +48,7 @@ class JointRecord:
     lower: float
     upper: float
     limit_source: str  # "truth", or what the manifest says
+    motion: MotionRecord | None = None  # None: nothing is said of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,7 +164,42 @@ def _joint(entry: dict[str, Any], world_from_file: Rigid3) -> JointRecord:
         lower=float(entry["lower"]),
         upper=float(entry["upper"]),
         limit_source=str(entry.get("source", {}).get("limits", "truth")),
+        motion=_true_motion(entry) if "states" in entry else _found_motion(entry.get("motion")),
     )
+
+
+def _true_motion(entry: dict[str, Any]) -> MotionRecord:
+    """Of a truth file: one state of every frame, and how much of the front each shows."""
+    states = {i: float(value) for i, value in enumerate(entry["states"])}
+    seen = zip(entry["seen_px"], entry["seen_share"], strict=True)
+    shown = frozenset(i for i, (px, share) in enumerate(seen) if px >= MIN_SEEN_PX and share >= MIN_SEEN_SHARE)
+    if any(not np.isfinite(value) for value in states.values()) or not shown <= states.keys():
+        raise ValueError("a frame without a state")
+    return MotionRecord(
+        states=states,
+        shown=shown,
+        largest=float(entry["largest"]),
+        stop_seen=bool(entry["stop_seen"]),
+        inside=_lengths(entry.get("inside")),
+    )
+
+
+def _found_motion(entry: dict[str, Any] | None) -> MotionRecord | None:
+    """Of a manifest: states of the frames in which its front was found."""
+    if entry is None:
+        return None
+    states = {int(each["frame"]): None if each["value"] is None else float(each["value"]) for each in entry["states"]}
+    return MotionRecord(
+        states=states,
+        shown=frozenset(),
+        largest=float(entry["largest"]),
+        stop_seen=bool(entry["stop_seen"]),
+        inside=_lengths(entry.get("inside")),
+    )
+
+
+def _lengths(entry: dict[str, Any] | None) -> dict[str, float]:
+    return {str(key): float(value) for key, value in (entry or {}).items() if isinstance(value, int | float)}
 
 
 def _vector(values: Any) -> Vector3:

@@ -12,6 +12,7 @@ from r2c2r_core.errors import BundleError
 from r2c2r_core.evaluate.extents import extent_errors
 from r2c2r_core.evaluate.iou import mask_errors, mask_not_given
 from r2c2r_core.evaluate.joints import joint_errors
+from r2c2r_core.evaluate.motions import motion_errors, open_frames
 from r2c2r_core.evaluate.pose import pose_errors
 from r2c2r_core.evaluate.records import ObjectRecord, read_bundle, read_truth
 from r2c2r_core.evaluate.shape import box_iou, shape_errors
@@ -22,7 +23,7 @@ MIN_BOX_IOU = 0.25  # objects of other names are taken for the same from this ov
 VERSION = 1
 
 Comparison = Callable[[ObjectRecord, ObjectRecord], tuple[Metric, ...]]
-COMPARISONS: tuple[Comparison, ...] = (extent_errors, pose_errors, joint_errors, shape_errors)
+COMPARISONS: tuple[Comparison, ...] = (extent_errors, pose_errors, joint_errors, motion_errors, shape_errors)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +112,7 @@ def _row(true: ObjectRecord, found: ObjectRecord | None, truth_masks: Path, mask
     elif not (truth_masks / true.name).is_dir():
         compared += mask_not_given("the truth has no masks")
     else:
-        compared += mask_errors(truth_masks / true.name, masks / found.name)
+        compared += mask_errors(truth_masks / true.name, masks / found.name, open_frames(true))
     return ObjectRow(name=true.name, category=true.category, matched=found.name, metrics=tuple(compared))
 
 

@@ -13,8 +13,7 @@ from r2c2r_core.synthetic.render import View
 
 _BEHIND_M = 0.05
 _FEWEST_STILL = 3  # frames that show a front at rest, for its stop to be seen
-MIN_SEEN_PX = 400  # as of the masks that evaluate compares
-MIN_SEEN_SHARE = 0.25
+MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25  # as evaluate asks (records.py); stages do not import each other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

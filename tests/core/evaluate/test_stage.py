@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import BundleError
+from r2c2r_core.evaluate.iou import mask_errors
 from r2c2r_core.evaluate.stage import Evaluation, evaluate_bundle
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.synthetic.layout import plan_kitchen
@@ -212,3 +213,17 @@ def test_the_fit_to_the_scan_is_what_the_bundle_says(tmp_path: Path) -> None:
     assert (first["f_score_1cm"], first["f_score_2cm"]) == (0.93, 0.99)
     assert row(evaluation, truth["objects"][1]["name"])["f_score_1cm"] is None  # not said, so not scored
     assert scene(evaluation)["f_score_1cm"] == 0.93
+
+
+def test_masks_of_open_frames_are_scored_apart(tmp_path: Path) -> None:
+    true, found = tmp_path / "true", tmp_path / "found"
+    whole, half = np.full((40, 40), 255, np.uint8), np.zeros((40, 40), np.uint8)
+    half[:20] = 255
+    for folder in (true, found):
+        folder.mkdir()
+        cv2.imwrite(str(folder / "000001.png"), whole)
+    cv2.imwrite(str(true / "000002.png"), whole)
+    cv2.imwrite(str(found / "000002.png"), half)
+    values = {metric.name: metric.value for metric in mask_errors(true, found, frozenset({2}))}
+    assert (values["mask_iou"], values["mask_iou_open"]) == (pytest.approx(0.75), pytest.approx(0.5))
+    assert {metric.name: metric.value for metric in mask_errors(true, found)}["mask_iou_open"] is None

@@ -1,0 +1,137 @@
+"""Joints that were filmed while they opened: the state of every frame, stops, limits and insides against what is true.
+
+Only joints that open in the recording are scored; of the others, whether something was seen to move that did not. A frame
+that shows the front and of which no state is known counts as wrong, and so does every frame of a joint that is missing or of
+another type.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.evaluate.joints import axis_deg, line_distance, pair_joints
+from r2c2r_core.evaluate.records import JointRecord, MotionRecord, ObjectRecord
+from r2c2r_core.model.report import Metric
+
+STATE_TOLERANCE = {"revolute": float(np.radians(2.0)), "prismatic": 0.006}
+"""Within which a state is right: 2 degrees, 6 mm."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointScore:
+    """One true joint that opens, and what was found of it."""
+
+    name: str
+    type: str  # the true one
+    type_right: bool
+    axis_deg: float | None  # None: of another type
+    pivot_mm: float | None  # of revolute ones
+    shown: int  # frames that show the front
+    shown_right: int  # with the right state
+    open_shown: int  # those in which it stands open
+    open_right: int
+    stop_right: bool | None  # None: none was seen, and none is claimed
+    limit_right: bool  # measured where it stopped, and right; not called measured where it did not
+    inner_depth_mm: float | None  # signed error; None: not seen, or nothing is true of it
+
+
+def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
+    """The means over the joints of an object that open; what does not apply is None with its reason."""
+    scores = joint_scores(truth, found)
+    false = false_motions(truth, found)
+    shown, shown_open = sum(s.shown for s in scores), sum(s.open_shown for s in scores)
+    note = f"{shown} frames show it, {shown_open} of them open" if scores else "nothing was opened"
+    stops = [float(s.stop_right) for s in scores if s.stop_right is not None]
+    depths = [abs(s.inner_depth_mm) for s in scores if s.inner_depth_mm is not None]
+    limits = [float(s.limit_right) for s in scores]
+    right, right_open = sum(s.shown_right for s in scores), sum(s.open_right for s in scores)
+    return (
+        Metric(name="state", value=_share(right, shown), unit="share", better="higher", tolerance=0.02, note=note),
+        Metric(
+            name="state_open", value=_share(right_open, shown_open), unit="share", better="higher", tolerance=0.02, note=note
+        ),
+        Metric(name="stop", value=_mean(stops), unit="share right", better="higher", tolerance=0.0),
+        Metric(name="limit_source", value=_mean(limits), unit="share right", better="higher", tolerance=0.0),
+        Metric(name="inner_depth", value=_mean(depths), unit="mm", better="lower", tolerance=2.0),
+        Metric(name="false_motion", value=false, unit="joints", better="lower", tolerance=0.0),
+    )
+
+
+def joint_scores(truth: ObjectRecord, found: ObjectRecord | None) -> tuple[JointScore, ...]:
+    """One score of every true joint that opens; of an object that is not there, nothing is right."""
+    others = () if found is None else found.joints
+    return tuple(
+        _score(a, a.motion, b) for a, b in pair_joints(truth.joints, others) if a.motion is not None and a.motion.opens
+    )
+
+
+def open_frames(truth: ObjectRecord) -> frozenset[int]:
+    """The frames that show a front of it which is not closed."""
+    motions = [joint.motion for joint in truth.joints if joint.motion is not None]
+    return frozenset(i for motion in motions for i in motion.shown if (motion.states[i] or 0.0) > 0)
+
+
+def false_motions(truth: ObjectRecord, found: ObjectRecord) -> float | None:
+    """How many joints of an object are said to have moved that did not; None where the truth says nothing of motion."""
+    pairs = [(a.motion, b) for a, b in pair_joints(truth.joints, found.joints) if a.motion is not None]
+    if not pairs:
+        return None
+    return float(sum(not a.opens and b is not None and _claims_motion(b) for a, b in pairs))
+
+
+def _score(true: JointRecord, motion: MotionRecord, found: JointRecord | None) -> JointScore:
+    same = found is not None and found.type == true.type
+    tolerance = STATE_TOLERANCE.get(true.type, 0.0)
+    states = found.motion.states if same and found is not None and found.motion is not None else {}
+    right = {i for i in motion.shown if _near(states.get(i), motion.states[i], tolerance)}
+    ajar = {i for i in motion.shown if (motion.states[i] or 0.0) > 0}
+    return JointScore(
+        name=true.name,
+        type=true.type,
+        type_right=same,
+        axis_deg=axis_deg(true, found) if same and found is not None else None,
+        pivot_mm=1000 * line_distance(true.origin, true.axis, found.origin, found.axis)
+        if same and found is not None and true.type == "revolute"
+        else None,
+        shown=len(motion.shown),
+        shown_right=len(right),
+        open_shown=len(ajar),
+        open_right=len(right & ajar),
+        stop_right=_stop_right(motion, found.motion if same and found is not None else None, tolerance),
+        limit_right=same and found is not None and _limit_right(motion, found, tolerance),
+        inner_depth_mm=_depth_error_mm(motion, found.motion if found is not None else None),
+    )
+
+
+def _near(value: float | None, true: float | None, tolerance: float) -> bool:
+    return value is not None and true is not None and abs(value - true) <= tolerance
+
+
+def _stop_right(true: MotionRecord, found: MotionRecord | None, tolerance: float) -> bool | None:
+    claimed = found is not None and found.stop_seen
+    if not true.stop_seen:
+        return False if claimed else None
+    return claimed and found is not None and abs(found.largest - true.largest) <= tolerance
+
+
+def _limit_right(true: MotionRecord, found: JointRecord, tolerance: float) -> bool:
+    if not true.stop_seen:
+        return found.limit_source != "measured" and found.upper >= true.largest - tolerance
+    return found.limit_source == "measured" and abs(found.upper - true.largest) <= tolerance
+
+
+def _depth_error_mm(true: MotionRecord, found: MotionRecord | None) -> float | None:
+    inside, seen = true.inside.get("depth_m"), None if found is None else found.inside.get("depth_m")
+    return None if inside is None or seen is None else 1000 * (seen - inside)
+
+
+def _claims_motion(joint: JointRecord) -> bool:
+    return joint.motion is not None and joint.motion.largest > STATE_TOLERANCE.get(joint.type, 0.0)
+
+
+def _share(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _mean(values: list[float]) -> float | None:
+    return float(np.mean(values)) if values else None

@@ -1,0 +1,128 @@
+"""Of what was filmed while it opened: what is right is right, and what is unknown is wrong."""
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.evaluate.stage import evaluate_bundle
+from tests.core.evaluate.test_stage import bundle_of, row, truth_of, write
+
+FRAMES, OPEN, UNSEEN = 20, range(8, 18), (2, 12)  # one closed frame and one open one do not show it
+NAMES = ("cabinet_1", "drawer_1")
+
+
+def opened_truth() -> dict[str, Any]:
+    """A truth in which a door and a drawer are opened, and nothing else."""
+    truth = truth_of(0)
+    for thing in truth["objects"]:
+        for joint in thing["joints"]:
+            opens = thing["name"] in NAMES
+            joint["states"] = [0.8 * joint["upper"] if opens and i in OPEN else 0.0 for i in range(FRAMES)]
+            joint["seen_px"] = [100 if i in UNSEEN else 4000 for i in range(FRAMES)]
+            joint["seen_share"] = [0.9] * FRAMES
+            joint["stop_seen"] = thing["name"] == "drawer_1"
+            joint["largest"] = 0.8 * joint["upper"] if opens else 0.0
+            joint["inside"] = {"depth_m": 0.45, "shelves_m": []} if opens else None
+    return truth
+
+
+def filmed_bundle(truth: dict[str, Any]) -> dict[str, Any]:
+    """The manifest of a bundle that found all of it."""
+    manifest = bundle_of(deepcopy(truth))
+    for thing in manifest["objects"]:
+        for joint in thing["joints"]:
+            states = [{"frame": i, "value": v, "sigma": 0.001} for i, v in enumerate(joint.pop("states"))]
+            opens = thing["name"] in NAMES
+            told = {key: joint.pop(key) for key in ("largest", "stop_seen", "inside")}
+            del joint["seen_px"], joint["seen_share"]
+            joint["motion"] = {"source": "measured", "covariance": None, "states": states, **told} if opens else None
+            if opens:
+                joint["upper"] = told["largest"]
+                joint["source"]["limits"] = "measured" if told["stop_seen"] else "at_least"
+    return manifest
+
+
+def found(tmp_path: Path, change: Any = lambda manifest: None) -> tuple[dict[str, float | None], dict[str, float | None]]:
+    """The metrics of the door and of the drawer."""
+    truth = opened_truth()
+    manifest = filmed_bundle(truth)
+    change({thing["name"]: thing["joints"][0] for thing in manifest["objects"] if thing["joints"]})
+    evaluation = evaluate_bundle(*write(tmp_path, truth, manifest))
+    return row(evaluation, "cabinet_1"), row(evaluation, "drawer_1")
+
+
+def test_a_bundle_that_found_everything_is_all_right(tmp_path: Path) -> None:
+    door, drawer = found(tmp_path)
+    for metrics in (door, drawer):
+        assert (metrics["state"], metrics["state_open"], metrics["limit_source"]) == (1.0, 1.0, 1.0)
+        assert metrics["inner_depth"] == pytest.approx(0.0)
+        assert metrics["false_motion"] == 0.0
+    assert (door["stop"], drawer["stop"]) == (None, 1.0)  # of the door no stop was seen, and none is claimed
+
+
+def test_an_unknown_state_is_a_miss_like_a_frame_that_is_not_listed(tmp_path: Path) -> None:
+    def forget(joints: dict[str, Any]) -> None:
+        joints["cabinet_1"]["motion"]["states"][9]["value"] = None
+        del joints["drawer_1"]["motion"]["states"][9]
+
+    shown, ajar = FRAMES - len(UNSEEN), len(OPEN) - 1
+    for metrics in found(tmp_path, forget):
+        assert metrics["state"] == pytest.approx((shown - 1) / shown)
+        assert metrics["state_open"] == pytest.approx((ajar - 1) / ajar)
+
+
+def test_frames_that_do_not_show_the_front_are_not_asked_about(tmp_path: Path) -> None:
+    def err(joints: dict[str, Any]) -> None:
+        for i in UNSEEN:
+            joints["cabinet_1"]["motion"]["states"][i]["value"] = 1.3
+
+    assert found(tmp_path, err)[0]["state"] == 1.0
+
+
+@pytest.mark.parametrize(("off", "right"), [(0.9, 1.0), (1.1, 0.0)])
+def test_states_are_right_within_two_degrees_or_six_millimetres(tmp_path: Path, off: float, right: float) -> None:
+    def shift(joints: dict[str, Any]) -> None:
+        for name, tolerance in (("cabinet_1", np.radians(2.0)), ("drawer_1", 0.006)):
+            for each in joints[name]["motion"]["states"]:
+                each["value"] += off * tolerance
+
+    assert [metrics["state"] for metrics in found(tmp_path, shift)] == [right, right]
+
+
+def test_nothing_of_a_joint_of_another_type_or_without_motion_is_right(tmp_path: Path) -> None:
+    def spoil(joints: dict[str, Any]) -> None:
+        joints["cabinet_1"]["type"] = "prismatic"
+        joints["drawer_1"]["motion"] = None
+
+    door, drawer = found(tmp_path, spoil)
+    assert (door["state"], door["limit_source"], drawer["state"], drawer["stop"]) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_limit_that_was_not_seen_must_not_be_called_measured(tmp_path: Path) -> None:
+    def claim(joints: dict[str, Any]) -> None:
+        joints["cabinet_1"]["source"]["limits"] = "measured"
+        joints["cabinet_1"]["motion"]["stop_seen"] = True
+
+    door, _ = found(tmp_path, claim)
+    assert (door["limit_source"], door["stop"]) == (0.0, 0.0)
+
+
+def test_motion_where_nothing_moved_is_counted(tmp_path: Path) -> None:
+    truth = opened_truth()
+    manifest = filmed_bundle(truth)
+    door, fridge = (next(t for t in manifest["objects"] if t["name"] == name) for name in ("cabinet_1", "refrigerator"))
+    fridge["joints"][0]["motion"] = deepcopy(door["joints"][0]["motion"])
+    evaluation = evaluate_bundle(*write(tmp_path, truth, manifest))
+    assert row(evaluation, "refrigerator")["false_motion"] == 1.0
+    assert row(evaluation, "cabinet_2")["false_motion"] == 0.0
+
+
+def test_of_a_truth_that_says_nothing_of_motion_nothing_is_scored(tmp_path: Path) -> None:
+    truth = truth_of(0)
+    metrics = row(evaluate_bundle(*write(tmp_path, truth, bundle_of(truth))), "cabinet_1")
+    assert [metrics[name] for name in ("state", "state_open", "stop", "limit_source", "inner_depth", "false_motion")] == [
+        None
+    ] * 6
