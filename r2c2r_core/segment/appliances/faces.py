@@ -83,16 +83,19 @@ def _surface_in(
     parts = scene.parts
     near = parts.faces_near(world_from_front.apply((low + high)[None] / 2)[0], float(np.linalg.norm(high - low)) / 2)
     points = world_from_front.inverse.apply(parts.middles[near])
-    inside = ((points > low) & (points < high)).all(axis=1)
+    inside = np.logical_and.reduce([(points[:, k] > low[k]) & (points[:, k] < high[k]) for k in range(3)])
     near = near[inside]
     return points[inside], parts.normals[near] @ world_from_front.rotation, parts.areas_m2[near]
 
 
 def _patches(points: Points, areas: np.ndarray, patch_m: float) -> Points:
     """The mean point of each cube of that side."""
-    _, patch = np.unique(np.floor(points / patch_m).astype(int), axis=0, return_inverse=True)
+    cubes = np.floor(points / patch_m).astype(int)
+    cubes -= cubes.min(axis=0)
+    patch = np.ravel_multi_index(tuple(cubes.T), tuple(cubes.max(axis=0) + 1))
     weight = np.bincount(patch, areas)
-    return np.stack([np.bincount(patch, areas * points[:, k]) for k in range(3)], axis=1) / weight[:, None]
+    taken = np.bincount(patch) > 0
+    return np.stack([np.bincount(patch, areas * points[:, k])[taken] for k in range(3)], axis=1) / weight[taken, None]
 
 
 def _end(depths: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, near_plane, nudged
-from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
+from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
 from r2c2r_core.segment.runs.handles import find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell
@@ -45,7 +45,7 @@ def appliance_front(
     """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
 
     Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
-    the photographs, which take most of the time.
+    the photographs and the handle, which take most of the time.
     """
     clicks = [click for click in prompt.points if click.label == 1]
     found = _plane_of(prepared, clicks[0], kind)
@@ -63,7 +63,7 @@ def appliance_front(
         return None
     lab, seen_colour = as_lab(run.mosaic)
     cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
-    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    handle = None if glimpse else find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_to_wall(front, prepared.scene.capture.room, kind)
     fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)
@@ -126,7 +126,7 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
     origin, ray = scene.ray(click.frame, click.x, click.y)
     point = scene.pick(click.frame, click.x, click.y)
     if scene.has_depth(click.frame, click.x, click.y) and point is not None:
-        region = region_at(prepared.planes, point)
+        region = _region_at(prepared, point, kind)
         front = _front_before(prepared, point, kind)
         if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
             return front, _support_near(front, point)
@@ -142,6 +142,15 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
     return None
 
 
+def _region_at(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
+    """The plane under a point; beside one that misses much of the kind, as a rounded edge does, the one most looked at."""
+    near = regions_at(prepared.planes, point)
+    if not near or not _misses_much(near[0], kind):
+        return near[0] if near else None
+    whole = [plane for plane in near if not _misses_much(plane, kind)]
+    return max(whole, key=lambda plane: _faced(prepared.scene, plane, point), default=near[0])
+
+
 def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
     """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
     params = tuned(Params)
@@ -149,6 +158,7 @@ def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> 
         plane
         for plane in prepared.planes
         if plane.width_m < params.own_width * kind.width.high
+        and not _misses_much(plane, kind)
         and params.off_front_m < _behind(plane, point) < kind.depth.usual + 0.1
         and plane.supports(point[None], 0.12)[0]
     ]
@@ -176,6 +186,10 @@ def _margin(region: PlaneRegion, kind: Category) -> float:
     """How far the front may reach beyond what depth saw of it."""
     missing = max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
     return round(missing + 0.05, 2) if missing > 0.08 else 0.0
+
+
+def _misses_much(region: PlaneRegion, kind: Category) -> bool:
+    return _margin(region, kind) > tuned(Params).prepared_margin_m
 
 
 def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:

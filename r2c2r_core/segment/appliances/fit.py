@@ -155,6 +155,8 @@ def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3)
     def annealed(box: np.ndarray, spreads_m: Sequence[float]) -> Solution:
         return _annealed(evidence, photos, world_from_front, box, spreads_m)
 
+    if not photos:  # no edge whose spread could shrink
+        return min((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
     coarse = sorted((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
     # At the widest spread the shadow behind it and its own back are one edge: the likeliest of each depth goes on.
     fine = min((annealed(found.box, params.spreads_m[1:]) for found in _apart(coarse, params.apart_m)), key=_cost)

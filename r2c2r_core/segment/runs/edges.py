@@ -59,13 +59,20 @@ def _profiles(
     slopes = (np.roll(colours[..., 0], -1, axis=1) - np.roll(colours[..., 0], 1, axis=1)) / 2
     valid = known & np.roll(known, 1, axis=1) & np.roll(known, -1, axis=1)
     count = valid.sum(axis=0)
-    ordered = np.sort(np.where(valid, change, np.inf), axis=0)
-    at = np.clip(count // 2, 0, max(len(ordered) - 1, 0))
-    gradient = np.where(count > 0.3 * len(ordered), np.take_along_axis(ordered, at[None], axis=0)[0], 0.0)
+    _, middle = _middles(change, valid)
+    gradient = np.where(count > 0.3 * len(valid), middle, 0.0)
     gradient[[0, -1]] = 0
-    slope = np.ma.median(np.ma.array(slopes, mask=~valid), axis=0).filled(0.0)
+    slope = np.where(count > 0, np.mean(_middles(slopes, valid), axis=0), 0.0)
     slope[[0, -1]] = 0
     return np.where(np.isfinite(gradient), gradient, 0.0), slope, support.mean(axis=0)
+
+
+def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """The lower and the upper of the two middle values (2, n) of what is valid of each column; inf where nothing is."""
+    ordered, count = np.sort(np.where(valid, values, np.inf), axis=0), valid.sum(axis=0)
+    return np.take_along_axis(
+        ordered, np.stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(values) - 1)]), axis=0
+    )
 
 
 def _ends(

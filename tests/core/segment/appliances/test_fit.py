@@ -46,7 +46,7 @@ def test_depths_that_are_unlike_are_judged_by_their_edges_at_the_finest_spread(m
     monkeypatch.setattr(fit, "_annealed", annealed)
     start = TRUE.copy()
     start[BACK] = BACK_M + 0.01
-    assert solved(start, []).box[BACK] == pytest.approx(BACK_M + 0.01)
+    assert solved(start, [photo(EYES[0])]).box[BACK] == pytest.approx(BACK_M + 0.01)
 
 
 @pytest.mark.parametrize("turn_deg", [1.4, -1.1])

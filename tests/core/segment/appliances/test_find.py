@@ -1,0 +1,60 @@
+"""Which plane a click on an appliance means."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.segment.appliances.find import appliance_front
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs.prepared import PreparedCapture
+
+
+def plane(centre: tuple[float, float, float], outward: tuple[float, float], width_m: float, height_m: float) -> PlaneRegion:
+    """All of it seen; `outward` in plan."""
+    normal = np.array([*outward, 0.0]) / np.hypot(*outward)
+    shape = (round(height_m / 0.02), round(width_m / 0.02))
+    pose = Rigid3(front_rotation(normal), np.array(centre))
+    return PlaneRegion(pose, width_m, height_m, np.ones(shape, bool), 0.02, width_m * height_m)
+
+
+FRONT = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.60, 1.74)
+SIDE = plane((-0.32, 0.33, 0.87), (-1.0, 0.0), 0.60, 1.74)
+ROUNDED = plane((-0.30, 0.02, 0.87), (-0.5, -1.0), 0.06, 1.60)  # what fusion makes of the edge between them
+
+
+def asked_for(point: Vector3) -> PlaneRegion:
+    """The plane whose run a click on a refrigerator at a world point asks for."""
+    asked: list[PlaneRegion] = []
+    camera = SimpleNamespace(world_from_camera=Rigid3(np.eye(3), np.array([-1.2, -1.6, 1.4])))
+    centre = camera.world_from_camera.translation
+    scene = SimpleNamespace(
+        frames=(camera,),
+        ray=lambda *_: (centre, (point - centre) / np.linalg.norm(point - centre)),
+        pick=lambda *_: point,
+        has_depth=lambda *_: True,
+    )
+
+    def run_of(region: PlaneRegion, margin_m: float = 0.0) -> None:
+        asked.append(region)
+
+    prepared = cast(PreparedCapture, cast(Any, SimpleNamespace(scene=scene, planes=(FRONT, SIDE, ROUNDED), run_of=run_of)))
+    prompt = ObjectPrompt(name="it", category="refrigerator", points=(PromptPoint(frame=0, x=1.0, y=1.0, label=1),))
+    assert appliance_front(prepared, prompt, category_of("refrigerator"), np.zeros((0, 3))) is None  # there is no run
+    return asked[0]
+
+
+def test_a_click_on_its_front_means_the_front() -> None:
+    assert asked_for(np.array([0.1, 0.0, 1.0])) is FRONT
+
+
+def test_a_click_on_its_side_means_the_front_before_it_and_not_the_rounded_edge() -> None:
+    assert asked_for(np.array([-0.32, 0.12, 0.5])) is FRONT
+
+
+def test_a_click_on_its_rounded_edge_means_the_front() -> None:
+    assert asked_for(np.array([-0.30, 0.02, 0.5])) is FRONT
