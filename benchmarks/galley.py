@@ -24,6 +24,7 @@ from proof import Placed, certificate_figures, placed_by, prove
 from r2c2r_core.arrays import Image
 from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
 from r2c2r_core.model.capture import Capture, Depth, FrameImages, SceneSurface, Wall
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
 
@@ -140,10 +141,21 @@ def _moved_track(track: MaskTrack, new_from_old: Rigid3) -> MaskTrack:
         name=f"b_{track.name}",
         masks={index + _SECOND: mask for index, mask in track.masks.items()},
         confidence={index + _SECOND: value for index, value in track.confidence.items()},
-        opened_m={index + _SECOND: value for index, value in track.opened_m.items()},
-        swung={index + _SECOND: swing for index, swing in track.swung.items()},
+        motions=tuple(_moved_motion(motion, new_from_old) for motion in track.motions),
         front=None if front is None else replace(front, world_from_front=new_from_old @ front.world_from_front),
         box=None if box is None else replace(box, world_from_object=new_from_old @ box.world_from_object),
+    )
+
+
+def _moved_motion(motion: JointMotion, new_from_old: Rigid3) -> JointMotion:
+    assert motion.axis_world is not None
+    assert motion.pivot_world is not None
+    return replace(
+        motion,
+        axis_world=new_from_old.turn(motion.axis_world[None])[0],
+        pivot_world=new_from_old.apply(motion.pivot_world[None])[0],
+        covariance=None,
+        states={index + _SECOND: state for index, state in motion.states.items()},
     )
 
 

@@ -1,11 +1,12 @@
 """Where an object is seen."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.motion import JointMotion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,14 +54,6 @@ class ThingBox:
     support_z_m: float  # world height of what it stands on
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Swing:
-    """A door seen open in one frame."""
-
-    hinge: Literal["left", "right"]  # as a person facing the closed front sees it
-    angle_rad: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaskTrack:
     """An object's masks at RGB resolution, and what the segmenter measured while finding them."""
@@ -75,10 +68,11 @@ class MaskTrack:
     backend: str
     prompt_count: int
     warnings: tuple[str, ...]
-    opened_m: dict[int, float] = field(default_factory=dict)  # frames in which its front is drawn out, and how far
-    swung: dict[int, Swing] = field(default_factory=dict)  # frames in which its door stands open
+    motions: tuple[JointMotion, ...] = ()  # of each leaf that was filmed open
 
     @property
     def opened_frames(self) -> frozenset[int]:
         """Frames in which its front is not in its place."""
-        return frozenset((*self.opened_m, *self.swung))
+        return frozenset(
+            frame for motion in self.motions for frame, state in motion.states.items() if state.value is None or state.value > 0
+        )

@@ -32,8 +32,10 @@ def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
         track,
         masks=dict(sorted(masks.items())),
         confidence={frame: 1.0 if frame in painted else track.confidence[frame] for frame in sorted(masks)},
-        opened_m={frame: by for frame, by in track.opened_m.items() if frame not in numbers},
-        swung={frame: swing for frame, swing in track.swung.items() if frame not in numbers},
+        motions=tuple(
+            replace(motion, states={frame: state for frame, state in motion.states.items() if frame not in numbers})
+            for motion in track.motions
+        ),
     )
 
 

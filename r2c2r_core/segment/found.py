@@ -6,7 +6,8 @@ from typing import Protocol
 from r2c2r_core.arrays import Mask
 from r2c2r_core.kitchen.category import Kind
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.model.track import FrontPanel, Swing, ThingBox
+from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.track import FrontPanel, ThingBox
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -15,8 +16,6 @@ class View:
 
     mask: Mask  # its visible pixels
     trust: float  # how far to trust them, 0..1
-    opened_m: float = 0.0  # how far its front is drawn out; 0 where closed or not to be told
-    swing: Swing | None = None  # how its door stands open; None where closed or not to be told
 
 
 class Found(Protocol):
@@ -31,10 +30,13 @@ class Found(Protocol):
         """One line each, for a person."""
 
     def see(self, frame: Frame) -> View:
-        """Its pixels in a frame, and how it stands open there."""
+        """Its pixels in a frame, where it stands there."""
 
     def panel(self) -> FrontPanel | None:
         """Its flat front, measured."""
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """How its leaves were filmed to move."""
 
     def box(self) -> ThingBox | None:
         """Its box, measured."""

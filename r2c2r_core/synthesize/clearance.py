@@ -56,7 +56,9 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
             free, blocker = joint.upper, None
             with spared(f"how far {joint.name} opens was not looked at", warnings):
                 free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
-            if blocker is None:
+            if joint.motion is not None:  # it was filmed to get this far: what seems to stand in its way is measured wrong
+                free = max(free, min(joint.motion.largest, joint.upper))
+            if blocker is None or free >= joint.upper:
                 joints.append(joint)
                 continue
             joints.append(replace(joint, upper=free, uncut=joint.upper, sources={**joint.sources, "limits": "inferred"}))

@@ -22,9 +22,9 @@ from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
-from r2c2r_core.model.motion import Source
+from r2c2r_core.model.motion import JointMotion, Source
 from r2c2r_core.model.placement import Placement
-from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack, Swing
+from r2c2r_core.model.track import FrontHandle, FrontPanel, MaskTrack
 from r2c2r_core.synthesize.fixtures.spec import Lap
 from r2c2r_core.synthesize.handles import handle_of_mesh, handles_of_mesh
 from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
@@ -44,9 +44,6 @@ class Params:
     level: float = param(0.7, "cosine", "rise of an axis, from which on it is the one that points up")
     sure_share: float = param(0.08, "share", "of a depth: one that is known this well was measured")
     sure_m: float = param(0.004, "m", "of a depth: one that is known this well was measured")
-    least_swings: int = param(3, "count", "frames that show a door open, for its side to be known by them")
-    agreed: float = param(0.75, "share", "of those frames that must agree on the side")
-    same_stop_rad: float = param(float(np.deg2rad(4.0)), "rad", "from the widest, within which opened doors are at their stop")
     as_tight: float = param(
         1.03,
         "ratio",
@@ -86,8 +83,7 @@ class MeasuredObject:
     sources: tuple[Source, Source, Source]
     handle: FrontHandle | None
     handles: tuple[FrontHandle, ...] = ()  # all of them, where several fronts may be one object
-    opened_m: float | None = None  # how far its front was drawn out while filming; None: never seen open
-    swung: Swing | None = None  # how far its door was swung open, and on which side; None: never seen open
+    motions: tuple[JointMotion, ...] = ()  # of each leaf that was filmed open: where it was placed, before the layout
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
@@ -155,8 +151,7 @@ def measure_object(
         sources=(sources[0], sources[1], sources[2]),
         handle=handle,
         handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
-        opened_m=None if spec.opens == "sideways" else _drawn_out(track),
-        swung=_swung_open(track),
+        motions=track.motions,
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
@@ -171,26 +166,6 @@ def _at_width(spec: Category, width_m: float, handle: FrontHandle | None) -> Cat
     """What a category is at a width: a wide refrigerator has two doors, unless its handle is at one edge."""
     at_edge = handle is not None and abs(handle.centre[0]) > tuned(Params).edge_share * width_m
     return category_of(spec.wider[1]) if spec.wider is not None and width_m >= spec.wider[0] and not at_edge else spec
-
-
-def _drawn_out(track: MaskTrack) -> float | None:
-    """The furthest its front was seen drawn out, in metres; one frame's error does not count where there are many."""
-    return float(np.quantile(list(track.opened_m.values()), 0.95)) if track.opened_m else None
-
-
-def _swung_open(track: MaskTrack) -> Swing | None:
-    """The furthest its door was seen open, on the side that most frames say; one frame alone may be mistaken."""
-    params = tuned(Params)
-    if len(track.swung) < params.least_swings:
-        return None
-    left = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "left"]
-    right = [swing.angle_rad for swing in track.swung.values() if swing.hinge == "right"]
-    hinge: Literal["left", "right"] = "left" if len(left) >= len(right) else "right"
-    angles = max(left, right, key=len)
-    agreed = len(angles) >= params.least_swings and len(angles) > params.agreed * len(track.swung)
-    # Where it stood at its widest, by the middle of the frames near it: one frame's angle is a degree or two off
-    widest = [angle for angle in angles if angle > np.quantile(angles, 0.9) - params.same_stop_rad]
-    return Swing(hinge=hinge, angle_rad=float(np.median(widest))) if agreed else None
 
 
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:

@@ -13,6 +13,7 @@ from r2c2r_core.failing import spared
 from r2c2r_core.model.inputs import HingeSide, Overrides
 from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.filmed import side_filmed
 from r2c2r_core.tuning import param, tuned
 
 
@@ -33,7 +34,7 @@ class Params:
     )
     slope: float = param(0.72, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
     offset: float = param(2.43, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
-    seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a door that several frames show open")
+    seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a leaf that several frames show open")
     in_pairs: float = param(
         0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"
     )
@@ -73,11 +74,9 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
             seen = _by_category(item, said[0])
         if asked is not None:
             hinges[item.name] = Hinge(side=asked, source="person", reason="given by a person", confidence=1.0)
-        elif item.swung is not None and item.spec.opens == "side":
-            reason = f"seen open on its {item.swung.hinge} edge"
-            hinges[item.name] = Hinge(
-                side=item.swung.hinge, source="measured", reason=reason, confidence=params.seen_open, by_handle=True
-            )
+        elif (side := side_filmed(item)) is not None:
+            reason = f"filmed open on its {side} edge"
+            hinges[item.name] = Hinge(side=side, source="measured", reason=reason, confidence=params.seen_open, by_handle=True)
         elif seen is not None:
             hinges[item.name] = seen
         elif item.spec.opens == "bottom":

@@ -15,13 +15,14 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
 from r2c2r_core.model.materials import JointFeel
 from r2c2r_core.model.mesh import MeshAsset
-from r2c2r_core.model.motion import Source
+from r2c2r_core.model.motion import JointMotion, Source
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
+from r2c2r_core.synthesize.filmed import as_filmed, filmed, opened_as, opening
 from r2c2r_core.synthesize.fixtures.boards import Boards
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
 from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
@@ -34,17 +35,10 @@ from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces,
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
-from r2c2r_core.tuning import Changes, param, tuned
+from r2c2r_core.tuning import Changes
 
 Outliers = Literal["leave-out", "keep"]
 _WOOD = (0.80, 0.76, 0.70)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """What counts as drawn out to the stop."""
-
-    fully_open: float = param(0.75, "share", "of the usual travel: a drawer drawn out this far was drawn out to its stop")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +129,9 @@ def _measured(
     """Its size and pose, and what a person should know of it so far."""
     spec, notice = named(track.category)
     item = measure_object(capture, track, placement, asset, spec, override, seed=config.seed, box_search=config.box)
-    return replace(item, warnings=(*([notice] if notice else []), *asset.warnings, *item.warnings))
+    spec, moved = opened_as(item.spec, item.motions, item.placed_pose)
+    notices = [one for one in (notice, moved) if one]
+    return replace(item, spec=spec, warnings=(*notices, *asset.warnings, *item.warnings))
 
 
 def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride, carcass: CarcassBuilder) -> SceneObject:
@@ -153,14 +149,13 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     )
     build = fixture.build(order)
     base, *movers = build.parts
-    motions = {motion.part: motion for motion in build.motions}
+    seen = {motion.part: filmed(item, motion) for motion in build.motions}
+    motions = {motion.part: as_filmed(motion, seen[motion.part], item.placed_pose) for motion in build.motions}
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
-    said, unheard = _limits_said(item.name, [motion.part for motion in build.motions], override)
-    joints = [_joint(item, motion, fixture.feel, hinge, said.get(motion.part)) for motion in build.motions]
-    warnings = [*item.warnings, *build.notes, *unheard]
-    if (seen_open := _seen_open(item, hinge)) and all(joint.sources["limits"] == "default" for joint in joints):
-        warnings.append(f"seen open to {seen_open}, which need not be all it opens")
+    said, unheard = _limits_said(item.name, list(motions), override)
+    joints = [_joint(item, motion, fixture.feel, hinge, said.get(part), seen[part]) for part, motion in motions.items()]
+    warnings = [*item.warnings, *build.notes, *unheard, *(line for joint in joints if (line := _open_ended(joint)))]
     if hinge is not None and hinge.source == "default":
         said_of = "slides to the" if item.spec.opens == "sideways" else "hinge on the"
         warnings.append(f"{said_of} {hinge.side} by default: {hinge.reason}")
@@ -268,10 +263,17 @@ def _joint_name(object_name: str, part: str) -> str:
     return f"{object_name}_{part}_joint"
 
 
-def _joint(item: MeasuredObject, motion: Motion, feel: JointFeel, hinge: Hinge | None, said: JointLimits | None) -> Joint:
-    """The joint of one moving part; what a person gave, or the scan showed, replaces the category's limits."""
-    axis: Source = hinge.source if hinge is not None else "inferred"
-    lower, upper, limits = _limits(item, motion, hinge, said)
+def _joint(
+    item: MeasuredObject,
+    motion: Motion,
+    feel: JointFeel,
+    hinge: Hinge | None,
+    said: JointLimits | None,
+    seen: JointMotion | None,
+) -> Joint:
+    """The joint of one moving part; what a person gave, or the scan showed, replaces the category's."""
+    axis: Source = hinge.source if hinge is not None else "inferred" if seen is None else seen.source
+    lower, upper, limits = _limits(item, motion, said, seen)
     return Joint(
         name=_joint_name(item.name, motion.part),
         type=motion.type,
@@ -285,42 +287,35 @@ def _joint(item: MeasuredObject, motion: Motion, feel: JointFeel, hinge: Hinge |
         velocity=feel.velocity,
         damping=feel.damping,
         friction=feel.friction,
-        sources={"axis": axis, "origin": "inferred", "limits": limits},
+        sources={"axis": axis, "origin": "inferred" if seen is None else seen.source, "limits": limits},
         confidence=hinge.confidence if hinge is not None else None,
+        motion=seen,
     )
 
 
-def _limits(item: MeasuredObject, motion: Motion, hinge: Hinge | None, said: JointLimits | None) -> tuple[float, float, Source]:
+def _limits(
+    item: MeasuredObject, motion: Motion, said: JointLimits | None, seen: JointMotion | None
+) -> tuple[float, float, Source]:
     """Lower and upper limit and where they come from: a person, the scan of an opened front, or the category.
 
     What a person said of one end leaves the other as it was found.
     """
-    upper, source = _opening(item, motion, hinge)
+    upper, source = opening(motion, seen, _most(item, motion))
     if said is None or said == (None, None):
         return 0.0, upper, source
     lower = 0.0 if said.lower is None else said.lower
     return lower, max(lower, upper if said.upper is None else said.upper), "person"
 
 
-def _opening(item: MeasuredObject, motion: Motion, hinge: Hinge | None) -> tuple[float, Source]:
-    """How far it opens: as the scan shows, or as its category does."""
-    slides = motion.type == "prismatic"
-    seen, most = (item.opened_m, float(item.dimensions_m[1])) if slides else (_swing_rad(item, hinge), np.pi)
-    if item.spec.several_fronts or seen is None:  # of which drawer, nobody knows
-        return motion.upper, "default"
-    return (seen, "measured") if tuned(Params).fully_open * motion.upper <= seen <= most else (motion.upper, "default")
+def _most(item: MeasuredObject, motion: Motion) -> float:
+    """How far it can open at all: a drawer as deep as its unit, a leaf that slides its own length, a door half a turn."""
+    return np.pi if motion.type == "revolute" else float(np.abs(motion.axis_object) @ item.dimensions_m)
 
 
-def _swing_rad(item: MeasuredObject, hinge: Hinge | None) -> float | None:
-    """How far its door was seen open on the edge that it hangs on; a person may have put it on the other one."""
-    if item.swung is None or hinge is None or item.swung.hinge != hinge.side:
+def _open_ended(joint: Joint) -> str | None:
+    """How far the scan shows a joint open that it does not show to stop."""
+    if joint.motion is None or joint.sources["limits"] in ("measured", "person"):
         return None
-    return item.swung.angle_rad
-
-
-def _seen_open(item: MeasuredObject, hinge: Hinge | None) -> str:
-    """How far the scan shows it open; empty where it does not."""
-    if item.opened_m is not None:
-        return f"{item.opened_m:.2f} m"
-    swing = _swing_rad(item, hinge)
-    return "" if swing is None else f"{np.degrees(swing):.0f} deg"
+    seen = joint.motion.largest
+    amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f} deg"
+    return f"{joint.name} was seen open to {amount}, which need not be all it opens"

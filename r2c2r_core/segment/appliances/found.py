@@ -1,14 +1,17 @@
 """An appliance that clicks found: its box, and the mask of that box in any frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from r2c2r_core.kitchen.category import Kind
+from r2c2r_core.kitchen.category import Category, Kind
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
 from r2c2r_core.segment.fronts.front import Front, front_corners, front_panel
+from r2c2r_core.segment.motion.board import open_mask
+from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -26,18 +29,29 @@ class FoundAppliance:
 
     front: Front
     scene: Scene
+    category: Category
     kind: Kind = "appliance"
     warnings: tuple[str, ...] = ()
+    _leaves: FilmedLeaves = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_leaves", FilmedLeaves(front_panel(self.front), self.category, self.scene))
 
     def see(self, frame: Frame) -> View:
-        """Its pixels; its door is not told open."""
+        """Its pixels: its box, and its doors where they stand open."""
         mask, share = appliance_mask(self.front, self.scene, frame)
+        for opened in self._leaves.open_in(frame.index):
+            mask = mask | open_mask(opened, self.scene, frame)[0]
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
         return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m))
 
     def panel(self) -> FrontPanel | None:
         """The rectangle of its front and its handle."""
         return front_panel(self.front)
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """How its doors were filmed to move."""
+        return self._leaves.motions
 
     def box(self) -> ThingBox | None:
         """The front extruded backwards."""

@@ -1,14 +1,20 @@
-"""A front that clicks found: its rectangle, and its mask in any frame, closed, drawn out or swung open."""
+"""A front that clicks found: its rectangle, and its mask in any frame, where its leaves stand there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from r2c2r_core.kitchen.category import Kind
+import numpy as np
+
+from r2c2r_core.kitchen.category import Category, Kind
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.articulation import drawn_out, swung, swung_corners
 from r2c2r_core.segment.fronts.front import Front, front_corners, front_mask, front_panel
+from r2c2r_core.segment.motion.board import open_mask
+from r2c2r_core.segment.motion.filmed import FilmedLeaves
+from r2c2r_core.segment.motion.leaf import OpenLeaf
+from r2c2r_core.segment.motion.leaf import corners as leaf_corners
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -26,26 +32,42 @@ class FoundFront:
 
     front: Front
     scene: Scene
-    swings: bool = True  # a single door; drawers slide, and of a pair each leaf would have to be told apart
+    category: Category
     fit: float = 1.0  # 0..1: how well its size fits its category
     kind: Kind = "front"
     warnings: tuple[str, ...] = ()
+    _leaves: FilmedLeaves = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_leaves", FilmedLeaves(front_panel(self.front), self.category, self.scene))
 
     def see(self, frame: Frame) -> View:
-        """Its pixels where it stands in the frame: closed, drawn out or swung open."""
+        """Its pixels where its leaves stand in the frame."""
+        opened = self._leaves.open_in(frame.index)
+        if opened:
+            return self._opened(opened, frame)
         corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
-        out_m = drawn_out(self.front, self.scene, frame)
-        swing = swung(self.front, self.scene, frame) if self.swings and not out_m else None
-        opened = corners + self.front.run.grid.outward * out_m if out_m else None
-        if swing is not None:
-            opened = swung_corners(self.front, swing)
-        mask, share = front_mask(self.front, self.scene, frame, opened)
-        trust = expected_iou(mask, share, frame, corners if opened is None else opened, tuned(Params).border_m, self.fit)
-        return View(mask, trust, out_m, swing)
+        mask, share = front_mask(self.front, self.scene, frame)
+        return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m, self.fit))
+
+    def _opened(self, opened: tuple[OpenLeaf, ...], frame: Frame) -> View:
+        """Its open leaves, and those of a pair that stay closed."""
+        parts = [open_mask(one, self.scene, frame) for one in opened]
+        corners = [one.world_from_leaf.apply(leaf_corners(one.leaf)) for one in opened]
+        for leaf in self._leaves.closed_in(frame.index):
+            corners.append(leaf.world_from_front.apply(leaf_corners(leaf)))
+            parts.append(front_mask(self.front, self.scene, frame, corners[-1]))
+        mask = np.logical_or.reduce([part for part, _ in parts])
+        share = float(np.mean([share for _, share in parts]))
+        return View(mask, expected_iou(mask, share, frame, np.concatenate(corners), tuned(Params).border_m, self.fit))
 
     def panel(self) -> FrontPanel | None:
         """The rectangle and its handle."""
         return front_panel(self.front)
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """How its leaves were filmed to move."""
+        return self._leaves.motions
 
     def box(self) -> ThingBox | None:
         """Fronts are built into something: no box of their own."""

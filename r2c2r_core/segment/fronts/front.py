@@ -115,16 +115,16 @@ def front_panel(front: Front) -> FrontPanel:
     )
 
 
-def front_mask(front: Front, scene: Scene, frame: Frame, opened: Points | None = None) -> tuple[Mask, float]:
-    """The front's visible pixels in a frame, and the share of its projection that is visible; where open, at these corners."""
+def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = None) -> tuple[Mask, float]:
+    """The front's visible pixels in a frame, and the share of its projection that is visible; or those of a part of it."""
     grid = front.run.grid
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
         return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
     slide = front.run.slide_of(frame.index, scene)
-    facets = [Facet(front_corners(front.cell, grid, slide) if opened is None else opened)]
+    facets = [Facet(front_corners(front.cell, grid, slide) if part is None else part)]
     facets += [
         Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
-        for side in (front.sides if opened is None else ())
+        for side in (front.sides if part is None else ())
         if side_faces(front.cell, grid, side, frame.world_from_camera.translation)
     ]
     return visible_mask(facets, scene, frame)

@@ -68,8 +68,8 @@ def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFron
     depth_m = depth_to_wall(front, scene.capture.room, category)
     front = replace(front, depth_m=depth_m or category.depth.usual)
     if category.kind == "appliance":
-        return FoundAppliance(front, scene, warnings=() if depth_m else (_assumed_depth(front, prompt),))
-    return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, swings=_swings(category))
+        return FoundAppliance(front, scene, category, warnings=() if depth_m else (_assumed_depth(front, prompt),))
+    return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, category)
 
 
 def glimpse_object(
@@ -105,7 +105,7 @@ def _front(
         return None
     best = replace(best, depth_m=depth_to_wall(best, prepared.scene.capture.room, category) or category.depth.usual)
     best = replace(best, sides=seen_sides(best, prepared.scene))
-    return FoundFront(best, prepared.scene, swings=_swings(category), fit=_fit(best, category))
+    return FoundFront(best, prepared.scene, category, fit=_fit(best, category))
 
 
 def _fit(front: Front, category: Category) -> float:
@@ -114,18 +114,13 @@ def _fit(front: Front, category: Category) -> float:
     return category.width.fit(cell_m * cell.width) * category.height.fit(cell_m * cell.height)
 
 
-def _swings(category: Category) -> bool:
-    """Whether it is one door: drawers slide, and of a pair each leaf would have to be told apart."""
-    return category.opens in ("side", "bottom") and not category.may_be_pair
-
-
 def _appliance(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, negatives: Points, *, glimpse: bool = False
 ) -> FoundAppliance | None:
     front, seen = appliance_front(prepared, prompt, category, negatives, glimpse=glimpse) or (None, False)
     if front is None:
         return None
-    return FoundAppliance(front, prepared.scene, warnings=() if seen else (_assumed_depth(front, prompt),))
+    return FoundAppliance(front, prepared.scene, category, warnings=() if seen else (_assumed_depth(front, prompt),))
 
 
 def _assumed_depth(front: Front, prompt: ObjectPrompt) -> str:

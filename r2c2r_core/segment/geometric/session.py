@@ -19,7 +19,7 @@ from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
 from r2c2r_core.segment.elevations import elevations
@@ -95,15 +95,9 @@ class GeometricSession:
         found = self.find(prompt)
         masks: dict[int, PackedMask] = {}
         confidence: dict[int, float] = {}
-        opened_m: dict[int, float] = {}
-        swung: dict[int, Swing] = {}
         total = len(self.scene.frames)
         for position, (index, view) in enumerate(self._views(prompt)):
             masks[index], confidence[index] = pack_mask(view.mask), view.trust
-            if view.opened_m > 0:
-                opened_m[index] = view.opened_m
-            if view.swing is not None:
-                swung[index] = view.swing
             progress.at(min(0.1 + 0.9 * position / total, 0.99), f"{prompt.name}: seen in {position + 1} frames")
         if not masks:
             raise ObjectNotSeen(
@@ -121,8 +115,7 @@ class GeometricSession:
             backend="geometric",
             prompt_count=len(prompt.points),
             warnings=found.warnings,
-            opened_m=dict(sorted(opened_m.items())),
-            swung=dict(sorted(swung.items())),
+            motions=found.motions(),
         )
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:

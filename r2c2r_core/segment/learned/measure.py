@@ -12,11 +12,13 @@ from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.kitchen.category import Category, Kind
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box
 from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
+from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
 from r2c2r_core.segment.runs.handles import find_handles
@@ -60,6 +62,7 @@ class Measured:
     front: FrontPanel | None = None
     box: ThingBox | None = None
     warnings: tuple[str, ...] = ()
+    motions: tuple[JointMotion, ...] = ()
 
 
 def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
@@ -74,12 +77,15 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
     wall = depth_to_wall(front, prepared.scene.capture.room, category)
     if category.kind == "front":
-        return Measured(kind="front", front=front_panel(replace(front, depth_m=wall or usual_m)))
+        panel = front_panel(replace(front, depth_m=wall or usual_m))
+        return Measured(kind="front", front=panel, motions=FilmedLeaves(panel, category, prepared.scene).motions)
     fitted = fit_box(front, prepared.scene, category, wall)
     front = fitted.front
     assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
     warnings = () if fitted.depth_seen else (assumed,)
-    return Measured(kind="appliance", front=front_panel(front), box=appliance_box(front), warnings=warnings)
+    panel = front_panel(front)
+    motions = FilmedLeaves(panel, category, prepared.scene).motions
+    return Measured(kind="appliance", front=panel, box=appliance_box(front), warnings=warnings, motions=motions)
 
 
 def _front(

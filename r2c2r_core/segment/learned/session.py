@@ -163,6 +163,7 @@ class LearnedSession:
             backend=self.name,
             prompt_count=len(prompt.points),
             warnings=fused.warnings + measured.warnings,
+            motions=measured.motions,
         )
 
     def _of(self, prompt: ObjectPrompt) -> "_Followed":

@@ -6,6 +6,7 @@ import numpy as np
 
 from r2c2r_core.kitchen.category import Kind
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
@@ -47,6 +48,10 @@ class FoundThing:
         """None: things have no front panel."""
         return None
 
+    def motions(self) -> tuple[JointMotion, ...]:
+        """None: things are moved whole."""
+        return ()
+
     def box(self) -> ThingBox | None:
         """Its box on its support."""
         centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
@@ -74,6 +79,10 @@ class FoundStanding:
     def panel(self) -> FrontPanel | None:
         """None: things have no front panel."""
         return None
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """None: things are moved whole."""
+        return ()
 
     def box(self) -> ThingBox | None:
         """Its box on the floor."""

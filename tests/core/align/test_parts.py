@@ -17,6 +17,7 @@ from r2c2r_core.align.sift import SiftMatcher
 from r2c2r_core.align.voting import vote
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.geometry.transforms import Similarity3
+from tests.core.motions import motion
 
 
 def test_there_are_24_turns_of_a_box_and_no_reflection() -> None:
@@ -76,9 +77,9 @@ def test_frames_are_spread_over_the_directions(bench: Any) -> None:
 def test_frames_in_which_a_drawer_stands_open_are_left_out(bench: Any) -> None:
     _, capture, track = bench.free_box(textured=False)
     opened = dict.fromkeys(sorted(track.masks)[::2], 0.2)
-    chosen = {f.index for f in choose_frames(capture, replace(track, opened_m=opened), 8)}
+    chosen = {f.index for f in choose_frames(capture, replace(track, motions=(motion(opened),)), 8)}
     assert chosen == set(track.masks) - set(opened)
-    always = replace(track, opened_m=dict.fromkeys(track.masks, 0.2))
+    always = replace(track, motions=(motion(dict.fromkeys(track.masks, 0.2)),))
     assert {f.index for f in choose_frames(capture, always, 8)} == set(track.masks)
 
 

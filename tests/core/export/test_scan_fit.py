@@ -13,8 +13,8 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Depth
 from r2c2r_core.model.reconstruction import Reconstruction
-from r2c2r_core.model.track import Swing
 from tests.core.export.kitchen import GreyImages, kitchen, reconstruction
+from tests.core.motions import motion
 
 
 class Filmed(GreyImages):
@@ -101,8 +101,8 @@ def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
 
 def test_frames_in_which_a_door_stands_open_are_not_asked() -> None:
     item = filmed(0.0)
-    opened = {index: Swing(hinge="left", angle_rad=1.0) for index in item.tracks[0].masks}
-    tracks = (replace(item.tracks[0], swung=opened), *item.tracks[1:])
+    opened = motion(dict.fromkeys(item.tracks[0].masks, 1.0), "left")
+    tracks = (replace(item.tracks[0], motions=(opened,)), *item.tracks[1:])
     found = scan_fits(replace(item, tracks=tracks), plan_bundle(item.scene))
     assert item.tracks[0].name not in found
     assert item.tracks[1].name in found

@@ -10,8 +10,9 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.track import FrontPanel, MaskTrack, Swing, ThingBox
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.segment.contradictions import find_contradictions
+from tests.core.motions import motion
 
 WALL = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)  # the room lies at y < 0
 FRAMES = range(0, 40, 2)
@@ -73,7 +74,7 @@ def test_masks_that_share_many_pixels_name_both_clicks(begins: int, rule: str) -
 
 def test_what_is_behind_an_open_door_is_not_the_door() -> None:
     left, right = track("door_1", "cabinet", slice(0, 80)), track("door_2", "cabinet", slice(0, 80))
-    opened = replace(left, swung=dict.fromkeys(FRAMES, Swing(hinge="left", angle_rad=1.0)))
+    opened = replace(left, motions=(motion(dict.fromkeys(FRAMES, 1.0), "left"),))
     said = (prompt("door_1", "cabinet", 40.5), prompt("door_2", "cabinet", 40.5))
     assert found((left, said[0]), (right, said[1]))
     assert found((opened, said[0]), (right, said[1])) == ()

@@ -5,13 +5,15 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import StageError
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
-from r2c2r_core.model.track import MaskTrack, Swing
+from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.synthesize import stage
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
+from tests.core.motions import motion
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 from tests.core.synthesize.mujoco_oracle import compile_scene, deepest_contact, reached, sweep
 
@@ -181,7 +183,7 @@ def test_limits_that_name_no_joint_move_none_of_several() -> None:
 
 def test_a_lower_limit_by_a_person_keeps_the_measured_upper_one() -> None:
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
-    track = replace(track, opened_m={5: 0.43})
+    track = replace(track, motions=(motion({5: 0.43}, stop_seen=True),))
     asked = Overrides(objects={"a": ObjectOverride(joint_lower=0.05)})
     joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
     assert (joint.lower, joint.sources["limits"]) == (0.05, "person")
@@ -197,41 +199,104 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     assert any("a wall is in the way" in w for w in scene.objects[0].warnings)
 
 
-@pytest.mark.parametrize(("seen_m", "source"), [(0.43, "measured"), (0.12, "default"), (0.9, "default"), (None, "default")])
-def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(seen_m: float | None, source: str) -> None:
-    """Drawn out far it was drawn to its stop; a crack open says nothing; more than its depth is an error."""
+@pytest.mark.parametrize(
+    ("seen_m", "stop_seen", "source"),
+    [
+        (0.43, True, "measured"),
+        (0.12, True, "measured"),
+        (0.12, False, "default"),
+        (0.56, False, "at_least"),
+        (0.9, True, "default"),
+        (None, False, "default"),
+    ],
+)
+def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(
+    seen_m: float | None, stop_seen: bool, source: str
+) -> None:
+    """Where it was seen to stop; else it opens at least so far; more than its depth is an error."""
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
-    track = replace(track, opened_m={} if seen_m is None else {4: 0.05, 5: seen_m})
+    if seen_m is not None:
+        track = replace(track, motions=(motion({4: 0.05, 5: seen_m}, stop_seen=stop_seen),))
     scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
     joint = scene.objects[0].joints[0]
     assert joint.sources["limits"] == source
-    if source == "measured":
-        assert joint.upper == pytest.approx(seen_m, abs=0.02)
-    assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source == "default")
+    if source != "default":
+        assert joint.upper == pytest.approx(seen_m, abs=1e-6)
+    assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source != "measured")
+    assert (joint.motion is not None) == (seen_m is not None)
 
 
-@pytest.mark.parametrize(("degrees", "source"), [(102.0, "measured"), (30.0, "default")])
-def test_a_door_that_stood_open_while_filming_tells_its_hinge_and_where_it_stops(degrees: float, source: str) -> None:
-    """Whatever its handle says; one frame that says otherwise does not count, and a crack open is no stop."""
+@pytest.mark.parametrize(("way", "stop_seen"), [("right", True), ("right", False), ("top", True), ("bottom", True)])
+def test_a_door_that_was_filmed_open_tells_its_hinge_and_where_it_stops(way: str, stop_seen: bool) -> None:
+    """Whatever its handle says."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
-    angle = np.deg2rad(degrees)
-    swung = {frame: Swing(hinge="right", angle_rad=angle + 0.01 * (frame - 6)) for frame in (4, 5, 6, 7, 8)}
-    track = replace(track, swung={**swung, 9: Swing(hinge="left", angle_rad=0.5)})
+    assert track.front is not None
+    angle = np.deg2rad(102.0)
+    seen = motion({4: 0.5, 5: angle}, way, stop_seen=stop_seen, world_from_front=track.front.world_from_front)
+    track = replace(track, motions=(seen,))
     item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
     joint = item.joints[0]
-    assert joint.axis_object[2] == 1.0  # hinged on the right
-    assert (joint.sources["axis"], joint.sources["limits"]) == ("measured", source)
-    if source == "measured":
-        assert joint.upper == pytest.approx(angle, abs=0.02)
-    assert any("seen open" in w for w in item.warnings) == (source == "default")
+    axes = {"right": [0, 0, 1], "top": [-1, 0, 0], "bottom": [1, 0, 0]}
+    np.testing.assert_allclose(joint.axis_object, axes[way], atol=0.01)
+    assert (joint.sources["axis"], joint.sources["limits"]) == ("measured", "measured" if stop_seen else "default")
+    assert joint.upper == pytest.approx(angle if stop_seen else np.deg2rad(110), abs=0.02)
+    assert any("seen open" in w for w in item.warnings) == (not stop_seen)
+
+
+def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
+    """Within what both are known to, the edge is taken: doors then clear their neighbours."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    origins = []
+    for off in (0.003, 0.03):
+        place = track.front.world_from_front
+        inside = Rigid3(place.rotation, place.apply(np.array([[off, 0.0, 0.0]]))[0])
+        moved = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
+        item = build_scene(capture(), [moved], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+        origins.append(item.joints[0].origin_object[0])
+    np.testing.assert_allclose(origins, [-0.25, -0.22], atol=0.003)
+
+
+@pytest.mark.parametrize(
+    ("category", "way", "fixture"),
+    [
+        ("drawer", "left", "cabinet"),
+        ("cabinet", "out", "drawer"),
+        ("cabinet", "slides_left", "sliding_door"),
+        ("oven", "left", "oven"),
+    ],
+)
+def test_a_front_is_built_as_it_was_filmed_to_open(category: str, way: str, fixture: str) -> None:
+    track, placement, asset = placed_unit(Unit("a", category, (0, 0, 0.5), (0.5, 0.58, 0.4)), np.random.default_rng(0))
+    assert track.front is not None
+    track = replace(track, motions=(motion({5: 0.3}, way, world_from_front=track.front.world_from_front),))
+    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+    assert item.fixture == fixture
+    assert item.joints[0].motion is track.motions[0]
+    assert any(f"called a {category}" in w for w in item.warnings) == (fixture != category)
+
+
+def test_each_door_of_a_pair_has_the_motion_of_its_own() -> None:
+    unit = Unit("a", "double-door cabinet", (0, 0, 0.5), (0.8, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    place = track.front.world_from_front
+    half = Rigid3(place.rotation, place.apply(np.array([[0.2, 0.0, 0.0]]))[0])
+    seen = motion({5: 1.2}, "right", stop_seen=True, world_from_front=half, size_m=(0.4, 0.7), part="right")
+    track = replace(track, motions=(seen,))
+    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+    left, right = sorted(item.joints, key=lambda joint: joint.name)
+    assert (left.motion, left.sources["limits"]) == (None, "default")
+    assert (right.motion, right.sources["limits"], right.upper) == (seen, "measured", 1.2)
 
 
 def test_how_far_a_door_was_seen_open_says_nothing_of_the_other_edge() -> None:
     """A person hung it on the left: the angle that the scan shows was about the right edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
-    track = replace(track, swung={frame: Swing(hinge="right", angle_rad=np.deg2rad(102.0)) for frame in (4, 5, 6)})
+    track = replace(track, motions=(motion({5: 1.8}, "right", stop_seen=True),))
     asked = Overrides(objects={"a": ObjectOverride(hinge="left")})
     joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
     assert joint.axis_object[2] == -1.0

@@ -15,8 +15,11 @@ def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(tmp_path: 
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y, 0.5), 60))
     track = open_session(capture, tmp_path).track(drawer)
     shown = [f for f, mask in truth["drawer_mid"].items() if mask.sum() > 3000]
-    assert {f for f in shown if f in track.opened_m} == {f for f in shown if f >= 100}
-    assert list(track.opened_m.values()) == pytest.approx([OUT_M] * len(track.opened_m), abs=0.012)  # 1 cm of depth noise
+    assert {f for f in shown if f in track.opened_frames} == {f for f in shown if f >= 100}
+    (motion,) = track.motions
+    assert (motion.kind, motion.stop_seen) == ("prismatic", False)  # nobody saw it being drawn out
+    values = [motion.states[f].value for f in shown if f >= 100]
+    assert values == pytest.approx([OUT_M] * len(values), abs=0.006)  # 2 mm of depth noise
     overlap = {f: mask_iou(unpack_mask(track.masks[f]), truth["drawer_mid"][f]) for f in shown}
     assert np.mean([overlap[f] for f in shown if f < 100]) > 0.93
     assert np.mean([overlap[f] for f in shown if f >= 100]) > 0.93
@@ -29,10 +32,12 @@ def test_a_door_open_in_the_last_frames_tells_its_hinge_and_its_angle(tmp_path: 
     x, width = DOORS["door_c"]
     door = prompt("door_c", "cabinet", click_on(capture, (x + width / 2, FRONT_Y, 0.5), 60))
     track = open_session(capture, tmp_path).track(door)
-    assert len(track.swung) >= 3
-    assert all(frame >= 80 for frame in track.swung)  # before, it is closed
-    assert {swing.hinge for swing in track.swung.values()} == {"left"}
-    angles = np.rad2deg([swing.angle_rad for swing in track.swung.values()])
-    assert np.median(angles) == pytest.approx(60.0, abs=2.0)  # 2 mm of depth noise, a leaf of 40 cm seen ever more flatly
-    overlap = [mask_iou(unpack_mask(track.masks[f]), truth["door_c"][f]) for f in (80, 90)]
-    assert np.mean(overlap) > 0.7  # its back and edges are the door's too; left where it was closed: less than half
+    assert track.opened_frames == {f for f in track.masks if f >= 80}  # before, it is closed
+    (motion,) = track.motions
+    np.testing.assert_allclose(motion.axis_world, [0.0, 0.0, -1.0], atol=np.deg2rad(0.5))
+    assert motion.pivot_world is not None
+    np.testing.assert_allclose(motion.pivot_world[:2], [x, FRONT_Y], atol=0.008)
+    angles = np.rad2deg([motion.states[f].value or 0.0 for f in track.opened_frames])
+    np.testing.assert_allclose(angles, 60.0, atol=2.0)
+    overlap = [mask_iou(unpack_mask(track.masks[f]), truth["door_c"][f]) for f in track.opened_frames]
+    assert np.mean(overlap) > 0.85

@@ -1,0 +1,46 @@
+"""The visible pixels of a leaf that stands open: its board, and what a drawer brings out behind it."""
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Mask
+from r2c2r_core.geometry.camera import pixel_centres, unproject
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.motion.leaf import OpenLeaf, behind, corners
+from r2c2r_core.segment.occlusion import Facet, visible_mask
+from r2c2r_core.segment.scene import Scene
+
+
+def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float]:
+    """Its visible pixels in a frame, and the share of its projection that is visible."""
+    mask, share = visible_mask(_faces(opened, frame), scene, frame)
+    return (mask | _drawn_out(opened, scene, frame) if opened.slides_out else mask), share
+
+
+def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:
+    """The sides of the board that face the camera."""
+    face = corners(opened.leaf)
+    back = face + behind()
+    quads = [face, back[::-1], *(np.stack([face[k], back[k], back[k - 1], face[k - 1]]) for k in range(4))]
+    facets = [Facet(opened.world_from_leaf.apply(quad)) for quad in quads]
+    camera = frame.world_from_camera.translation
+    middle = opened.world_from_leaf.apply((face + back).mean(axis=0)[None] / 2)[0]
+    return [f for f in facets if _side(f, camera) * _side(f, middle) < 0]
+
+
+def _side(facet: Facet, point: np.ndarray) -> float:
+    return float((point - facet.corners_world[0]) @ facet.normal)
+
+
+def _drawn_out(opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
+    """Pixels whose depth lies between a drawer's front and its closed place: its box, and what is in it."""
+    camera, depth = frame.depth_camera, scene.depth(frame.index)
+    leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
+    local = leaf_from_camera.apply(unproject(pixel_centres(camera), depth, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
+    out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
+    half_w, half_h = opened.leaf.half_m
+    inside = (depth > 0) & (np.abs(local[..., 0]) < half_w) & (np.abs(local[..., 2]) < half_h)
+    inside &= (local[..., 1] > 0) & (local[..., 1] < out)
+    size = (frame.rgb_camera.width, frame.rgb_camera.height)
+    return np.asarray(cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5)

@@ -1,0 +1,104 @@
+"""A leaf that may move: the rectangle of a closed front, and points on it and around it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Where a leaf is looked at."""
+
+    thickness_m: float = param(0.019, "m", "of a front's board", source="European lists: fronts of 16-22 mm")
+    across: int = param(9, "count", "points along each side of the grid on a leaf", ge=3)
+    inside: float = param(0.9, "share", "of a leaf's half width and height that the grid spans: its rim is half a depth pixel")
+    rim_m: tuple[float, float] = param((0.03, 0.05), "m", "beyond a leaf's edges, where it must have ended")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Leaf:
+    """A board in its closed place; `front` frame of transforms.py at the middle of its outer face."""
+
+    world_from_front: Rigid3
+    width_m: float
+    height_m: float
+
+    @property
+    def outward(self) -> Vector3:
+        """Unit normal of its closed outer face, towards the room."""
+        return -self.world_from_front.rotation[:, 1]
+
+    @property
+    def half_m(self) -> tuple[float, float]:
+        """Half its width and height."""
+        return self.width_m / 2, self.height_m / 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpenLeaf:
+    """A leaf that does not stand in its place."""
+
+    leaf: Leaf
+    world_from_leaf: Rigid3  # of its outer face, as `front`
+    slides_out: bool
+
+
+def behind() -> Vector3:
+    """From the outer face to the back, in the front frame."""
+    return np.array([0.0, tuned(Params).thickness_m, 0.0])
+
+
+def face_points(leaf: Leaf) -> Points:
+    """A grid (n, 3) on the outer face, in the front frame."""
+    params = tuned(Params)
+    steps = np.linspace(-params.inside, params.inside, params.across)
+    x, z = (grid.ravel() for grid in np.meshgrid(steps * leaf.half_m[0], steps * leaf.half_m[1]))
+    return np.stack([x, np.zeros_like(x), z], axis=1)
+
+
+def rim_points(leaf: Leaf, fixed: str | None) -> Points:
+    """Points (n, 3) beyond the edges that are free to move, in the front frame; `fixed` is the edge of the hinge."""
+    params = tuned(Params)
+    steps = np.linspace(-params.inside, params.inside, params.across)
+    half_w, half_h = leaf.half_m
+    rim = []
+    for off in params.rim_m:
+        sides = {
+            "left": (np.full_like(steps, -half_w - off), steps * half_h),
+            "right": (np.full_like(steps, half_w + off), steps * half_h),
+            "bottom": (steps * half_w, np.full_like(steps, -half_h - off)),
+            "top": (steps * half_w, np.full_like(steps, half_h + off)),
+        }
+        rim += [np.stack([x, np.zeros_like(x), z], axis=1) for side, (x, z) in sides.items() if side != fixed]
+    return np.concatenate(rim)
+
+
+def edge_points(leaf: Leaf, fixed: str | None) -> list[tuple[Points, Vector3, float]]:
+    """Of each free edge's narrow face: points (n, 3) in its middle, its normal, and the area about each; in the front frame."""
+    params = tuned(Params)
+    steps = np.linspace(-params.inside, params.inside, params.across)
+    half_w, half_h = leaf.half_m
+    level = np.full_like(steps, params.thickness_m / 2)
+    faces = []
+    for side, sign in (("left", -1.0), ("right", 1.0), ("bottom", -1.0), ("top", 1.0)):
+        upright = side in ("left", "right")
+        x, z = (
+            (np.full_like(steps, sign * half_w), steps * half_h)
+            if upright
+            else (steps * half_w, np.full_like(steps, sign * half_h))
+        )
+        normal = np.array([sign, 0.0, 0.0] if upright else [0.0, 0.0, sign])
+        area = (leaf.height_m if upright else leaf.width_m) * params.thickness_m / params.across
+        if side != fixed:
+            faces.append((np.stack([x, level, z], axis=1), normal, area))
+    return faces
+
+
+def corners(leaf: Leaf) -> Points:
+    """Corners (4, 3) of the outer face in the front frame: top left, then clockwise."""
+    half_w, half_h = leaf.half_m
+    return np.array([[-half_w, 0.0, half_h], [half_w, 0.0, half_h], [half_w, 0.0, -half_h], [-half_w, 0.0, -half_h]])

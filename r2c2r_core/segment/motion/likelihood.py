@@ -1,0 +1,177 @@
+"""What a frame's depth says of each state of a leaf: log-likelihood ratios to knowing nothing of what stands there.
+
+A beam model (Thrun et al. 2005, 6.3): depth is measured on the leaf, on something before it, or anywhere by mistake.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.motion.hypotheses import Hypothesis
+from r2c2r_core.segment.motion.leaf import Leaf, behind, edge_points, face_points, rim_points
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How depth errs about a leaf."""
+
+    hit: float = param(0.6, "share", "of readings towards a leaf that are of the leaf")
+    before: float = param(
+        0.95, "ratio", "of finding something before a leaf to finding it there without one: what hides says nothing"
+    )
+    wild: float = param(0.05, "share", "of them that are anything: gloss, glass, flying pixels")
+    range_m: float = param(3.0, "m", "over which depth lies that nothing is known of", gt=0)
+    floor_m: float = param(0.006, "m", "standard deviation of a front's place: poses, warp, profile", gt=0)
+    same: float = param(2.0, "σ", "within which what lies beyond an edge is of the same surface")
+    rim_cost: float = param(1.5, "log", "for a point beyond a free edge that the leaf should have ended at")
+    rim_free_m: float = param(0.06, "m", "from the closed plane, within which neighbours explain what lies beyond an edge")
+    seen_past: float = param(-1.0, "log", "of a reading below which what is behind the leaf's place was seen", ge=-10, le=0)
+    told_apart: float = param(0.25, "share", "of a frame's readings that count: their errors go together", gt=0)
+    flattest: float = param(0.12, "cosine", "of the angle from which a leaf is seen")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Samples:
+    """Points of a leaf in each state (q, n, 3), world frame, and what each stands for."""
+
+    points: np.ndarray
+    outward: np.ndarray  # (q, 3) unit normal of their face
+    spread_m: np.ndarray  # (q, n) by which a point may lie off along the normal between two states that are tried
+    area_m2: float  # of the face about each point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class States:
+    """A hypothesis laid out: where the leaf is in each state."""
+
+    leaf: Leaf
+    hypothesis: Hypothesis
+    faces: tuple[Samples, Samples]  # the outer one and the back
+    edges: tuple[Samples, ...]  # the narrow faces of its free edges: all that shows of a leaf that is seen edge on
+    rim: Samples  # beyond its free edges
+    covered: np.ndarray  # (q, n) bool: closed points that a leaf sliding within its plane still covers
+
+
+def lay_out(leaf: Leaf, hypothesis: Hypothesis) -> States:
+    """The points of every state that is tried."""
+    fixed = hypothesis.way if hypothesis.turns else None
+    face, rim = face_points(leaf), rim_points(leaf, fixed)
+    area = leaf.width_m * leaf.height_m / len(face)
+    outward = np.array([0.0, -1.0, 0.0])
+    along = face[None, :, 0] - hypothesis.states[:, None] * hypothesis.axis[0]
+    return States(
+        leaf=leaf,
+        hypothesis=hypothesis,
+        faces=(_moved(leaf, hypothesis, face, outward, area), _moved(leaf, hypothesis, face + behind(), outward, area)),
+        edges=tuple(_moved(leaf, hypothesis, *edge) for edge in edge_points(leaf, fixed)),
+        rim=_moved(leaf, hypothesis, rim, outward, area),
+        covered=np.abs(along) < leaf.half_m[0],
+    )
+
+
+def _moved(leaf: Leaf, hypothesis: Hypothesis, points: Points, outward: Vector3, area_m2: float) -> Samples:
+    """Points of the closed leaf (front frame) in every state."""
+    place, states = leaf.world_from_front, hypothesis.states
+    poses = [hypothesis.pose(float(state)) for state in states]
+    step = float(states[1] - states[0]) / np.sqrt(12)
+    if hypothesis.turns:
+        velocity = np.cross(hypothesis.axis, points - hypothesis.pivot)
+    else:
+        velocity = np.tile(hypothesis.axis, (len(points), 1))
+    return Samples(
+        points=np.stack([place.apply(pose.apply(points)) for pose in poses]),
+        outward=np.stack([place.turn(pose.turn(outward[None]))[0] for pose in poses]),
+        spread_m=np.tile(np.abs(velocity @ outward) * step, (len(states), 1)),
+        area_m2=area_m2,
+    )
+
+
+def closed_counts(leaf: Leaf, scene: Scene, frame: Frame) -> tuple[int, int, int]:
+    """Of the closed leaf's points, how many depth agrees with, sees through, and sees something before."""
+    points = leaf.world_from_front.apply(face_points(leaf))
+    z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+    margin = 2 * tuned(Params).floor_m
+    agrees = scene.noise.agrees(seen, z, margin)
+    through = scene.noise.seen_through(seen, z, margin)
+    return int(agrees.sum()), int(through.sum()), int(((seen > 0) & ~agrees & ~through).sum())
+
+
+def in_view(leaf: Leaf, pose: Rigid3, scene: Scene, frame: Frame) -> bool:
+    """Whether a frame shows a part of the leaf in a pose (front_from_leaf)."""
+    points = leaf.world_from_front.apply(pose.apply(face_points(leaf)))
+    z, seen, inside = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+    return bool((inside & ~scene.noise.occluded(seen, z, 2 * tuned(Params).floor_m)).any())
+
+
+def evidence(states: States, scene: Scene, frame: Frame, *, edges: bool = False) -> np.ndarray:
+    """The log-likelihood ratio of each state (q,) in a frame to knowing nothing of what stands there.
+
+    With `edges`, those of the leaf's narrow faces count too: worth asking where states lie closer than a board is thick.
+    """
+    params = tuned(Params)
+    if states.hypothesis.lateral:
+        return _lateral(states, scene, frame)
+    front, back = states.faces
+    from_back = ((frame.world_from_camera.translation - front.points[:, 0]) * front.outward).sum(axis=1) < 0
+    seen = replace(front, points=np.where(from_back[:, None, None], back.points, front.points))
+    face = _readings(seen, scene, frame)
+    rim = _readings(states.rim, scene, frame)
+    place = states.leaf.world_from_front
+    off = np.abs((states.rim.points - place.translation) @ place.rotation[:, 1]) > params.rim_free_m
+    total = (face.ratio * face.weight).sum(axis=1) - params.rim_cost * (rim.agrees * off * rim.weight).sum(axis=1)
+    for edge in states.edges if edges else ():
+        read = _readings(edge, scene, frame, facing=True)
+        total = total + (read.ratio * read.weight).sum(axis=1)
+    return np.asarray(params.told_apart * total)
+
+
+def _lateral(states: States, scene: Scene, frame: Frame) -> np.ndarray:
+    """By the closed place alone: what is covered still agrees, what is vacated is seen through; beside it others may stand."""
+    params, front = tuned(Params), states.faces[0]
+    closed = Samples(
+        points=states.leaf.world_from_front.apply(face_points(states.leaf))[None],
+        outward=states.leaf.outward[None],
+        spread_m=np.zeros((1, front.points.shape[1])),
+        area_m2=front.area_m2,
+    )
+    read = _readings(closed, scene, frame)
+    vacated = np.where(read.agrees, np.log(params.wild), np.where(read.ratio < params.seen_past, -np.log(params.hit), 0.0))
+    each = np.where(states.covered, read.ratio, vacated) * read.weight
+    return np.asarray(params.told_apart * each.sum(axis=1))
+
+
+class _Readings(NamedTuple):
+    """What depth says of points (q, n)."""
+
+    ratio: np.ndarray  # log-likelihood ratios
+    agrees: np.ndarray  # bool
+    weight: np.ndarray  # what each reading is worth
+
+
+def _readings(samples: Samples, scene: Scene, frame: Frame, *, facing: bool = False) -> _Readings:
+    """Depth at the samples' pixels, by how far it lies from their face along its normal."""
+    params = tuned(Params)
+    count, each = samples.points.shape[:2]
+    flat: Points = samples.points.reshape(-1, 3)
+    z, seen, _ = look_up(flat, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+    z, seen = np.maximum(z, 1e-3).reshape(count, each), seen.reshape(count, each)
+    ray = samples.points - frame.world_from_camera.translation
+    towards = -(ray * samples.outward[:, None]).sum(axis=2)
+    height = np.abs(towards)  # of the camera over the face
+    cosine = height / np.maximum(np.linalg.norm(ray, axis=2), 1e-6)
+    behind_m = (seen / z - 1) * height
+    sigma = np.sqrt((scene.noise.sigma(z) * height / z) ** 2 + params.floor_m**2 + samples.spread_m**2)
+    known = (seen > 0) & (cosine > params.flattest) & ((towards > 0) | (not facing))
+    density = np.exp(-0.5 * (behind_m / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma) * params.range_m * height / z
+    ratio = np.log(params.hit * density + params.before * (behind_m < 0) + params.wild)
+    # Readings are pixels: a leaf seen flatly or from far has fewer than it has points.
+    pixels = samples.area_m2 * frame.depth_camera.fx * frame.depth_camera.fy * cosine / z**2
+    weight = np.where(known, np.minimum(pixels, 1.0), 0.0)
+    return _Readings(np.where(known, ratio, 0.0), known & (np.abs(behind_m) < params.same * sigma), weight)

@@ -1,0 +1,94 @@
+"""The leaf's own pose in one frame, free of any joint: where depth has its plane, with covariance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.motion.leaf import Leaf, corners
+from r2c2r_core.segment.motion.leaf import Params as LeafParams
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a frame tells a leaf's plane."""
+
+    gates_m: tuple[float, ...] = param((0.05, 0.025, 0.015), "m", "off the plane so far, within which depth is the leaf's")
+    inside: float = param(0.92, "share", "of a leaf's half width and height within which depth is its own")
+    least_points: int = param(40, "count", "depth points of a plane", ge=10)
+    spans: float = param(0.35, "share", "of a leaf's width and of its height that they must reach over")
+    near_m: float = param(0.035, "m", "of the leaf's middle from where it was expected: a step and its thickness")
+    near_rad: float = param(float(np.deg2rad(6.0)), "rad", "of its direction from the expected one: two steps of states")
+    together: float = param(6.0, "ratio", "of a frame's points to as many as would err independently", gt=0)
+    place_m: float = param(0.003, "m", "standard deviation of a frame's pose", source="ARKit over a kitchen: millimetres")
+    turn_rad: float = param(float(np.deg2rad(0.15)), "rad", "standard deviation of a frame's direction")
+    scale_m: float = param(0.004, "m", "residual from which points count little (Geman and McClure 1987)", gt=0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneFix:
+    """A leaf's plane in one frame: y = plane @ (1, x, z) in the frame of the leaf where it was `expected`."""
+
+    frame_index: int
+    expected: Rigid3  # front_from_leaf
+    plane: np.ndarray  # (3,) metres, and slopes along x and z
+    covariance: np.ndarray  # (3, 3)
+    is_back: bool  # whether the camera saw the inner face
+    points: int
+
+
+def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> PlaneFix | None:
+    """The plane that depth shows near an expected pose; None where it shows too little of it."""
+    params = tuned(Params)
+    world_from_leaf = leaf.world_from_front @ expected
+    local, sigma = _points_near(leaf, world_from_leaf, scene, frame)
+    is_back = bool(world_from_leaf.inverse.apply(frame.world_from_camera.translation[None])[0, 1] > 0)
+    y = local[:, 1] - (tuned(LeafParams).thickness_m if is_back else 0.0)
+    design = np.stack([np.ones(len(local)), local[:, 0], local[:, 2]], axis=1)
+    plane = np.zeros(3)
+    information = np.eye(3)
+    for gate in params.gates_m:
+        off = y - design @ plane
+        near = np.abs(off) < gate
+        if near.sum() < params.least_points:
+            return None
+        for _ in range(5):
+            off = y[near] - design[near] @ plane
+            scale = np.hypot(params.scale_m, sigma[near])
+            weight = (1 / (1 + (off / scale) ** 2) ** 2) / scale**2
+            information = design[near].T @ (design[near] * weight[:, None])
+            plane = np.linalg.solve(information + 1e-9 * np.eye(3), design[near].T @ (weight * y[near]))
+    spans = np.ptp(np.quantile(local[near][:, [0, 2]], [0.03, 0.97], axis=0), axis=0)
+    far = abs(plane[0]) > params.near_m or (np.abs(plane[1:]) > params.near_rad).any()
+    if far or (spans < params.spans * np.array([leaf.width_m, leaf.height_m])).any():
+        return None
+    covariance = params.together * np.linalg.inv(information) + np.diag(
+        [params.place_m**2, params.turn_rad**2, params.turn_rad**2]
+    )
+    return PlaneFix(frame.index, expected, plane, covariance, is_back, int(near.sum()))
+
+
+def _points_near(leaf: Leaf, world_from_leaf: Rigid3, scene: Scene, frame: Frame) -> tuple[Points, np.ndarray]:
+    """Depth points within the leaf's outline, in its frame, and how far each may err along its normal."""
+    params = tuned(Params)
+    camera, depth = frame.depth_camera, scene.depth(frame.index)
+    outline = frame.world_from_camera.inverse.apply(world_from_leaf.apply(corners(leaf)))
+    uv = project(np.maximum(outline, [-np.inf, -np.inf, 0.1]), camera)
+    low = np.clip(np.floor(uv.min(axis=0)), 0, [camera.width, camera.height]).astype(int)
+    high = np.clip(np.ceil(uv.max(axis=0)), 0, [camera.width, camera.height]).astype(int)
+    row, column = np.nonzero(depth[low[1] : high[1], low[0] : high[0]] > 0)
+    row, column = row + low[1], column + low[0]
+    z = depth[row, column].astype(np.float64)
+    seen = unproject(np.stack([column + 0.5, row + 0.5], axis=1), z, camera)
+    leaf_from_camera = world_from_leaf.inverse @ frame.world_from_camera
+    local = leaf_from_camera.apply(seen)
+    half_w, half_h = leaf.half_m
+    near = (np.abs(local[:, 0]) < params.inside * half_w) & (np.abs(local[:, 2]) < params.inside * half_h)
+    near &= np.abs(local[:, 1]) < 2 * max(params.gates_m)
+    height = abs(float(leaf_from_camera.translation[1]))
+    return local[near], scene.noise.sigma(z[near]) * height / z[near]

@@ -1,0 +1,176 @@
+"""READ FIRST: a leaf's motion over all frames: the joint by model comparison, then joint and states by one robust fit.
+
+For each joint that a leaf may have, the likeliest course of its states is found by dynamic programming; the joint whose
+course explains the depth best is taken, where it explains it better than a leaf that never moved. What category the leaf is
+of weighs as a prior that a few frames overrule.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from r2c2r_core.model.motion import JointMotion, State
+from r2c2r_core.segment.motion.bundle import FittedJoint, as_supposed, fit_joint
+from r2c2r_core.segment.motion.hypotheses import Hypothesis, Way, hypotheses
+from r2c2r_core.segment.motion.lateral import slid
+from r2c2r_core.segment.motion.leaf import Leaf
+from r2c2r_core.segment.motion.likelihood import States, closed_counts, evidence, in_view, lay_out
+from r2c2r_core.segment.motion.limits import stop_seen, widest
+from r2c2r_core.segment.motion.path import best_path
+from r2c2r_core.segment.motion.pose import fix_plane
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a leaf is said to have moved."""
+
+    vacated_share: float = param(0.5, "share", "of the readings towards a closed place, below which it may be vacated")
+    closed_share: float = param(0.7, "share", "of them that agree, from which it is closed")
+    least_known: int = param(20, "count", "readings towards it that a frame must have", ge=1)
+    least_frames: int = param(3, "count", "frames that must show it so, and that must show the leaf elsewhere", ge=1)
+    closed_cost: float = param(60.0, "log", "against every other state where it is closed")
+    gain: float = param(40.0, "log", "by which a course must explain the depth better than a leaf that never moved")
+    support: float = param(40.0, "log", "of the readings on the leaf where it stands open: what hides it is none")
+    told: float = param(3.0, "log", "of a frame's evidence for its state, from which the leaf is looked for in it")
+    closed_rad: float = param(float(np.deg2rad(2.0)), "rad", "a door that stands open by less is closed: a frame's error")
+    closed_m: float = param(0.01, "m", "what slides and stands open by less is closed: a frame's error, and a handle's relief")
+    moves_steps: float = param(4.0, "count", "steps of states that a leaf never seen closed must move over")
+    around_steps: float = param(2.0, "count", "steps of states about its course, in which a frame without a fit is asked")
+    finer: float = param(6.0, "ratio", "of those steps to the ones then tried: a board is thicker than these", gt=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Course:
+    """A hypothesis, and the likeliest state of the leaf in each frame."""
+
+    hypothesis: Hypothesis
+    values: np.ndarray  # (frames,) radians or metres
+    log: np.ndarray  # (frames,) evidence for each
+    gain: float  # over a leaf that never moved, with the prior
+    support: float  # evidence of the frames in which it stands open
+
+
+Seen = dict[int, tuple[float, float]]
+"""State and standard deviation by the frame's position in the recording."""
+
+NO_PRIOR: Mapping[Way, float] = MappingProxyType({})
+
+
+def find_motion(leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR, part: str = "") -> JointMotion | None:
+    """The joint that a leaf was seen to move on; None where it was never seen anywhere but in its closed place.
+
+    `prior` says by how much each way of opening is likelier than the others before any frame, as a logarithm.
+    """
+    params = tuned(Params)
+    counts = np.array([closed_counts(leaf, scene, frame) for frame in scene.frames])
+    known = counts.sum(axis=1)
+    agrees = np.where(known >= params.least_known, counts[:, 0] / np.maximum(known, 1), np.nan)
+    if (agrees < params.vacated_share).sum() < params.least_frames:
+        return None
+    closed = agrees > params.closed_share
+    tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
+    courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
+    for course in sorted(courses, key=lambda course: -course.gain):
+        if course.gain < params.gain:
+            break
+        motion = _measured(leaf, course, scene, part) if course.support > params.support else None
+        if motion is not None:
+            return motion
+    return None
+
+
+def _course(states: States, scene: Scene, closed: np.ndarray, prior: float) -> Course:
+    """The likeliest course under a hypothesis."""
+    values = states.hypothesis.states
+    shut = np.where(np.arange(len(values)) > 0, -tuned(Params).closed_cost, 0.0)
+    log = np.stack([shut if is_shut else evidence(states, scene, f) for is_shut, f in zip(closed, scene.frames, strict=True)])
+    path, total = best_path(log)
+    own = log[np.arange(len(path)), path]
+    gain = total - float(log[:, 0].sum()) + prior
+    return Course(hypothesis=states.hypothesis, values=values[path], log=own, gain=gain, support=float(own[path > 0].sum()))
+
+
+def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotion | None:
+    """The joint fitted to the frames that show the leaf; None where too few of them have it in one piece."""
+    params, step = tuned(Params), float(course.hypothesis.states[1])
+    joint, seen = _fitted(leaf, course, scene)
+    opened = [value for k, (value, _) in seen.items() if course.values[k] > 0]
+    shut = sum(course.values[k] == 0 for k in seen)
+    # What never changes is how things are, not a motion: a rectangle that was drawn too wide looks like a leaf half slid away.
+    moves = shut >= params.least_frames or (len(opened) > 0 and np.ptp(opened) > params.moves_steps * step)
+    if len(opened) < params.least_frames or not moves:
+        return None
+    turns = course.hypothesis.turns
+    states = _states(leaf, course, joint, seen, scene)
+    values = np.array([state.value for state in states.values()], dtype=np.float64)
+    times = [scene.frames[k].timestamp_s for k in states]
+    pivot = joint.pivot - joint.axis * float(joint.axis @ joint.pivot) if turns else np.zeros(3)
+    place = leaf.world_from_front
+    return JointMotion(
+        part=part,
+        kind="revolute" if turns else "prismatic",
+        axis_world=place.turn(joint.axis[None])[0],
+        pivot_world=place.apply(pivot[None])[0],
+        covariance=joint.covariance_in(place.rotation),
+        states={scene.frames[k].index: state for k, state in states.items()},
+        largest=widest(values, turns=turns),
+        stop_seen=stop_seen(values, times, turns=turns),
+        source="measured",
+    )
+
+
+def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen]:
+    """The joint, and the states of the frames that tell it."""
+    told = [k for k in range(len(scene.frames)) if course.log[k] > tuned(Params).told or course.values[k] == 0]
+    if course.hypothesis.lateral:
+        found = {k: slid(leaf, course.hypothesis, scene, scene.frames[k]) for k in told}
+        return as_supposed(course.hypothesis), {k: state for k, state in found.items() if state is not None}
+    fixes = {
+        k: fix
+        for k in told
+        if (fix := fix_plane(leaf, course.hypothesis.pose(float(course.values[k])), scene, scene.frames[k])) is not None
+    }
+    if not fixes:
+        return as_supposed(course.hypothesis), {}
+    joint, states, sigmas = fit_joint(course.hypothesis, list(fixes.values()), course.values[list(fixes)])
+    return joint, {k: (float(states[n]), float(sigmas[n])) for n, k in enumerate(fixes)}
+
+
+def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene) -> dict[int, State]:
+    """The state in every frame that shows the leaf: as fitted, else as the likeliest near the fitted ones beside it."""
+    states: dict[int, State] = {}
+    for k, frame in enumerate(scene.frames):
+        value, sigma = seen[k] if k in seen else _likeliest(leaf, course, joint, seen, scene, k)
+        value = _opening(value, joint)
+        if k in seen or in_view(leaf, joint.pose(value), scene, frame):
+            states[k] = State(value=value, sigma=sigma)
+    return states
+
+
+def _likeliest(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int) -> tuple[float, float]:
+    """The state of a frame that has no fit of its own: it may show the leaf edge on, or a part of it."""
+    params, step = tuned(Params), float(course.hypothesis.states[1])
+    beside = [max((j for j in seen if j < k), default=None), min((j for j in seen if j > k), default=None)]
+    near = [seen[j][0] for j in beside if j is not None] if course.log[k] < params.told else []
+    low, high = min([float(course.values[k]), *near]), max([float(course.values[k]), *near])
+    fine = step / params.finer
+    tried = np.arange(max(low - params.around_steps * step, 0.0), high + params.around_steps * step + fine, fine)
+    log = evidence(
+        lay_out(leaf, replace(course.hypothesis, axis=joint.axis, pivot=joint.pivot, states=tried)),
+        scene,
+        scene.frames[k],
+        edges=True,
+    )
+    weight = np.exp(log - log.max())
+    mean = float(weight @ tried / weight.sum())
+    return mean, float(np.sqrt(weight @ (tried - mean) ** 2 / weight.sum() + fine**2))
+
+
+def _opening(value: float, joint: FittedJoint) -> float:
+    """A state, 0 where it cannot be told from closed."""
+    params = tuned(Params)
+    return value if value > (params.closed_rad if joint.turns else params.closed_m) else 0.0

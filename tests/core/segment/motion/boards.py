@@ -1,0 +1,112 @@
+"""Depth of a board that moves before a hollow unit, in closed form: rays and boxes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
+from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
+from r2c2r_core.segment.motion.leaf import Leaf
+from tests.core.segment.scenes import look_at
+
+CAMERA = Intrinsics(fx=150.0, fy=150.0, cx=96.0, cy=72.0, width=192, height=144)
+THICKNESS_M = 0.018
+Solid = tuple[Rigid3, tuple[float, float, float], tuple[float, float, float]]
+"""A box: world_from_box, and its lowest and highest corner."""
+
+LEAF = Leaf(
+    world_from_front=Rigid3(front_rotation(np.array([0.3, -1.0, 0.0])), np.array([0.4, 0.2, 0.8])), width_m=0.5, height_m=0.6
+)
+
+
+@dataclass
+class Film:
+    """As much of a scene as motion asks for."""
+
+    frames: tuple[Frame, ...]
+    depths: dict[int, np.ndarray]
+    noise: DepthNoise = field(default_factory=lambda: DepthNoise(floor_m=0.002, per_m=0.002))
+
+    def depth(self, frame_index: int) -> np.ndarray:
+        return self.depths[frame_index]
+
+
+def joint(way: str) -> Hypothesis:
+    return next(one for one in hypotheses(LEAF) if one.way == way)
+
+
+def filmed(
+    way: str,
+    states: Sequence[float],
+    *,
+    noise_m: float = 0.004,
+    hands: Sequence[int] = (),
+    pivot_off: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    seed: int = 0,
+) -> Film:
+    """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`."""
+    rng = np.random.default_rng(seed)
+    moving = joint(way)
+    frames, depths = [], {}
+    for number, state in enumerate(states):
+        t = number / max(len(states) - 1, 1) - 0.5
+        eye = LEAF.world_from_front.apply(np.array([[1.4 * t, -1.7 + 0.2 * np.cos(9 * t), 0.45 + 0.15 * np.sin(7 * t)]]))[0]
+        pose = look_at(eye, LEAF.world_from_front.apply(np.array([[0.2 * t, -0.15, -0.05]]))[0])
+        turning = Rigid3(np.eye(3), np.array(pivot_off))
+        leaf = LEAF.world_from_front @ turning @ moving.pose(state) @ turning.inverse
+        seen = cast_rays([*_unit(), _board(leaf), *([_arm()] if number in hands else [])], pose)
+        frames.append(
+            Frame(
+                index=number,
+                timestamp_s=number / 10,
+                rgb_camera=CAMERA,
+                depth_camera=CAMERA,
+                world_from_camera=pose,
+                sharpness=1.0,
+            )
+        )
+        noisy = seen + rng.normal(0, noise_m, seen.shape) * (seen > 0)
+        depths[number] = noisy.astype(np.float32)
+    return Film(tuple(frames), depths)
+
+
+def cast_rays(solids: Sequence[Solid], world_from_camera: Rigid3) -> np.ndarray:
+    """z-depth (h, w) of the nearest of some boxes."""
+    rays = pixel_rays(pixel_centres(CAMERA), CAMERA).reshape(-1, 3)
+    nearest = np.full(len(rays), np.inf)
+    for world_from_box, low, high in solids:
+        seen = world_from_box.inverse @ world_from_camera
+        turned = seen.turn(rays)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first, second = ((np.array(edge) - seen.translation) / turned for edge in (low, high))
+        enter = np.minimum(first, second).max(axis=1)
+        leave = np.maximum(first, second).min(axis=1)
+        nearest = np.where((enter < leave) & (enter > 0), np.minimum(nearest, enter), nearest)
+    return np.where(np.isfinite(nearest), nearest, 0.0).reshape(CAMERA.height, CAMERA.width)
+
+
+def _board(world_from_leaf: Rigid3) -> Solid:
+    half_w, half_h = LEAF.half_m
+    return world_from_leaf, (-half_w + 0.0015, 0.0, -half_h + 0.0015), (half_w - 0.0015, THICKNESS_M, half_h - 0.0015)
+
+
+def _unit() -> list[Solid]:
+    """Boards round a hollow half a metre deep, neighbours beside and below, a wall behind and a floor."""
+    place, (w, h), t = LEAF.world_from_front, LEAF.half_m, THICKNESS_M
+    return [
+        (place, (-w - 0.6, 0.0, -h), (-w, 0.5, h)),
+        (place, (w, 0.0, -h), (w + 0.6, 0.5, h)),
+        (place, (-w - 0.6, 0.0, h), (w + 0.6, 0.5, h + 0.3)),
+        (place, (-w - 0.6, 0.0, -h - 0.2), (w + 0.6, 0.5, -h)),
+        (place, (-w, t + 0.45, -h), (w, t + 0.47, h)),
+        (place, (-3.0, 0.5, -h - 0.5), (3.0, 0.6, 2.0)),
+        (place, (-3.0, -3.0, -h - 0.3), (3.0, 0.5, -h - 0.2)),
+    ]
+
+
+def _arm() -> Solid:
+    return LEAF.world_from_front, (-0.05, -0.75, -0.05), (0.07, -0.65, 0.7)

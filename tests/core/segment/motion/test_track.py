@@ -1,0 +1,91 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.segment.motion.track import find_motion
+from tests.core.segment.motion.boards import LEAF, filmed, joint
+
+RAD, M = ("left", "right", "top", "bottom"), ("out", "slides_left", "slides_right")
+
+
+def opened_and_held(largest: float) -> np.ndarray:
+    """Closed, opened slowly, held, and closed by half."""
+    return np.concatenate(
+        [np.zeros(8), np.linspace(0, largest, 12), np.full(10, largest), np.linspace(largest, largest / 2, 5)]
+    )
+
+
+def scene(*args: Any, **more: Any) -> Any:
+    return filmed(*args, **more)
+
+
+@pytest.mark.parametrize("way", RAD + M)
+def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
+    states = opened_and_held(np.deg2rad(75) if way in RAD else 0.33)
+    motion = find_motion(LEAF, scene(way, states))
+    assert motion is not None
+    assert motion.kind == ("revolute" if way in RAD else "prismatic")
+    axis = LEAF.world_from_front.turn(joint(way).axis[None])[0]
+    assert motion.axis_world is not None
+    assert np.degrees(np.arccos(min(float(motion.axis_world @ axis), 1.0))) < 0.5
+    values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
+    assert np.quantile(np.abs(values - states), 0.95) < (np.deg2rad(2) if way in RAD else 0.008)  # a depth pixel is 11 mm
+    assert motion.largest == pytest.approx(states.max(), abs=np.deg2rad(1) if way in RAD else 0.006)
+    assert motion.stop_seen
+
+
+@pytest.mark.parametrize("way", RAD)
+def test_a_hinge_behind_its_edge_is_found_there(way: str) -> None:
+    """A concealed hinge turns about a line inside the unit: far from what is usual, and three ranges of angles tell it."""
+    off = (0.012, 0.015, 0.0) if way in ("left", "right") else (0.0, 0.015, 0.012)
+    states = np.concatenate([np.zeros(4), np.linspace(0, np.deg2rad(95), 45)])
+    motion = find_motion(LEAF, scene(way, states, pivot_off=off, noise_m=0.003))
+    assert motion is not None
+    assert motion.pivot_world is not None
+    assert motion.covariance is not None
+    found = LEAF.world_from_front.inverse.apply(motion.pivot_world[None])[0] - joint(way).pivot
+    axis = joint(way).axis
+    error = np.array(off) - found
+    error -= axis * (axis @ error)
+    assert np.linalg.norm(error) < 0.005
+    spread = np.sqrt(np.trace(motion.covariance[3:, 3:]))
+    assert 0.0005 < spread < 0.006
+
+
+def test_a_leaf_that_never_moves_has_no_motion() -> None:
+    assert find_motion(LEAF, scene("left", np.zeros(30))) is None
+
+
+def test_an_arm_before_a_closed_leaf_is_no_motion() -> None:
+    assert find_motion(LEAF, scene("left", np.zeros(30), hands=range(5, 20))) is None
+
+
+def test_an_arm_before_an_open_leaf_leaves_its_joint_as_it_is() -> None:
+    states = opened_and_held(np.deg2rad(60))
+    motion = find_motion(LEAF, scene("right", states, hands=range(8, 24, 2)))
+    assert motion is not None
+    assert motion.largest == pytest.approx(np.deg2rad(60), abs=np.deg2rad(1))
+    values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
+    assert np.quantile(np.abs(values - states), 0.95) < np.deg2rad(2)
+
+
+@pytest.mark.parametrize("states", [np.linspace(1.2, 0, 30), np.linspace(0, 1.2, 30), np.repeat([0.0, 1.2], 15)])
+def test_open_at_the_start_left_open_or_opened_unseen(states: np.ndarray) -> None:
+    motion = find_motion(LEAF, scene("left", states))
+    assert motion is not None
+    values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
+    assert np.quantile(np.abs(values - states), 0.9) < np.deg2rad(2)
+    assert not motion.stop_seen
+
+
+def test_evidence_overrules_what_is_usual() -> None:
+    motion = find_motion(LEAF, scene("left", opened_and_held(1.0)), {"out": 8.0})
+    assert motion is not None
+    assert motion.kind == "revolute"
+
+
+@pytest.mark.parametrize("way", ["left", "slides_left"])
+def test_what_stands_so_all_the_time_is_no_motion(way: str) -> None:
+    """A rectangle drawn too wide looks like a leaf that is half slid away: only a change tells a joint."""
+    assert find_motion(LEAF, scene(way, np.full(30, 0.3))) is None
