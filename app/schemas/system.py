@@ -11,6 +11,7 @@ class Category(Shape):
     name: str
     label: str
     joint: str  # revolute | prismatic | none
+    sideways: bool  # it slides along its front
 
 
 class Backend(Shape):

@@ -122,7 +122,7 @@ def _categories() -> list[schemas.Category]:
     from r2c2r_core.kitchen.categories import every_category
 
     return [
-        schemas.Category(name=name, label=category.label, joint=_JOINTS[category.opens])
+        schemas.Category(name=name, label=category.label, joint=_JOINTS[category.opens], sideways=category.opens == "sideways")
         for category in every_category()
         for name in category.names
     ]

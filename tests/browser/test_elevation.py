@@ -165,7 +165,11 @@ def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(browser: 
     expect(fronts(page).nth(4)).to_contain_text("pan_2")
     assert names(page)[3:] == ["pan_1", "pan_2"]
     stored(page)
-    for _ in range(2):  # one name, then the other
+    page.get_by_role("combobox", name="Kind").select_option("sliding_door")
+    page.get_by_role("combobox", name="Slides to").select_option("right")
+    picture(page, "elevation-slides")
+    stored(page)
+    for _ in range(4):  # side, kind, one name, then the other
         page.keyboard.press("Control+z")
     expect(fronts(page).nth(3)).to_contain_text("pantry_door_4")
     page.keyboard.press("Control+z")  # all names at once

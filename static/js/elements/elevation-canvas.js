@@ -26,7 +26,7 @@ import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 /**
  * @typedef {{
  *   key: string, rect: Rect, name: string, paint: string, chosen: boolean, drawn: boolean,
- *   handle: Box | null, hinge: Side | null, overlaps: boolean,
+ *   handle: Box | null, hinge: Side | null, slides: boolean, overlaps: boolean,
  * }} Shown
  */
 /** @typedef {{ key: string, side: Side | null }} Held an edge, or all of a front */
@@ -164,7 +164,8 @@ export class ElevationCanvas extends LiveElement {
       front.drawn ? [] : [8, 4],
     );
     if (front.handle) this.#drawHandle(context, rect, front.handle, front.paint);
-    if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
+    if (front.hinge && front.slides) this.#drawSlide(context, rect, front.hinge, front.paint);
+    else if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
     if (front.chosen && this.edge) this.#drawEdge(context, rect, this.edge);
     this.#drawLabel(context, rect, front.name);
   }
@@ -229,6 +230,24 @@ export class ElevationCanvas extends LiveElement {
     context.setLineDash([6, 5]);
     context.stroke();
     context.setLineDash([]);
+  }
+
+  /** An arrow to where it slides. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
+  #drawSlide(context, rect, side, colour) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    const y = (top + bottom) / 2;
+    const quarter = (right - left) / 4;
+    const [from, to] = side === "left" ? [right - quarter, left + quarter] : [left + quarter, right - quarter];
+    const head = Math.sign(from - to) * Math.min(12, quarter);
+    context.beginPath();
+    context.moveTo(from, y);
+    context.lineTo(to, y);
+    context.lineTo(to + head, y - Math.abs(head) / 2);
+    context.moveTo(to, y);
+    context.lineTo(to + head, y + Math.abs(head) / 2);
+    context.lineWidth = 2.5;
+    context.strokeStyle = colour;
+    context.stroke();
   }
 
   /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */

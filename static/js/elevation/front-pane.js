@@ -24,6 +24,9 @@ export class FrontPane extends EventTarget {
   #across = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 600 450 600" });
   #down = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 140 280 280" });
   #category = h("select");
+  #side = h("span", { class: "muted" }, "Hinge");
+  /** Kinds that slide along their front: their side is where to. @type {Set<string>} */
+  #sideways = new Set();
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
   #handle = h("select", {}, ...options({ "": "looked for", none: "none", drawn: "drawn" }));
   #adopt = h("button", { type: "button", onClick: () => this.#say("adopt") });
@@ -36,7 +39,7 @@ export class FrontPane extends EventTarget {
     label("Width mm", this.#width),
     label("Height mm", this.#height),
     label("Handle", this.#handle),
-    label("Hinge", this.#hinge),
+    h("label", {}, this.#side, this.#hinge),
     label("Divide width", this.#across),
     label("Divide height", this.#down),
   );
@@ -85,11 +88,17 @@ export class FrontPane extends EventTarget {
 
   /** @param {Category[]} categories */
   setCategories(categories) {
+    this.#sideways = new Set(categories.filter(({ sideways }) => sideways).map(({ name }) => name));
     const others = categories.map(({ name }) => name).filter((name) => !QUICK.includes(name));
     this.#category.replaceChildren(
       ...QUICK.map((name, k) => h("option", { value: name }, `${k + 1}  ${name}`)),
       ...others.map((name) => h("option", { value: name }, name)),
     );
+  }
+
+  /** Whether that kind slides along its front. @param {string} category */
+  slides(category) {
+    return this.#sideways.has(category);
   }
 
   /** @param {number} digit */
@@ -126,6 +135,7 @@ export class FrontPane extends EventTarget {
     set(this.#category, leading?.category ?? "");
     set(this.#width, leading ? String(Math.round(1000 * widthOf(leading.rect))) : "");
     set(this.#height, leading ? String(Math.round(1000 * heightOf(leading.rect))) : "");
+    this.#side.textContent = this.slides(leading?.category ?? "") ? "Slides to" : "Hinge";
     set(this.#hinge, leading?.hinge ?? "");
     set(this.#handle, leading?.handle === "none" ? "none" : leading?.handle && leading.drawn ? "drawn" : "");
     this.#adopt.hidden = cut === 0;

@@ -229,6 +229,7 @@ export class ElevationPage extends LiveElement {
       chosen: chosen.has(front.key),
       handle: front.handle === "none" ? null : (front.handle ?? front.seen),
       hinge: front.hinge ?? null,
+      slides: this.#pane.slides(front.category),
       overlaps: here.some((other) => other.key !== front.key && plane.overlap(other.rect, front.rect)),
     }));
     this.#canvas.setFronts(shown, cut);

@@ -1,6 +1,7 @@
 /** What a person may correct about one object: hinge, limits, size, place. Each is an override; what depends on it runs again. */
 
 import { h, numberField } from "../dom.js";
+import { slidesSideways } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
@@ -25,7 +26,7 @@ export function corrections(group, item, { move, open }, change) {
     h(
       "div",
       { class: "stack" },
-      hinge(group, change),
+      side(group, item, change),
       ...limits(group, item, change),
       move && h("button", { type: "button", onClick: move }, "Move or resize it…"),
     ),
@@ -44,19 +45,25 @@ function hasCorrection({ override }) {
 }
 
 /**
+ * The side it turns on, or slides to.
  * @param {CandidateGroup} group
+ * @param {SceneItem | undefined} item
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
-function hinge(group, change) {
-  const select = h("select", { "aria-label": `Hinge of ${group.name}` });
-  for (const side of SIDES) {
-    select.append(h("option", { value: side, selected: (group.override.hinge ?? "automatic") === side }, side));
+function side(group, item, change) {
+  const sideways = item?.joints.some(slidesSideways) ?? false;
+  const what = sideways ? "Slides to" : "Hinge";
+  const said = group.override.hinge ?? "automatic";
+  const select = h("select", { "aria-label": sideways ? `Where ${group.name} slides to` : `Hinge of ${group.name}` });
+  for (const one of SIDES) {
+    if (sideways && one !== said && (one === "top" || one === "bottom")) continue;
+    select.append(h("option", { value: one, selected: said === one }, one));
   }
   select.addEventListener("change", () => {
-    const side = /** @type {typeof SIDES[number]} */ (select.value);
-    change({ hinge: side === "automatic" ? null : side });
+    const chosen = /** @type {typeof SIDES[number]} */ (select.value);
+    change({ hinge: chosen === "automatic" ? null : chosen });
   });
-  return h("label", {}, h("span", { class: "muted" }, "Hinge"), select);
+  return h("label", {}, h("span", { class: "muted" }, what), select);
 }
 
 /**
@@ -75,7 +82,7 @@ function limits(group, item, change) {
       );
     }
     const part = joint.name
-      .slice(group.name.length + 1)
+      .slice(group.run_name.length + 1)
       .replace(/_joint$/, "")
       .replaceAll("_", " ");
     return limit(joint, `${part}: `, joint.name in said, (upper) => {

@@ -3,6 +3,7 @@
 import { h } from "../dom.js";
 import { findingList } from "../elements/results.js";
 import { centimetres } from "../lib/format.js";
+import { motionOf } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Certificate} Certificate */
@@ -60,8 +61,7 @@ function joints(item) {
         `${what}: ${source}`,
       ),
     );
-    const kind = joint.type === "revolute" ? "Hinged" : "Slides";
-    return h("div", { class: "chips" }, h("span", {}, kind), ...chips);
+    return h("div", { class: "chips" }, h("span", {}, motionOf(joint)), ...chips);
   });
 }
 

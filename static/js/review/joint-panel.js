@@ -2,6 +2,7 @@
 
 import { h } from "../dom.js";
 import { counted, jointValue } from "../lib/format.js";
+import { motionOf } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 /** @typedef {import("../api-types").ViewerJoint} ViewerJoint */
@@ -116,7 +117,8 @@ export class JointPanel {
       worst,
     );
     const alone = known?.item.joints.length === 1; // then the object's name says enough
-    const name = h("span", { class: "name", title: joint.name }, alone ? known.item.name : joint.name);
+    const title = known ? `${joint.name}: ${motionOf(known.joint).toLowerCase()}` : joint.name;
+    const name = h("span", { class: "name", title }, alone ? known.item.name : joint.name);
     return { joint, object: known?.item.name ?? "", set, check, element: h("label", {}, name, badge, input, value) };
   }
 }

@@ -1,0 +1,21 @@
+/** What a joint does, in words: which way it slides, or on which side it turns, as seen by a person facing the front. */
+
+/** @typedef {import("../api-types").SceneItem} SceneItem */
+
+/**
+ * @param {SceneItem["joints"][number]} joint in the object's frame: x to the right, z up
+ */
+export function motionOf({ type, axis, origin }) {
+  const [x = 0, y = 0, z = 0] = axis;
+  if (type === "prismatic") {
+    if (Math.abs(x) > Math.max(Math.abs(y), Math.abs(z))) return x > 0 ? "Slides right" : "Slides left";
+    return Math.abs(z) > Math.abs(y) ? "Slides up" : "Slides out";
+  }
+  if (Math.abs(z) > Math.abs(x)) return (origin[0] ?? 0) < 0 ? "Hinged left" : "Hinged right";
+  return (origin[2] ?? 0) < 0 ? "Hinged below" : "Hinged above";
+}
+
+/** Whether it slides along its front, as doors on tracks do. @param {SceneItem["joints"][number]} joint */
+export function slidesSideways(joint) {
+  return ["Slides left", "Slides right"].includes(motionOf(joint));
+}
