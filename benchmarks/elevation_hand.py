@@ -18,6 +18,7 @@ import re
 import sys
 import tempfile
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,7 @@ def draw_by_hand(kitchen: Path, data: Path) -> dict[str, Any]:
         "hand": hand.counts,
         "edges_off_mm": {"median": round(float(np.median(wrong)), 1), "worst": round(max(wrong), 1)},
         "objects_of_the_scene": len(scene["items"]),
-        "joint_types": sorted(joint["type"] for item in scene["items"] for joint in item["joints"]),
+        "joints": Counter(joint["type"] for item in scene["items"] for joint in item["joints"]),
         "certified": certificate["passed"],
         "import_s": round(imported - began, 1),
         "drawing_s": round(drawn - imported, 1),

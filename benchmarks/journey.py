@@ -226,7 +226,8 @@ def _click_object(person: Person, name: str, category: str) -> None:
     assert box
     scale = min(box["width"] / facts["width"], box["height"] / facts["height"])
     left, top = (box["width"] - facts["width"] * scale) / 2, (box["height"] - facts["height"] * scale) / 2
-    person.click(canvas, position={"x": left + point["x"] * scale, "y": top + point["y"] * scale})
+    at = {"x": left + point["x"] * scale, "y": top + point["y"] * scale}
+    person.click(canvas, position=at, modifiers=["Control"])  # also where another one's mask is
     while len(person.ask(f"{person.project}/objects")) == before:
         page.wait_for_timeout(50)
 

@@ -37,10 +37,13 @@ export function markersOn(objects, coming, frame) {
  * @param {number} frame
  */
 export function masksOn(objects, masks, frame) {
-  return objects.sorted.flatMap((object) => {
+  return objects.sorted.flatMap((object, k) => {
     const mask = masks.on(object.id, frame)?.mask;
     if (!mask || objects.isHidden(object.id)) return [];
-    return [{ object: object.id, colour: rgbOf(objects.colour(object)), mask, current: object.id === objects.current }];
+    const { id, name } = object;
+    return [
+      { object: id, number: k + 1, name, colour: rgbOf(objects.colour(object)), mask, current: id === objects.current },
+    ];
   });
 }
 

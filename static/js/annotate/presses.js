@@ -14,6 +14,9 @@ export class Presses extends EventTarget {
   #edits;
   #player;
   #category;
+  #under;
+  /** Whether the next click makes a new object wherever it falls. */
+  #forced = false;
   #pinning = false;
   #batching = false;
 
@@ -22,13 +25,21 @@ export class Presses extends EventTarget {
    * @param {import("./edits.js").Edits} edits
    * @param {import("./player.js").Player} player
    * @param {() => string} category of the next object
+   * @param {(spot: Spot) => number[]} under the objects whose masks are there, the uppermost first
    */
-  constructor(objects, edits, player, category) {
+  constructor(objects, edits, player, category, under) {
     super();
     this.#objects = objects;
     this.#edits = edits;
     this.#player = player;
     this.#category = category;
+    this.#under = under;
+  }
+
+  /** The next click starts a new object, also on another's mask. */
+  startNew() {
+    this.#objects.choose(null);
+    this.#forced = true;
   }
 
   /** Whether the next click is the place of a comment. */
@@ -48,7 +59,25 @@ export class Presses extends EventTarget {
     if (this.#pinning) return this.#pin({ frame, x, y });
     if (this.#objects.current === null && label === 0)
       return say("Left click on the object first: a right click takes away from the chosen one.");
+    const other = label === 1 && !hold ? this.#otherAt({ x, y }) : null;
+    if (other) return this.#choose(other);
     this.#place([{ frame, x, y, label }], hold);
+  }
+
+  /** The object that a click means that falls on its mask, and not on the chosen one's. @param {Spot} spot */
+  #otherAt(spot) {
+    const under = this.#forced && this.#objects.current === null ? [] : this.#under(spot);
+    const [first] = under;
+    return first === undefined || under.includes(this.#objects.current ?? -1) ? null : this.#objects.get(first);
+  }
+
+  /** @param {import("./scene-objects.js").SceneObject} object */
+  #choose({ id, name }) {
+    const { chosen } = this.#objects;
+    this.#objects.choose(id);
+    say(`${name} is chosen: it is there already`, {
+      hint: chosen ? `Ctrl-click there belongs to ${chosen.name}` : "Ctrl-click or New object makes another one there",
+    });
   }
 
   /** @param {{ from: Spot, to: Spot, hold: boolean }} box */
@@ -72,6 +101,7 @@ export class Presses extends EventTarget {
    */
   #place(points, hold) {
     this.#batching = hold;
+    this.#forced = false;
     this.#edits.place(points, { category: this.#category(), infer: !hold });
   }
 

@@ -1,12 +1,21 @@
 /**
  * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
  * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id; while a brush is set "paint" path instead of boxes.
- * Zoom with the wheel or two fingers, pan with the middle button, Alt-drag or two fingers; a crosshair moved by arrows
- * replaces the mouse.
+ * Zoom with the wheel or two fingers, pan with the middle button, Space- or Alt-drag or two fingers; a crosshair moved by arrows
+ * replaces the mouse. Each mask carries its object's number, the chosen one and the one under the pointer their names.
  */
 
 import { h, LiveElement, wire } from "../dom.js";
-import { drawBox, drawClick, drawPath, drawCrosshair, drawPin, isOnClick, isOnPin } from "../lib/frame-marks.js";
+import {
+  drawBox,
+  drawClick,
+  drawPath,
+  drawCrosshair,
+  drawPin,
+  drawTag,
+  isOnClick,
+  isOnPin,
+} from "../lib/frame-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { decodeBox, paintBox } from "../lib/masks.js";
 import { Newest } from "../lib/newest.js";
@@ -16,9 +25,9 @@ import { clamped, fit, isInside, pinch, toImage, toScreen, zoom } from "../lib/v
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {import("../api-types").Point} Point */
 /** @typedef {import("../lib/gestures.js").At} At */
-/** @typedef {{ object: number, colour: [number, number, number], mask: MaskBits, current: boolean }} Layer */
+/** @typedef {{ object: number, number: number, name: string, colour: [number, number, number], mask: MaskBits, current: boolean }} Layer */
 /** @typedef {Point & { colour: string, number: number, object: number, current: boolean }} Marker */
-/** @typedef {{ box: MaskBits, bitmap: ImageBitmap, close(): void }} Painted */
+/** @typedef {{ layer: Layer, box: MaskBits, pixels: Uint8Array, bitmap: ImageBitmap, close(): void }} Painted */
 /** @typedef {{ id: number, x: number, y: number, text: string }} Pin */
 /** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
@@ -44,6 +53,10 @@ export class FrameCanvas extends LiveElement {
   /** @type {At | null} */
   #crosshair = null;
   #raw = false;
+  /** The object under the pointer. @type {number | null} */
+  #hovered = null;
+  /** Whether Space is held, so that a drag pans, and whether one did. */
+  #space = { held: false, panned: false };
   /** @type {{ tool: string, px: number } | null} */
   #brush = null;
   /** A stroke being drawn, or the corners of a polygon, in the frame. @type {At[]} */
@@ -130,6 +143,24 @@ export class FrameCanvas extends LiveElement {
     return this.#view.scale;
   }
 
+  /** Space is held, or was let go. @param {boolean} held @returns {boolean} whether a drag panned meanwhile */
+  holdSpace(held) {
+    const { panned } = this.#space;
+    if (held !== this.#space.held) this.#space = { held, panned: false };
+    return panned;
+  }
+
+  /** The objects whose masks are at a position of the frame, the uppermost first. @param {At} at @returns {number[]} */
+  objectsAt({ x, y }) {
+    const there = this.#painted.held.filter(({ box, pixels }) => {
+      const step = box.width / this.#size.width;
+      const [column, row] = [Math.floor(x * step) - box.left, Math.floor(y * step) - box.top];
+      const inside = column >= 0 && row >= 0 && column < box.box_width && row < box.box_height;
+      return inside && pixels[row * box.box_width + column] === 1;
+    });
+    return there.map(({ layer }) => layer.object).toReversed();
+  }
+
   fit() {
     this.#view = fit(this.#size, this.#room);
     this.#fitted = true;
@@ -177,6 +208,7 @@ export class FrameCanvas extends LiveElement {
       const step = (this.#size.width / box.width) * scale; // masks come at preview size
       context.drawImage(bitmap, x + box.left * step, y + box.top * step, box.box_width * step, box.box_height * step);
     }
+    for (const { layer, box } of this.#painted.held) this.#drawTag(context, layer, box);
     for (const outline of this.#outlines) drawOutline(context, this.#view, outline);
     for (const marker of this.#markers) drawClick(context, toScreen(this.#view, marker), marker);
     for (const pin of this.#pins) drawPin(context, toScreen(this.#view, pin));
@@ -191,13 +223,22 @@ export class FrameCanvas extends LiveElement {
     if (this.#crosshair) drawCrosshair(context, toScreen(this.#view, this.#crosshair));
   }
 
+  /** @param {CanvasRenderingContext2D} context @param {Layer} layer @param {MaskBits} box */
+  #drawTag(context, { object, number, name, colour, current }, box) {
+    const step = this.#size.width / box.width;
+    const middle = { x: (box.left + box.box_width / 2) * step, y: (box.top + box.box_height / 2) * step };
+    const named = current || object === this.#hovered;
+    drawTag(context, toScreen(this.#view, middle), named ? `${number} ${name}` : String(number), colour);
+  }
+
   // What is pressed
 
   /** @param {PointerEvent} event */
   #down(event) {
     this.#canvas.setPointerCapture(event.pointerId);
     const at = this.#at(event);
-    const pan = event.button === 1 || event.altKey;
+    const pan = event.button === 1 || event.altKey || this.#space.held;
+    this.#space.panned ||= this.#space.held;
     this.#gestures.press(event.pointerId, at, { pan, held: pan || this.#brush ? null : this.#markerAt(at) });
     if (event.button === 1) event.preventDefault();
   }
@@ -206,7 +247,7 @@ export class FrameCanvas extends LiveElement {
   #move(event) {
     const still = event.pointerType === "touch" ? STILL_TOUCH_PX : STILL_PX;
     const motion = this.#gestures.move(event.pointerId, this.#at(event), still);
-    if (!motion) return;
+    if (!motion) return this.#hover(this.#at(event));
     if (motion.kind === "pan") {
       const { scale, x, y } = this.#view;
       this.#see({ scale, x: x + motion.by.x, y: y + motion.by.y });
@@ -218,6 +259,14 @@ export class FrameCanvas extends LiveElement {
       if (!this.#path.length) this.#path = [this.#inFrame(motion.from)];
       this.#path.push(this.#inFrame(motion.to));
     }
+    this.#draw();
+  }
+
+  /** @param {At} at on the screen */
+  #hover(at) {
+    const hovered = this.objectsAt(toImage(this.#view, at))[0] ?? null;
+    if (hovered === this.#hovered) return;
+    this.#hovered = hovered;
     this.#draw();
   }
 
@@ -313,9 +362,10 @@ export class FrameCanvas extends LiveElement {
  * @param {number} opacity of the current object's
  * @returns {Promise<Painted>}
  */
-async function paint({ mask, colour, current }, opacity) {
+async function paint(layer, opacity) {
+  const { mask, colour, current } = layer;
   const pixels = await decodeBox(mask);
   const rgba = paintBox(pixels, mask.box_width, mask.box_height, colour, current ? opacity : 0.6 * opacity);
   const bitmap = await createImageBitmap(new ImageData(rgba, mask.box_width, mask.box_height));
-  return { box: mask, bitmap, close: () => bitmap.close() };
+  return { layer, box: mask, pixels, bitmap, close: () => bitmap.close() };
 }

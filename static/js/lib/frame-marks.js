@@ -35,6 +35,25 @@ export function drawClick(context, { x, y }, { colour, label, current }) {
 }
 
 /**
+ * What a mask is of: its number in the list, and its name where that is asked for.
+ * @param {CanvasRenderingContext2D} context
+ * @param {At} at
+ * @param {string} text
+ * @param {[number, number, number]} colour
+ */
+export function drawTag(context, { x, y }, text, [red, green, blue]) {
+  context.font = "600 12px system-ui, sans-serif";
+  const width = context.measureText(text).width + 12;
+  context.beginPath();
+  context.roundRect(x - width / 2, y - 9, width, 18, 5);
+  context.fillStyle = "rgb(16 19 26 / 82%)";
+  context.fill();
+  stroke(context, 1.5, `rgb(${red} ${green} ${blue})`);
+  context.fillStyle = WHITE;
+  context.fillText(text, x - width / 2 + 6, y + 4);
+}
+
+/**
  * A comment: a speech bubble whose tip is the spot.
  * @param {CanvasRenderingContext2D} context
  * @param {At} at

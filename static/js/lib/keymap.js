@@ -14,7 +14,7 @@ export const KEYMAP = [
   { keys: ["Shift+ArrowLeft", "c"], action: "back-ten", text: "Ten frames back", page: "annotate" },
   { keys: ["Home"], action: "first-frame", text: "First frame", page: "annotate" },
   { keys: ["End"], action: "last-frame", text: "Last frame", page: "annotate" },
-  { keys: ["Space"], action: "play", text: "Play or pause", page: "annotate" },
+  { keys: ["Space"], action: "play", text: "Play or pause; held, a drag moves the picture", page: "annotate" },
   { keys: ["]"], action: "next-prompt", text: "Next frame with a click of this object", page: "annotate" },
   { keys: ["["], action: "previous-prompt", text: "Previous frame with a click of this object", page: "annotate" },
   { keys: ["Enter"], action: "finish", text: "Finish this object; the next click starts a new one", page: "annotate" },
@@ -105,7 +105,7 @@ export const KEYMAP = [
   {
     keys: ["j"],
     action: "hinge",
-    text: "It turns on the side nearest to the pointer; again: inferred",
+    text: "It turns on, or slides to, the side nearest to the pointer; again: inferred",
     page: "elevation",
   },
   {

@@ -49,7 +49,13 @@ export class AnnotatePage extends LiveElement {
   #mosaic = new FrameMosaic();
   // What ties them together
   #player = new Player(this.#canvas, this.#strip);
-  #presses = new Presses(this.#objects, this.#edits, this.#player, () => this.#pane.category);
+  #presses = new Presses(
+    this.#objects,
+    this.#edits,
+    this.#player,
+    () => this.#pane.category,
+    (spot) => this.#canvas.objectsAt(spot),
+  );
   #parts = {
     objects: this.#objects,
     masks: this.#masks.stored,
@@ -136,7 +142,7 @@ export class AnnotatePage extends LiveElement {
     const { list, proposals } = this.#pane;
     const { comments } = this.#evidence;
     for (const action of ["undo", "redo"]) this.#on(this.#pane, action, () => this.act(action));
-    this.#on(list, "pick-object", (id) => this.#objects.choose(id));
+    this.#on(list, "pick-object", (id) => (id === null ? this.#presses.startNew() : this.#objects.choose(id)));
     this.#on(list, "toggle", (id) => this.#objects.toggle(id));
     this.#on(list, "delete", (id) => this.#edits.remove(id));
     this.#on(list, "stop", (id) => this.#edits.stopSegmenting(id));
@@ -300,6 +306,7 @@ export class AnnotatePage extends LiveElement {
     if (event.key === "Escape" && this.#presses.pinning) return void (this.#presses.pinning = false);
     if (event.key === "Escape" && this.#painter.tool) return this.#painter.use(null);
     if (event.key === "Enter" && this.#painter.close()) return event.preventDefault();
+    if (event.key === " ") return (event.preventDefault(), void this.#canvas.holdSpace(true)); // a tap plays: #onKeyUp
     const click = (/** @type {0 | 1} */ label) =>
       this.#canvas.crosshair && this.#presses.click({ ...this.#canvas.crosshair, label, hold: false });
     if (crosshairKey(event, this.#canvas, click)) return event.preventDefault();
@@ -309,6 +316,7 @@ export class AnnotatePage extends LiveElement {
   /** @param {KeyboardEvent} event */
   #onKeyUp(event) {
     if (event.key.toLowerCase() === "t") this.#canvas.showRaw(false);
+    if (event.key === " " && isForPage(event) && !this.#canvas.holdSpace(false)) this.act("play");
     if (event.key === "Control" || event.key === "Meta") this.#presses.release();
   }
 }
