@@ -40,7 +40,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
         members=sorted(queries.who_sees(session, project) - {owner}),
         objects=[
             DescribedObject(
-                **item.model_dump(include={"id", "name", "category", "colour", "deleted", "front", "frames"}),
+                **item.model_dump(include={"id", "name", "category", "colour", "deleted", "front", "frames", "run_name"}),
                 points=points[item.id or 0],
                 override=relative(overrides.get(item.id, {}), files.root),
                 verdicts=verdicts[item.id or 0],

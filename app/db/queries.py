@@ -73,6 +73,12 @@ class Drawn(NamedTuple):
     id: int
     name: str
     masks_key: str
+    run_name: str
+
+    @property
+    def result_name(self) -> str:
+        """As of SceneObject."""
+        return self.run_name or self.name
 
 
 class DrawnIn(NamedTuple):
@@ -87,7 +93,7 @@ _DRAWN_IN = sqlalchemy.select(col(Project.id), col(Project.work_path), col(Proje
     col(Project.id) == bindparam("project")
 )
 _DRAWN = (
-    sqlalchemy.select(col(SceneObject.id), col(SceneObject.name), col(SceneObject.masks_key))
+    sqlalchemy.select(col(SceneObject.id), col(SceneObject.name), col(SceneObject.masks_key), col(SceneObject.run_name))
     .where(col(SceneObject.project_id) == bindparam("project"), col(SceneObject.deleted).is_(False))
     .order_by(col(SceneObject.id))
 )

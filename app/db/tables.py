@@ -145,6 +145,12 @@ class SceneObject(SQLModel, table=True):
     front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
+    run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # in the last run; empty: as now
+
+    @property
+    def result_name(self) -> str:
+        """What its results are stored under: a rename leaves them where they are until the next run."""
+        return self.run_name or self.name
 
 
 class Point(SQLModel, table=True):

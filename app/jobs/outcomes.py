@@ -16,6 +16,7 @@ from app.db import history
 from app.db.queries import live_objects, newest_bundle
 from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
+from app.jobs.plans import NAMES
 from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject
@@ -51,7 +52,13 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
 def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
     """The bundle becomes a version, unless it is the same as the newest one."""
     adopt_bundle(session, project, files, job.payload.get("inputs", ""), kept)
-    write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
+    request = files.request(job.id or 0)
+    write_atomically(files.finished_prompts, request.with_name("prompts.json").read_bytes())
+    names = request.with_name(NAMES)
+    named: dict[str, str] = json.loads(names.read_text()) if names.is_file() else {}  # none beside an older version's request
+    for item in live_objects(session, project.id):
+        item.run_name = named.get(str(item.id), item.run_name)
+        session.add(item)
 
 
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:

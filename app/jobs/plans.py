@@ -9,7 +9,7 @@ from typing import Any
 from sqlmodel import Session
 
 from app.db.documents import overrides_document, prompts_document
-from app.db.queries import STAGES
+from app.db.queries import STAGES, live_objects
 from app.db.tables import Job, Project
 from app.files import ProjectFiles
 from app.process import python_module
@@ -42,6 +42,8 @@ def commands_of(settings: Settings) -> Commands:
     return Commands(worker=(*python_module("r2c2r_core.worker"), "--workers", str(settings.workers_a_job)))
 
 
+NAMES = "names.json"  # beside a request: what each object, by its number, is called in the run
+
 Planner = Callable[[Job, Project, ProjectFiles, Commands], list[Step]]
 
 _WEIGHTS = {"segment": 30.0, "generate": 30.0, "align": 25.0, "synthesize": 3.0, "warp": 4.0, "export": 8.0}
@@ -69,6 +71,7 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
     request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": project.inputs}
     write_json(path.with_name("prompts.json"), prompts_document(session, project.id))
     write_json(path.with_name("overrides.json"), overrides_document(session, project.id))
+    write_json(path.with_name(NAMES), {item.id or 0: item.name for item in live_objects(session, project.id)})
     write_json(path, request)
     return request
 

@@ -76,6 +76,7 @@ class CandidateGroup(Shape):
 
     object: int
     name: str
+    run_name: str  # what the last run called it, as do the scene's joints and the certificate
     category: str
     chosen: str
     chosen_by: str

@@ -119,7 +119,7 @@ def _adopt_objects(
 
 def _write_prompts(session: Session, item: SceneObject, entry: DescribedObject, _files: ProjectFiles) -> None:
     item.name, item.category, item.colour, item.deleted = entry.name, entry.category, entry.colour, False
-    item.front, item.frames = entry.front, entry.frames
+    item.front, item.frames, item.run_name = entry.front, entry.frames, entry.run_name
     session.add(item)
     session.exec(delete(Point).where(col(Point.object_id) == item.id))
     session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in entry.points)

@@ -53,22 +53,23 @@ def groups_of(
 def _group(
     files: ProjectFiles, kept: KeptFacts, project: Project, item: SceneObject, said: _Said
 ) -> schemas.CandidateGroup | None:
-    facts = kept.of("generate", item.name, _candidate_facts)
+    facts = kept.of("generate", item.result_name, _candidate_facts)
     if facts is None:
         return None
     override, verdicts = said.overrides.get(item.id or 0, {}), said.verdicts.get(item.id or 0, {})
     accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
     steps = said.steps.get(item.id, history.Steps())
-    placement = kept.of("align", item.name, plain)
+    placement = kept.of("align", item.result_name, plain)
     by_person: str | None = override.get("candidate")
     known = {c["candidate_id"] for c in facts["candidates"]}
     chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
     if placement and by_person and chosen != by_person:
         chosen = placement["candidate_id"]  # an uploaded mesh: its id is known once it was placed
-    address, version = f"/media/{project.id}/candidates/{item.id}", generate_key(files, item.name)
+    address, version = f"/media/{project.id}/candidates/{item.id}", generate_key(files, item.result_name)
     return schemas.CandidateGroup(
         object=item.id or 0,
         name=item.name,
+        run_name=item.result_name,
         category=item.category,
         chosen=chosen,
         chosen_by="person" if by_person else facts["chosen_by"],

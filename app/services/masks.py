@@ -303,21 +303,21 @@ def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
 
 def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, width: int) -> StoredMasks | None:
     """The last run's masks, when it ran with these clicks and this segmenter; made for the browser once."""
-    if _finished_key(files, segmenter, item.name) != item.masks_key:
+    if _finished_key(files, segmenter, item.result_name) != item.masks_key:
         return None
-    noun = noun_path(files.work, "segment", item.name)
+    noun = noun_path(files.work, "segment", item.result_name)
     if not noun.is_file():
         return None
-    kept = files.previews / "masks" / f"{item.name}-{noun.stat().st_mtime_ns:x}.jsonl"
+    kept = files.previews / "masks" / f"{item.result_name}-{noun.stat().st_mtime_ns:x}.jsonl"
     found = _stored(kept)
     if found is None or found.end != "done":
-        track: MaskTrack | None = Workspace(files.work).load_latest("segment", item.name)
+        track: MaskTrack | None = Workspace(files.work).load_latest("segment", item.result_name)
         if track is None:
             return None
-        for older in kept.parent.glob(f"{item.name}-*.jsonl"):
+        for older in kept.parent.glob(f"{item.result_name}-*.jsonl"):
             older.unlink(missing_ok=True)
         front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
-        mask_store.write(kept, _entries(track, width), track.backend, front, _run_others(files, item.name))
+        mask_store.write(kept, _entries(track, width), track.backend, front, _run_others(files, item.result_name))
         found = _stored(kept)
     return found if found is not None and found.backend == segmenter else None
 

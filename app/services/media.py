@@ -87,7 +87,7 @@ def _files(context: Context, project_id: str) -> ProjectFiles:
 def _object_files(context: Context, project_id: str, object_id: int) -> tuple[ProjectFiles, str]:
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        return context.files(project), queries.object_row(session, project_id, object_id, deleted=True).name
+        return context.files(project), queries.object_row(session, project_id, object_id, deleted=True).result_name
 
 
 def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int]]:

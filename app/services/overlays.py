@@ -50,12 +50,12 @@ def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectP
     best = sorted(found.masks.seen().tolist() if found else [], key=lambda seen: -seen[2] * seen[1])[: 6 * PHOTOS]
     spread = sorted(best)[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
     shown = [photo for frame, sure, _ in spread if (photo := _photo(files, int(frame), sure)) is not None]
-    fitted = _scene_object(files, "warp", item.name) or _scene_object(files, "synthesize", item.name)
+    fitted = _scene_object(files, "warp", item.result_name) or _scene_object(files, "synthesize", item.result_name)
     stages: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
     return schemas.ObjectPhotos(
         photos=sorted(shown, key=lambda photo: -photo.confidence),
-        version=_version(files, item.name),
-        of=[name for name, stage in stages.items() if _stored(files, stage, item.name)],
+        version=_version(files, item.result_name),
+        of=[name for name, stage in stages.items() if _stored(files, stage, item.result_name)],
         world_from_object=fitted.world_from_object.matrix.tolist() if fitted else None,
         dimensions_m=fitted.dimensions_m.tolist() if fitted else None,
     )
@@ -67,7 +67,7 @@ def overlay(
     """The object drawn for one frame: a PNG with a transparent ground, kept until the object is placed or fitted anew."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        name = queries.object_row(session, project_id, object_id, deleted=True).name
+        name = queries.object_row(session, project_id, object_id, deleted=True).result_name
         files = context.files(project)
     target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name)}.png"
     return media.kept_file(files, target, lambda: _drawn(files, name, index, of, look))
@@ -77,7 +77,7 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
     """The point of the object's mesh, in the world, under a pixel of the stored frame; None where the mesh is not there."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        name = queries.object_row(session, project_id, object_id).name
+        name = queries.object_row(session, project_id, object_id).result_name
         files = context.files(project)
     frame = views.frame_of(files, index)
     if frame is None:

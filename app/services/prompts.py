@@ -12,12 +12,14 @@ from app.db.documents import readable_front
 from app.db.engine import reading, writing
 from app.db.tables import Point, Project, SceneObject
 from app.errors import Conflict, NotFound
+from app.files import ProjectFiles
 from app.services import masks
 from app.services.context import Context
 from app.services.projects import frame_table
 from r2c2r_core.errors import PromptError
 from r2c2r_core.schema.prompts import PromptsFileMask
 from r2c2r_core.segment.prompts import check_mask_size
+from r2c2r_core.workspace import noun_path
 
 
 class Change(NamedTuple):
@@ -80,6 +82,8 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
         wanted = _wanted(session, item, body)
         text = ", ".join(_said_of(item, key, value) for key, value in wanted.items()) or "nothing"
         with history.change(session, item, "prompts", "edit", text, who=context.who):
+            if "name" in wanted and not item.run_name and _has_results(context.files(project), item.name, str(wanted["name"])):
+                item.run_name = item.name
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
@@ -338,6 +342,11 @@ def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> d
     if "front" in body.model_fields_set and front != item.front:
         wanted["front"] = front
     return wanted
+
+
+def _has_results(files: ProjectFiles, *names: str) -> bool:
+    """Whether a run left something under one of these names: what stays the object's, or must not become it."""
+    return any(noun_path(files.work, "segment", name).is_file() for name in names)
 
 
 def _said_of(item: SceneObject, key: str, value: object) -> str:

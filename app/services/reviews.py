@@ -46,7 +46,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         refuse_overtaken(context, session, project, item, body)
-        facts = facts_of(context.files(project), item.name)
+        facts = facts_of(context.files(project), item.result_name)
         before = history.override_data(session, item)
         known = {c["candidate_id"] for c in facts["candidates"]} if facts else set()
         if body.candidate not in known | set(before.get("rejected", [])):
@@ -158,7 +158,7 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
     wanted = merged.get("candidate")
     if wanted is None or (Path(wanted).is_relative_to(files.uploads) and inside(files.uploads, wanted).is_file()):
         return
-    facts = facts_of(files, item.name)
+    facts = facts_of(files, item.result_name)
     if facts is None or wanted not in {c["candidate_id"] for c in facts["candidates"]}:
         raise OverrideError(f"{item.name} has no candidate '{wanted}'", hint="choose one of its candidates, or upload a mesh")
 

@@ -32,7 +32,7 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
         project = queries.project_row(session, project_id)
         files = context.files(project)
         mine = select(SceneObject).where(SceneObject.project_id == project_id)
-        ids = {item.name: item.id for item in session.exec(mine) if not item.deleted}
+        mine_by_name = {item.result_name: item for item in session.exec(mine) if not item.deleted}
         bundle = queries.newest_bundle(session, project_id)
     scene = fitted(files)
     if scene is None:
@@ -41,7 +41,7 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
     described = manifest(files.bundles / bundle.path) if bundle else {}
     failures = described.get("failures") if isinstance(described.get("failures"), dict) else {}
     return schemas.SceneSummary(
-        items=[_item(entry, ids.get(entry["name"]), files) for entry in scene["objects"]],
+        items=[_item(entry, mine_by_name.get(entry["name"]), files) for entry in scene["objects"]],
         failures={str(name): str(line) for name, line in (failures or {}).items()},
         warnings=scene["warnings"],
         stages=[_stage(entry, taken) for entry in described.get("stages", [])],
@@ -79,11 +79,11 @@ def _mask_count(track: MaskTrack) -> int:
     return len(track.masks)
 
 
-def _item(entry: dict[str, Any], number: int | None, files: ProjectFiles) -> schemas.SceneItem:
+def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles) -> schemas.SceneItem:
     placement = views.facts(files, "align", entry["name"], plain)
     return schemas.SceneItem(
-        object=number,
-        name=entry["name"],
+        object=item.id if item else None,
+        name=item.name if item else entry["name"],
         category=entry["category"],
         fixture=entry["fixture"],
         dimensions_m=entry["dimensions_m"],

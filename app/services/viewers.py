@@ -49,15 +49,15 @@ def show(context: Context, project_id: str, session_id: str, body: schemas.Viewe
     wish: dict[str, Any] = body.model_dump(exclude={"object"})
     files = context.files(project)
     if item is not None:
-        wish["name"] = item.name
+        wish["name"] = item.result_name
     if body.mode == "candidate":
         if item is None:
             raise NotReady("a candidate of which object?", hint="give the object")
         wish["candidate"] = body.candidate or _chosen(context, project_id, item.id or 0)
-        wish["rotation"] = upright(files, item.name, wish["candidate"]).tolist()
+        wish["rotation"] = upright(files, item.result_name, wish["candidate"]).tolist()
     if body.mode == "scene":
         with reading(context.engine) as session:
-            wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.name if item else None)
+            wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.result_name if item else None)
         folder: Path | None = bundles.folder(context, project_id)
         wish["bundle"] = str(folder) if folder else None
     return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, session_id, wish))

@@ -111,6 +111,7 @@ export interface Candidate {
 export interface CandidateGroup {
   object: number;
   name: string;
+  run_name: string;
   category: string;
   chosen: string;
   chosen_by: string;
@@ -173,6 +174,7 @@ export interface Category {
   name: string;
   label: string;
   joint: string;
+  sideways: boolean;
 }
 
 /** The proof in the newest bundle. */

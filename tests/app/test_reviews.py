@@ -273,3 +273,33 @@ def test_a_correction_that_is_no_number_is_refused(reviewed: Reviewed, what: str
     body = json.dumps({what: value, "rerun": False}).replace('"nan"', "NaN")
     refused = web.client.patch(at, content=body, headers={"content-type": "application/json"})
     assert (refused.status_code, web.get(at)[what]) == (422, None)
+
+
+def test_a_rename_keeps_masks_candidates_verdicts_and_the_scenes_object_until_the_next_run(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    at, address = f"/api/projects/{project}", f"/api/projects/{project}/objects/{number}"
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted"})
+
+    def seen() -> Any:
+        (lane,) = [lane for lane in web.get(f"{at}/lanes") if lane["object"] == number]
+        (group,) = web.get(f"{at}/candidates")
+        (item,) = web.get(f"{at}/scene")["items"]
+        photos = web.get(f"{address}/photos")
+        return lane["frames"], group["chosen"], group["accepted"], item["object"], item["mask_frames"], len(photos["photos"])
+
+    before = seen()
+    assert (before[0], before[2], before[3]) == ([3, 7], "c0", number)
+    web.patch(address, {"name": "cutlery"})
+    assert seen() == before
+    assert [item["name"] for item in web.get(f"{at}/scene")["items"]] == ["cutlery"]
+    assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "drawer_1")]
+    (other,) = [item for item in web.get(f"{at}/objects") if item["id"] != number]
+    web.patch(f"{at}/objects/{other['id']}", {"name": "drawer_1"})  # a name that is free; its results are another's
+    assert seen() == before
+    web.post(f"{at}/undo", {"object": other["id"]})
+    web.post(f"{at}/undo", {"object": number})
+    assert seen() == before
+    web.patch(address, {"name": "cutlery"})
+    web.job(run(web, project), "done")
+    finish(web.settings.data_dir / "projects" / project / "work", "cutlery")
+    assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "cutlery")]

@@ -27,7 +27,7 @@ import { findingsOf, placement } from "./evidence.js";
 export function panel(objects, decisions, asked, correcting) {
   const { group, item, groups, certificate, candidate } = objects;
   if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
-  const names = groups.map(({ name }) => name);
+  const names = groups.map(({ run_name }) => run_name);
   const told = { show: asked.show, verdict: decisions.judge.bind(decisions) };
   const [used, ...rest] = cards(group, candidate, told);
   return [
@@ -35,7 +35,7 @@ export function panel(objects, decisions, asked, correcting) {
     used ?? "",
     choice(group),
     group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
-    findingsOf(certificate, group.name, names),
+    findingsOf(certificate, group.run_name, names),
     corrections(group, item, { move: asked.move, open: correcting }, (patch) => decisions.correct(patch)),
     rest.length ? h("h3", {}, counted(rest.length, "other candidate")) : "",
     ...rest,

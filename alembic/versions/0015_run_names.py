@@ -1,0 +1,18 @@
+"""What an object was called in the last run, where its results are."""
+
+import sqlalchemy as sa
+
+from alembic import op
+
+revision = "0015"
+down_revision = "0014"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.add_column("objects", sa.Column("run_name", sa.String(), nullable=False, server_default=""))
+
+
+def downgrade() -> None:
+    op.drop_column("objects", "run_name")
