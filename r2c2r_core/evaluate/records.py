@@ -152,20 +152,26 @@ def _pose(entry: dict[str, Any]) -> Any:
 
 
 def _joint(entry: dict[str, Any], world_from_file: Rigid3) -> JointRecord:
-    axis = _vector(entry["axis"])
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9:
-        raise ValueError("a joint axis of length 0")
+    origin, axis = joint_line(entry["origin"], entry["axis"], world_from_file)
     return JointRecord(
         name=str(entry.get("name", "")),
         type=str(entry["type"]),
-        axis=world_from_file.turn(axis[None] / length)[0],
-        origin=world_from_file.apply(_vector(entry["origin"])[None])[0],
+        axis=axis,
+        origin=origin,
         lower=float(entry["lower"]),
         upper=float(entry["upper"]),
         limit_source=str(entry.get("source", {}).get("limits", "truth")),
         motion=_true_motion(entry) if "states" in entry else _found_motion(entry.get("motion")),
     )
+
+
+def joint_line(origin: Any, axis: Any, world_from_file: Rigid3) -> tuple[Vector3, Vector3]:
+    """A point and the unit direction of a file's axis, in the world; raises ValueError or TypeError for what is neither."""
+    direction = _vector(axis)
+    length = float(np.linalg.norm(direction))
+    if length < 1e-9:
+        raise ValueError("a joint axis of length 0")
+    return world_from_file.apply(_vector(origin)[None])[0], world_from_file.turn(direction[None] / length)[0]
 
 
 def _true_motion(entry: dict[str, Any]) -> MotionRecord:

@@ -16,6 +16,7 @@ _COLUMNS = (
     ("yaw", "yaw deg", "{:.1f}"),
     ("joint_type", "type", "{:.2f}"),
     ("hinge_side", "hinge", "{:.2f}"),
+    ("axis", "axis deg", "{:.2f}"),
     ("pivot", "pivot mm", "{:.0f}"),
     ("range_ratio", "range", "{:.2f}"),
     ("state", "states", "{:.2f}"),

@@ -8,6 +8,7 @@ from r2c2r_core.ingest.above import WithAbove, borrowed_by, with_folder_above
 from r2c2r_core.ingest.files import Files, SubFiles, open_files, top_folders
 from r2c2r_core.ingest.readers import (
     arkitscenes,
+    arti4d,
     nerfstudio,
     polycam,
     record3d,
@@ -38,6 +39,7 @@ READERS: tuple[Reader, ...] = (
     tum.READER,
     redwood.READER,
     nerfstudio.READER,
+    arti4d.READER,
 )
 """The project's own; `readers()` also has those of other packages."""
 

@@ -14,6 +14,7 @@ from .tiny import TinyRoom, integer_centred, write_seven_scenes, write_tum, zip_
 from .tiny_formats import (
     told,
     write_arkitscenes,
+    write_arti4d,
     write_nerfstudio,
     write_polycam,
     write_redwood,
@@ -33,6 +34,23 @@ def test_arkitscenes_images_between_poses_are_left_out(tmp_path):
     assert [f.index for f in recording.frames] == list(range(0, 24, 2))
     assert told(recording, "12 a pose missing")
     assert told(recording, "turned by 90 deg")
+
+
+# Arti4D
+
+
+def test_a_sequence_of_arti4d_that_was_filmed_upside_down_is_turned_back(tmp_path):
+    recording = open_recording(write_arti4d(tmp_path / "a", SMALL, flipped=True))
+    assert told(recording, "hangs upside down")
+    for frame, pose in zip(recording.frames, SMALL.poses(), strict=True):
+        assert np.allclose(frame.capture_from_camera.matrix, pose.matrix, atol=1e-6)
+    assert not open_recording(write_arti4d(tmp_path / "b", SMALL)).notices
+
+
+def test_arti4d_without_its_calibration_says_which_file_is_missing(tmp_path):
+    with pytest.raises(CaptureError, match=r"tf\*\.json") as caught:
+        open_recording(write_arti4d(tmp_path / "a", SMALL, tf=False))
+    assert "azure_tf.json" in caught.value.hint
 
 
 # ScanNet

@@ -15,6 +15,7 @@ from r2c2r_core.ingest.readers.table import open_recording
 from .tiny import YUP_FROM_ZUP, TinyRoom, arkit_rows, write_exr, write_r3d, write_seven_scenes, write_tum, zip_folder
 from .tiny_formats import (
     write_arkitscenes,
+    write_arti4d,
     write_nerfstudio,
     write_polycam,
     write_redwood,
@@ -57,8 +58,10 @@ WRITERS = {
     "nerfstudio": write_nerfstudio,
     "3dmatch": write_threedmatch,
     "redwood": write_redwood,
+    "arti4d": write_arti4d,
 }
 KINDS = ("r3d", "r3d-folder", "exr", "exr-below", *WRITERS, "7scenes-zip", "stray-zip", "polycam-zip", "3dmatch-zip")
+KNOW_NO_GRAVITY = ("3dmatch", "3dmatch-zip", "redwood", "arti4d")
 INTERPOLATED = ("tum", "arkitscenes")
 
 
@@ -97,7 +100,7 @@ def test_every_format_gives_each_frame_its_own_upright_picture(kind, tmp_path):
 
 
 def depth_size(kind: str) -> tuple[int, int]:
-    registered = any(kind.startswith(name) for name in ("7scenes", "tum", "3dmatch", "redwood"))
+    registered = any(kind.startswith(name) for name in ("7scenes", "tum", "3dmatch", "redwood", "arti4d"))
     return ROOM.rgb_size if registered else ROOM.depth_size
 
 
@@ -107,7 +110,7 @@ def world_of(recording: Recording) -> np.ndarray:
     return first @ np.linalg.inv(recording.frames[0].capture_from_camera.matrix)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if "3dmatch" not in kind and "redwood" not in kind])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in KNOW_NO_GRAVITY])
 def test_a_format_that_knows_gravity_says_so(kind, tmp_path):
     recording = open_recording(write(kind, tmp_path))
     up_world = world_of(recording)[:3, :3] @ recording.up_capture

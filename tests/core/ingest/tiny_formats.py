@@ -206,6 +206,39 @@ def write_nerfstudio(folder: Path, room: TinyRoom, *, depth: bool = True, npy: b
     return folder
 
 
+def write_arti4d(folder: Path, room: TinyRoom, *, flipped: bool = False, tf: bool = True) -> Path:
+    """A raw sequence of Arti4D: poses are of a tracked base; `flipped` scenes were filmed upside down and turned back."""
+    for name in ("rgb", "depth", "odom"):
+        (folder / name).mkdir(parents=True)
+    base_from_depth, depth_from_rgb = TILTED, Rigid3(np.eye(3), np.array([0.03, 0.001, -0.002]))
+    turned = Rigid3(np.diag([-1.0, -1.0, 1.0]), np.zeros(3)) if flipped else Rigid3()
+    rows = ["timestamp, x, y, z, qx, qy, qz, qw"]
+    for k, pose in enumerate(room.poses()):
+        time_s = 1_744_364_672 + k / 30
+        stamp = f"{time_s:.9f}".replace(".", "")
+        (folder / "rgb" / f"rgb_{stamp}.jpg").write_bytes(jpeg(room.image(pose, room.camera)))
+        cv2.imwrite(str(folder / "depth" / f"depth_{stamp}.png"), millimetres(room.depth(pose, room.camera)))
+        base = pose @ turned @ (base_from_depth @ depth_from_rgb).inverse
+        numbers = [*base.translation, *Rotation.from_matrix(base.rotation).as_quat()]
+        rows.append(", ".join([f"{time_s:.9f}", *(f"{n:.12f}" for n in numbers)]))
+    (folder / "odom" / f"{folder.name}.csv").write_text("\n".join(rows))
+    for name in ("rgb", "depth"):
+        matrix = ", ".join(str(n) for n in integer_centred(room.camera).ravel())
+        text = f"header:\n  seq: 1\nheight: {room.camera.height}\nwidth: {room.camera.width}\nD: (0.0, 0.0)\nK: ({matrix})\n"
+        (folder / name / "camera_info.txt").write_text(text)
+    if tf:
+        tree = {"base_T_depth": _ros_transform(base_from_depth), "depth_T_rgb": _ros_transform(depth_from_rgb)}
+        (folder / "azure_tf.json").write_text(json.dumps(tree))
+    return folder
+
+
+def _ros_transform(pose: Rigid3) -> dict[str, dict[str, float]]:
+    return {
+        "rotation": dict(zip("xyzw", Rotation.from_matrix(pose.rotation).as_quat().tolist(), strict=True)),
+        "translation": dict(zip("xyz", pose.translation.tolist(), strict=True)),
+    }
+
+
 def millimetres(depth_m: np.ndarray) -> np.ndarray:
     """uint16 millimetres."""
     return np.rint(depth_m * 1000).astype(np.uint16)

@@ -1,0 +1,153 @@
+"""Arti4D (CoRL 2025), raw: rgb/*.jpg, depth/*.png in mm, rgb|depth/camera_info.txt, odom/SEQUENCE.csv, and *tf*.json too.
+
+The layout is that of the authors' own loader (robot-learning-freiburg/artipoint, dataloader/arti4d.py): file names end in
+_<nanoseconds>, poses are of the tracked base in seconds, and a camera's is base * base_T_depth * depth_T_rgb. Depth is
+registered to colour. Some scenes were filmed with the camera upside down and their images turned back: a loader is told so;
+here it is seen from poses by which the room would hang from its floor. Pixel centres lie at integers.
+"""
+
+import csv
+import io
+import re
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
+from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_quaternion, read_json_object, read_numbers
+from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
+
+_COLOUR, _DEPTH = r"rgb/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.jpe?g", r"depth/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.png"
+_ODOMETRY, _CALIBRATION = r"odom/[^/]+\.csv", r"[^/]*tf[^/]*\.json"
+_APART_S, _GAP_S = 0.05, 0.1  # a Kinect's frames are 33 ms apart, and its trackers' poses closer
+_COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw")
+_TURNED_BACK = Rigid3(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
+_HANGS = -0.5  # mean height of the images' up on world's: from here on they are upside down
+
+
+def open_arti4d(files: Files) -> Recording:
+    """One raw sequence of Arti4D; raises CaptureError."""
+    colour, depth = _stamped(files, _COLOUR), _stamped(files, _DEPTH)
+    if not colour or not depth:
+        raise CaptureError(f"{files.source}: no image in rgb/ or depth/ is named by its time", hint="copy the sequence again")
+    times = dict(enumerate(sorted(colour)))
+    odometry = next(name for name in sorted(files.names()) if re.fullmatch(_ODOMETRY, name))
+    calibration = _calibration_name(files)
+    trajectory, base_from_camera = _trajectory(files, odometry), _base_from_camera(files, calibration)
+    based = {n: trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for n, t in times.items()}
+    poses = {n: pose @ base_from_camera for n, pose in based.items() if pose is not None}
+    hangs = _hangs(list(poses.values()))
+    if hangs:
+        poses = {n: pose @ _TURNED_BACK for n, pose in poses.items()}
+    found = Found(
+        colour={n: colour[t] for n, t in times.items()},
+        depth=named_at(times, depth, _APART_S),
+        poses=poses,
+        times_s=times,
+    )
+    rgb_camera = _camera(files, "rgb/camera_info.txt", first_size(files, found.colour.values(), "colour image"))
+    depth_camera = _camera(files, "depth/camera_info.txt", first_size(files, found.depth.values(), "depth image"))
+    frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
+    turned = ("by its poses the camera hangs upside down: the images are taken for turned back by 180 deg",) if hangs else ()
+    return Recording(
+        format="Arti4D",
+        files=files,
+        frames=frames,
+        colour_of=partial(colour_file, files),
+        depth_of=partial(depth_file, files, 1000.0),
+        up_capture=None,
+        notices=(*turned, *left_out),
+        other_names=("rgb/camera_info.txt", "depth/camera_info.txt", odometry, calibration),
+    )
+
+
+def _stamped(files: Files, pattern: str) -> dict[float, str]:
+    """Files by their times, seconds."""
+    matches = ((re.fullmatch(pattern, name), name) for name in files.names())
+    return {_seconds(match.group(1)): name for match, name in matches if match}
+
+
+def _seconds(stamp: str) -> float:
+    """Ten digits are seconds, as of a Unix clock until the year 2286; the rest are their decimals."""
+    return float(stamp) if "." in stamp else float(f"{stamp[:10]}.{stamp[10:]}")
+
+
+def _calibration_name(files: Files) -> str:
+    names = sorted(name for name in files.names() if re.fullmatch(_CALIBRATION, name))
+    if not names:
+        raise CaptureError(
+            f"{files.source}: no calibration between tracker and camera (*tf*.json)",
+            hint="copy meta/calibration/azure_tf.json of the data set beside rgb/",
+        )
+    return names[0]
+
+
+def _trajectory(files: Files, name: str) -> Trajectory:
+    """The tracked base's poses by time."""
+    rows = csv.DictReader(io.StringIO(files.read(name).decode("utf-8", errors="replace")), skipinitialspace=True)
+    timed = []
+    for row in rows:
+        values = read_numbers(" ".join(str(row.get(column)) for column in _COLUMNS).encode())
+        pose = None if values is None or values.size != len(_COLUMNS) else pose_of_quaternion(values[1:])
+        if values is not None and pose is not None and np.isfinite(values[0]):
+            timed.append((float(values[0]), pose))
+    if not timed:
+        raise CaptureError(f"{files.source}/{name}: no line of {','.join(_COLUMNS)}", hint="check the odometry file")
+    timed.sort(key=lambda each: each[0])
+    return Trajectory(np.array([time_s for time_s, _ in timed]), [pose for _, pose in timed])
+
+
+def _base_from_camera(files: Files, name: str) -> Rigid3:
+    document = read_json_object(files, name)
+    return _transform(document, "base_T_depth", files, name) @ _transform(document, "depth_T_rgb", files, name)
+
+
+def _transform(document: dict[str, Any], key: str, files: Files, name: str) -> Rigid3:
+    """One transform of the calibration: translation {x, y, z}, rotation {x, y, z, w}."""
+    try:
+        entry = document[key]
+        numbers = [entry["translation"][axis] for axis in "xyz"] + [entry["rotation"][axis] for axis in "xyzw"]
+        pose = pose_of_quaternion(np.array(numbers, dtype=np.float64))
+    except (KeyError, TypeError, ValueError):
+        pose = None
+    if pose is None:
+        raise CaptureError(
+            f"{files.source}/{name}: {key} is no transform", hint="expected translation {x, y, z} and rotation {x, y, z, w}"
+        )
+    return pose
+
+
+def _hangs(poses: list[Rigid3]) -> bool:
+    """Whether the images' up points down, in a world whose +Z is up."""
+    return bool(poses) and float(np.mean([-pose.rotation[2, 1] for pose in poses])) < _HANGS
+
+
+def _camera(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
+    """The camera of ROS's CameraInfo printed as text: a line `K: (fx, 0, cx, 0, fy, cy, 0, 0, 1)`."""
+    match = re.search(r"^\s*K\s*:\s*[\[(]([^\])]*)[\])]", files.read(name).decode("utf-8", errors="replace"), re.MULTILINE)
+    matrix = None if match is None else read_numbers(match.group(1).encode())
+    if matrix is None or matrix.size != 9 or not (np.isfinite(matrix).all() and min(matrix[0], matrix[4]) > 0):
+        raise CaptureError(
+            f"{files.source}/{name}: no line K of nine numbers", hint="expected K: (fx, 0, cx, 0, fy, cy, 0, 0, 1)"
+        )
+    return integer_centred(matrix[0], matrix[4], matrix[2], matrix[5], size)
+
+
+READER = Reader(
+    name="Arti4D",
+    parts=(
+        Part("rgb/NAME_TIME.jpg", _COLOUR),
+        Part("depth/NAME_TIME.png", _DEPTH),
+        Part("rgb/camera_info.txt", r"rgb/camera_info\.txt"),
+        Part("depth/camera_info.txt", r"depth/camera_info\.txt"),
+        Part("odom/SEQUENCE.csv", _ODOMETRY),
+    ),
+    open=open_arti4d,
+)
