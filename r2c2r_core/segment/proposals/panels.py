@@ -39,11 +39,6 @@ class Params:
         "by which the doors of one cabinet may differ",
         source="they are cut alike; two cabinets beside each other seldom are",
     )
-    faint_lines: float = param(0.45, "σ", "mean strength of the four sides that says nothing")
-    clear_lines: float = param(0.9, "σ", "mean strength of the four sides that says all")
-    faintest_line: float = param(0.1, "σ", "strength of the faintest side that says nothing")
-    faintest_clear: float = param(0.6, "σ", "strength of the faintest side that says all")
-    unoutlined: float = param(0.3, "share", "of its confidence that a panel with one side missing keeps")
     without_handle: float = param(0.6, "share", "of its confidence that a panel without a handle keeps")
     unseen: float = param(0.3, "share", "of a panel that depth saw, that says nothing for it")
     seen: float = param(0.8, "share", "of a panel that depth saw, that says all for it")
@@ -170,21 +165,23 @@ def _odd_one_out(mates: list[Panel]) -> bool:
     return bool(handles) and all(handle is not None and handle.height > upright * handle.width for handle in handles)
 
 
-def outlined(front: Front) -> float:
-    """0..1: lines on its four sides, and a handle."""
-    params, edges = tuned(Params), edge_strengths(front)
-    mean = (np.mean(edges) - params.faint_lines) / (params.clear_lines - params.faint_lines)
-    least = (min(edges) - params.faintest_line) / (params.faintest_clear - params.faintest_line)
-    lines = np.clip(mean, 0, 1) * np.clip(least, params.unoutlined, 1)
-    handle = front.handle.confidence if front.handle is not None else 0.0
-    return float(lines * (params.without_handle + (1 - params.without_handle) * handle))
+def outlined(front: Front, *, stands: bool = False) -> float:
+    """The probability that its sides are edges of a front: the faintest one's, as one light and one colour err on all alike.
+
+    The foot of what stands lies in shadow, and depth saw what it stands on.
+    """
+    left, right, top, bottom = edge_strengths(front)
+    return min(left, right, top) if stands else min(left, right, top, bottom)
 
 
 def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
-    """0..1: outlined, flat where depth saw it, and no wall."""
+    """0..1: outlined, with a handle, flat where depth saw it, and no wall."""
     params = tuned(Params)
+    handle = front.handle.confidence if front.handle is not None else 0.0
+    handled = params.without_handle + (1 - params.without_handle) * handle
     flat = np.clip((front.run.seen[area].mean() - params.unseen) / (params.seen - params.unseen), 0, 1)
-    return float(outlined(front) * flat * (params.on_wall if is_on_wall(front.run, room, params.shallowest_m) else 1.0))
+    free = params.on_wall if is_on_wall(front.run, room, params.shallowest_m) else 1.0
+    return float(outlined(front) * handled * flat * free)
 
 
 def is_on_wall(run: Run, room: Room, shallowest_m: float) -> bool:

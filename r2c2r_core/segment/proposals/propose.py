@@ -165,7 +165,7 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     cell, cell_m = found.front.cell, found.front.run.grid.cell_m
     off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
     front = replace(found.front, depth_m=min(found.front.depth_m, kind.depth.high))
-    return [Panel(front, kind.name, outlined(front) * float(np.exp(-(off @ off) / params.odd_size)))]
+    return [Panel(front, kind.name, outlined(front, stands=True) * float(np.exp(-(off @ off) / params.odd_size)))]
 
 
 # Presenting: the frame that shows it best, and a click there that means it

@@ -1,3 +1,5 @@
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,9 @@ from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.proposals import panels
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front, name_thing
 from r2c2r_core.segment.proposals.propose import is_taken
 from r2c2r_core.segment.runs.handles import GridHandle
@@ -106,3 +110,11 @@ def test_plinths_walls_and_fillers_are_unusual_fronts(width: float, height: floa
 )
 def test_size_names_a_thing(extent: tuple[float, float, float], base: float, category: str) -> None:
     assert name_thing(np.array(extent), base) == category
+
+
+def test_what_stands_needs_no_edge_at_its_foot_and_a_front_needs_all_four(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A refrigerator's foot lies in shadow: the network sees no edge there."""
+    monkeypatch.setattr(panels, "edge_strengths", lambda _: (0.96, 0.97, 0.98, 0.12))
+    front = cast(Front, None)  # of which only the edges are asked
+    assert panels.outlined(front, stands=True) == 0.96
+    assert panels.outlined(front) == 0.12
