@@ -8,15 +8,17 @@ way is named, it is not the door's defect.
 import logging
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from r2c2r_core.export.alone import leave_alone
+from r2c2r_core.export.alone import Left, leave_alone
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, Touch, body_name, free_bodies, joint_names, touches
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.export.sweeps import examine_joint
 from r2c2r_core.export.together import Meeting, all_together, meetings
+from r2c2r_core.failing import apart
 from r2c2r_core.model.report import Finding, JointResult
 from r2c2r_core.progress import SILENT, Progress
 
@@ -52,27 +54,44 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
         solid, loose = compiled(mjcf, strict=True, keep_free=True), compiled(mjcf, strict=True, keep_free=True, loosen=True)
     except (ET.ParseError, ValueError) as error:
         return Simulation(findings=(finding("mjcf-compile", "scene.xml", str(error).partition("\n")[0]),))
-    rest = touches(solid, {})
-    findings = [*_rest_findings(rest), *_fixed_overlaps(loose, rest)]
+    findings: list[Finding] = []
+    deepest_m, met, together, left = _NAN, list[Meeting](), _NAN, Left({}, _NAN, [])
+    with _apart("scene.xml", findings):
+        rest = touches(solid, {})
+        deepest_m = max([0.0, *(touch.depth_m for touch in rest)])
+        findings += [*_rest_findings(rest), *_fixed_overlaps(loose, rest)]
     joints = []
     for name in progress.part(0.0, 0.7).each(joint_names(strict), "joint"):
-        result, notes = examine_joint(strict, solid, name)
+        result, notes = JointResult(joint=name, deepest_penetration_m=_NAN, travel_reached=_NAN), list[Finding]()
+        with _apart(name, findings):
+            result, notes = examine_joint(strict, solid, name)
         joints.append(result)
         findings += notes
     progress.at(0.7, "opening joints together")
-    met = meetings(strict)
-    together = all_together(strict)
+    with _apart("joints together", findings):
+        met = meetings(strict)
+        together = all_together(strict)
     progress.at(0.8, "leaving everything alone")
-    left = leave_alone(shipped)
+    with _apart("left alone", findings):
+        left = leave_alone(shipped)
     return Simulation(
         findings=(*findings, *(one.finding for one in met), *left.findings),
         joints=tuple(_with_meetings(result, met) for result in joints),
-        rest_penetration_m=max([0.0, *(touch.depth_m for touch in rest)]),
+        rest_penetration_m=deepest_m,
         together_penetration_m=together,
         drift_m=left.drift_m,
         realtime_factor=left.realtime_factor,
         free=tuple(body_name(shipped, body) for body in sorted(free_bodies(shipped))),
     )
+
+
+@contextmanager
+def _apart(where: str, findings: list[Finding]) -> Iterator[None]:
+    """One test: what it may end in is a finding, and ends no other test."""
+    failed: dict[str, str] = {}
+    with apart("certificate", where, failed):
+        yield
+    findings += [finding("untested", where, message) for message in failed.values()]
 
 
 def _rest_findings(rest: list[Touch]) -> Iterator[Finding]:

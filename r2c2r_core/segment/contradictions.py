@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from r2c2r_core.arrays import Mask
+from r2c2r_core.failing import apart
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.names import category_of
@@ -61,39 +62,47 @@ class Params:
 def find_contradictions(
     tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], walls: Sequence[Wall]
 ) -> tuple[Contradiction, ...]:
-    """All of them, those between two objects first; objects without a track are left out."""
+    """All of them, those between two objects first; objects without a track are left out.
+
+    What cannot be told of one object, or of two, is in the log, and the rest is told.
+    """
     params = tuned(Params)
     known = [prompt for prompt in prompts if prompt.name in tracks]
-    found = list(_between(tracks, known, params))
+    found: list[Contradiction] = []
+    for first, second in combinations(known, 2):
+        with apart("contradictions", f"{first.name} and {second.name}", {}):
+            found += _between(tracks, first, second, params)
     for prompt in known:
-        track, category = tracks[prompt.name], category_of(prompt.category)
-        found += _disobeyed(track, prompt, params)
-        found += _unlikely_sizes(track, category, params)
-        found += _misplaced(track, category, walls, params)
-        found += _unsure_edges(track, category, params)
+        with apart("contradictions", prompt.name, {}):
+            track, category = tracks[prompt.name], category_of(prompt.category)
+            found += _disobeyed(track, prompt, params)
+            found += _unlikely_sizes(track, category, params)
+            found += _misplaced(track, category, walls, params)
+            found += _unsure_edges(track, category, params)
     return tuple(found)
 
 
-def _between(tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], params: Params) -> Iterator[Contradiction]:
-    for first, second in combinations(prompts, 2):
-        share, frame = _overlap(tracks[first.name], tracks[second.name], params.frames)
-        if share < params.overlap:
-            continue
-        where = f"{_clicks(first)} and {_clicks(second)}"
-        if share >= params.same:
-            yield Contradiction(
-                rule="same-thing",
-                objects=(first.name, second.name),
-                message=f"{where} are on the same thing: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
-                mend="delete one, or click off each of them on the other",
-            )
-        else:
-            yield Contradiction(
-                rule="masks-overlap",
-                objects=(first.name, second.name),
-                message=f"{where} claim the same surface: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
-                mend=f"click off one of them where the other is, in frame {frame}",
-            )
+def _between(
+    tracks: Mapping[str, MaskTrack], first: ObjectPrompt, second: ObjectPrompt, params: Params
+) -> Iterator[Contradiction]:
+    share, frame = _overlap(tracks[first.name], tracks[second.name], params.frames)
+    if share < params.overlap:
+        return
+    where = f"{_clicks(first)} and {_clicks(second)}"
+    if share >= params.same:
+        yield Contradiction(
+            rule="same-thing",
+            objects=(first.name, second.name),
+            message=f"{where} are on the same thing: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
+            mend="delete one, or click off each of them on the other",
+        )
+    else:
+        yield Contradiction(
+            rule="masks-overlap",
+            objects=(first.name, second.name),
+            message=f"{where} claim the same surface: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
+            mend=f"click off one of them where the other is, in frame {frame}",
+        )
 
 
 def _overlap(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int]:

@@ -74,6 +74,7 @@ SIMULATION_RULES: dict[str, Rule] = {
     "drift": Rule("error", "something left alone falls or creeps"),
     "unstable": Rule("error", "the simulation diverges"),
     "overlap": Rule("warning", "fixed parts of two objects overlap"),
+    "untested": Rule("error", "a test of the simulation that could not be made"),
     "blocked-by": Rule("warning", "a free-standing thing is in a joint's way"),
 }
 

@@ -10,6 +10,7 @@ from r2c2r_core.export.writers.glb import check_glb, write_glb
 from r2c2r_core.export.writers.mjcf import write_mjcf
 from r2c2r_core.export.writers.urdf import write_urdf
 from r2c2r_core.export.writers.usd import write_usd
+from r2c2r_core.failing import OBJECT_FAILS
 from r2c2r_core.plugins import added
 from r2c2r_core.progress import SILENT, Progress
 
@@ -85,12 +86,15 @@ def formats() -> tuple[Format, ...]:
 
 
 def write_formats(plan: Plan, folder: Path, *, progress: Progress = SILENT) -> None:
-    """Every format's file; one of another package that fails is left out, with a warning in the log."""
+    """Every format's file; one that fails is left out, with a warning in the log, and the certificate says that it is missing.
+
+    scene.urdf, by which the rest is judged, must be written, and what no scene is to blame for (a full disk) ends the export.
+    """
     for entry in progress.each(formats(), "writing"):
         try:
             entry.write(plan, folder / entry.file)
         except Exception as error:
-            if entry in FORMATS:
+            if entry in FORMATS and (entry.name == "urdf" or not isinstance(error, OBJECT_FAILS)):
                 raise
             (folder / entry.file).unlink(missing_ok=True)
             _LOG.warning("%s is left out of the bundle: %s: %s", entry.file, type(error).__name__, error)

@@ -1,6 +1,7 @@
 """What fails for one object while the bundle is written leaves that one out, and the rest is certified."""
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
+from r2c2r_core.errors import R2C2RError
 from r2c2r_core.export import plan as planning
 from r2c2r_core.export import stage, support
 from r2c2r_core.export.stage import ExportConfig, write_bundle
+from r2c2r_core.export.writers import table
 from r2c2r_core.model.report import Certificate
 from tests.core.export.kitchen import CREATED, reconstruction
 
@@ -78,3 +81,27 @@ def test_evidence_that_cannot_be_made_is_missing_and_the_scene_is_there(
     found = names(tmp_path / "b.zip")
     assert "scene.urdf" in found
     assert file not in found
+
+
+@pytest.mark.parametrize("name", ["mjcf", "usd", "glb"])
+def test_a_format_that_cannot_be_written_is_missing_and_the_others_are_there(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(plan: Any, path: Path) -> None:
+        path.write_text("half")
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    lost = next(entry for entry in table.FORMATS if entry.name == name)
+    changed = tuple(replace(entry, write=fails) if entry is lost else entry for entry in table.FORMATS)
+    monkeypatch.setattr(table, "FORMATS", changed)
+    write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED)
+    assert {entry.file for entry in table.FORMATS} - names(tmp_path / "b.zip") == {lost.file}
+
+
+def test_a_full_disk_is_no_format_s_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(plan: Any, path: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(table, "FORMATS", tuple(replace(entry, write=fails) for entry in table.FORMATS))
+    with pytest.raises((OSError, R2C2RError)):
+        write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED)

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
+from r2c2r_core.export import simulate as simulation
 from r2c2r_core.export.contacts import touches
 from r2c2r_core.export.simulate import compiled, simulate
 from r2c2r_core.geometry.transforms import Rigid3
@@ -215,3 +217,25 @@ def test_a_door_before_a_solid_block_is_an_error(tmp_path: Path) -> None:
     result = simulated(tmp_path, replace(item, links=(base, *item.links[1:])))
     assert "cavity" in {f.rule for f in result.findings}
     assert result.joints[0].cavity_open < 0.1
+
+
+def test_a_joint_that_cannot_be_tested_is_named_and_the_others_are_tested(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = simulation.examine_joint
+
+    def fails(strict: Any, solid: Any, name: str) -> Any:
+        if name == "cabinet_1_hinge":
+            raise ZeroDivisionError("range of nothing")
+        return real(strict, solid, name)
+
+    monkeypatch.setattr(simulation, "examine_joint", fails)
+    monkeypatch.setattr(simulation, "leave_alone", lambda _: 1 // 0)
+    result = simulated(tmp_path, cabinet("cabinet_1", x=0.0), drawer("drawer_1", x=1.5))
+    assert {(f.rule, f.where, f.severity) for f in result.findings} == {
+        ("untested", "cabinet_1_hinge", "error"),
+        ("untested", "left alone", "error"),
+    }
+    reached = {joint.joint: joint.travel_reached for joint in result.joints}
+    assert np.isnan(reached["cabinet_1_hinge"])
+    assert reached["drawer_1_slide"] >= 0.98

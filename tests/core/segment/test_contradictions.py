@@ -1,6 +1,8 @@
 """Every rule finds what it is for, and a right kitchen contradicts nothing."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
+from r2c2r_core.segment import contradictions
 from r2c2r_core.segment.contradictions import find_contradictions
 from tests.core.motions import motion
 
@@ -137,3 +140,30 @@ def test_the_seam_between_two_doors_is_not_asked_about() -> None:
         (replace(pair, front=replace(pair.front, edges=(0.9,) * 4, seam=0.9)), prompt("double_1", "double_door_cabinet", 40.5))
     )
     assert not any(contradiction.rule == "edge-unsure" for contradiction in said)
+
+
+def test_what_cannot_be_told_of_one_object_or_two_hides_nothing_of_the_others(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    overlap, sizes = contradictions._overlap, contradictions._unlikely_sizes
+
+    def overlap_fails(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int]:
+        if "broken" in (first.name, second.name):
+            raise IndexError("no frame")
+        return overlap(first, second, most)
+
+    def sizes_fail(track: MaskTrack, *rest: Any) -> Iterator[Contradiction]:
+        if track.name == "broken":
+            raise np.linalg.LinAlgError("singular")
+        return sizes(track, *rest)
+
+    monkeypatch.setattr(contradictions, "_overlap", overlap_fails)
+    monkeypatch.setattr(contradictions, "_unlikely_sizes", sizes_fail)
+    broken = (track("broken", "cabinet", slice(0, 20)), prompt("broken", "cabinet", 10.5))
+    left = (track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5))
+    right = (track("door_2", "cabinet", slice(0, 80), width_m=2.5), prompt("door_2", "cabinet", 70.5))
+    assert [(said.rule, said.objects) for said in found(broken, left, right)] == [
+        ("same-thing", ("door_1", "door_2")),
+        ("size-unlikely", ("door_2",)),
+    ]
+    assert "contradictions: broken" in caplog.text
