@@ -26,6 +26,7 @@ from typing import Any
 
 from app.errors import told
 from app.jobs.disputes import Again, Disputes, others_line, read_prompt
+from app.jobs.doubts import doubts_about
 from app.jobs.elevation_files import write_elevations
 from app.jobs.front_wire import front_line
 from app.jobs.mask_wire import mask_bits
@@ -35,6 +36,7 @@ from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.progress import Progress
 from r2c2r_core.segment.corrected import as_found, corrected_stream
 from r2c2r_core.segment.prompts import check_prompt
@@ -255,10 +257,14 @@ class Desk:
                 _say(object=number, key=followed.key, **said)
 
     def _done(self, prompt: ObjectPrompt) -> dict[str, Any]:
-        return {"end": "done", "front": self._front(prompt), "others": others_line(prompt.others)}
+        panel = self.session.panel(prompt)
+        doubts = doubts_about(prompt, panel, self.capture) if panel is not None else []
+        return {"end": "done", "front": self._line(panel), "others": others_line(prompt.others), "doubts": doubts}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
-        panel = self.session.panel(prompt)
+        return self._line(self.session.panel(prompt))
+
+    def _line(self, panel: FrontPanel | None) -> dict[str, Any] | None:
         return front_line(panel, self.capture.world_from_capture) if panel is not None else None
 
     def _shown(self, found: Glimpse) -> dict[str, Any]:

@@ -186,6 +186,7 @@ class LiveSession:
             if "end" in line:
                 error = told_body(line["error"]) if line.get("error") else None
                 task.masks.front, task.masks.others = line.get("front"), line.get("others", [])
+                task.masks.doubts = line.get("doubts", [])
                 self._end_task(number, task, line["end"], error)
                 return
             first = task.state == "waiting"
@@ -215,7 +216,7 @@ class LiveSession:
         task.state = "done" if end == "done" else "failed" if end == "failed" else "partial"
         self.deaths = 0 if end == "done" else self.deaths
         try:
-            mask_store.finish(task.path, end, error, task.masks.front, task.masks.others)
+            mask_store.finish(task.path, end, error, task.masks)
         except OSError:
             task.kept = False
         self._note_work()

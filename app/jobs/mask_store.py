@@ -33,6 +33,7 @@ class Masks(Protocol):
     error: dict[str, Any] | None
     front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
     others: Others  # drawn with these
+    doubts: list[str]  # about its front, with what would mend them
 
     def __len__(self) -> int:
         """On how many frames there is one."""
@@ -53,6 +54,7 @@ class MaskFile:
     error: dict[str, Any] | None = None
     front: dict[str, Any] | None = None
     others: Others = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -78,6 +80,7 @@ class StoredMasks:
     backend: str = ""  # that drew them, where the file says so
     front: dict[str, Any] | None = None
     others: Others = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.index)
@@ -127,12 +130,12 @@ def append(path: Path, line: dict[str, Any]) -> None:
         handle.write(json.dumps(line) + "\n")
 
 
-def finish(
-    path: Path, end: str, error: dict[str, Any] | None, front: dict[str, Any] | None = None, others: Others | None = None
-) -> None:
+def finish(path: Path, end: str, error: dict[str, Any] | None, masks: Masks | None = None) -> None:
     """Say how it came to its end, what flat front it has, what it was drawn with, and where each mask is."""
+    about = masks or MaskFile()
+    said = {"end": end, "error": error, "front": about.front, "others": about.others, "doubts": about.doubts}
     found = _scanned(path, path.read_bytes() if path.exists() else b"")
-    append(path, {"end": end, "error": error, "front": front, "others": others or [], "index": _packed(found.index)})
+    append(path, said | {"index": _packed(found.index)})
 
 
 def write(
@@ -199,6 +202,7 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
     found.front, found.others = line.get("front"), line.get("others", [])  # older files: every object was drawn alone
+    found.doubts = line.get("doubts", [])
     if found.end == "done" and "front" not in line:
         found.end = OUTDATED
     index = line.get("index", [])  # numbers, in files of before they were packed

@@ -95,6 +95,7 @@ class SceneObject(Shape):
     mask_frames: int
     mask_backend: str  # the segmenter that drew the masks; empty while there are none
     notices: list[str]
+    doubts: list[str]  # about its front: a size or a place that its category does not have, edges that hardly show
     saved: float  # when the last change was stored
 
 

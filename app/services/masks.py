@@ -1,6 +1,7 @@
 """Masks that follow from the clicks: live ones while annotating, else those of the last run."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -156,24 +157,31 @@ def resume(context: Context) -> None:
             segment(context, project_id, number or 0)
 
 
-def state_of(
-    context: Context, project: Project, item: SceneObject, places: Places | None = None
-) -> tuple[schemas.SegmentState, int, list[str]]:
-    """How far the object's masks are, on how many frames it is seen, and what went wrong."""
+class MasksState(NamedTuple):
+    """How far the object's masks are, on how many frames it is seen, what went wrong, and what is doubtful about it."""
+
+    state: schemas.SegmentState
+    frames: int = 0
+    notices: Sequence[str] = ()
+    doubts: Sequence[str] = ()
+
+
+def state_of(context: Context, project: Project, item: SceneObject, places: Places | None = None) -> MasksState:
+    """How the object's masks stand."""
     found = found_of(context, project, item, places)
     if found is None:
-        return "none", 0, []
+        return MasksState("none")
     error = found.masks.error
     notices = [f"{error['message']}; {error['hint']}".rstrip("; ")] if error else []
-    return found.state, len(found.masks), notices
+    return MasksState(found.state, len(found.masks), notices, found.masks.doubts)
 
 
-def state_after_follow(context: Context, project: Project, item: SceneObject) -> tuple[schemas.SegmentState, int, list[str]]:
+def state_after_follow(context: Context, project: Project, item: SceneObject) -> MasksState:
     """`state_of` as it will be once `follow` was there."""
     found = found_of(context, project, item)
     done = found is not None and found.state == "done"
     if item.masks_key and not item.deleted and not done and project.status == "ready":
-        return "waiting", 0, []
+        return MasksState("waiting")
     return state_of(context, project, item)
 
 

@@ -314,19 +314,17 @@ def _shape(
         mask_frames=0,
         mask_backend="",
         notices=[],
+        doubts=[],
         saved=saved,
     )
     return _with_masks(shape, project, masks.state_of(context, project, item, places))
 
 
-def _with_masks(
-    shape: schemas.SceneObject, project: Project, state: tuple[schemas.SegmentState, int, list[str]]
-) -> schemas.SceneObject:
+def _with_masks(shape: schemas.SceneObject, project: Project, now: masks.MasksState) -> schemas.SceneObject:
     """The object with its masks in that state."""
-    segment, frames, notices = state
-    said = [*notices, *_category_notice(shape.category)]
-    backend = project.segmenter if frames else ""
-    return shape.model_copy(update={"segment": segment, "mask_frames": frames, "mask_backend": backend, "notices": said})
+    told: dict[str, object] = {"segment": now.state, "mask_frames": now.frames, "doubts": [*now.doubts]}
+    told |= {"mask_backend": project.segmenter if now.frames else ""}
+    return shape.model_copy(update=told | {"notices": [*now.notices, *_category_notice(shape.category)]})
 
 
 def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:

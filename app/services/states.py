@@ -79,7 +79,7 @@ def _ready_to_review(context: Context, session: Session, project: Project) -> li
         return ["no object was clicked yet"]
     unclicked, unseen = [], []
     for item in items:
-        frames = masks.state_of(context, project, item)[1]
+        frames = masks.state_of(context, project, item).frames
         if not item.masks_key:
             unclicked.append(item.name)
         elif frames < LEAST_FRAMES:

@@ -5,7 +5,7 @@ Each finding names the clicks and what would mend it; nothing is changed here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -74,12 +74,16 @@ def find_contradictions(
             found += _between(tracks, first, second, params)
     for prompt in known:
         with apart("contradictions", prompt.name, {}):
-            track, category = tracks[prompt.name], category_of(prompt.category)
-            found += _disobeyed(track, prompt, params)
-            found += _unlikely_sizes(track, category, params)
-            found += _misplaced(track, category, walls, params)
-            found += _unsure_edges(track, category, params)
+            found += _disobeyed(tracks[prompt.name], prompt, params)
+            found += find_implausible(replace(tracks[prompt.name], category=prompt.category), walls)
     return tuple(found)
+
+
+def find_implausible(track: MaskTrack, walls: Sequence[Wall]) -> tuple[Contradiction, ...]:
+    """What contradicts the category of one object in its size, its place and its edges; its masks are not looked at."""
+    params, category = tuned(Params), category_of(track.category)
+    sizes, place = _unlikely_sizes(track, category, params), _misplaced(track, category, walls, params)
+    return (*sizes, *place, *_unsure_edges(track, category, params))
 
 
 def _between(

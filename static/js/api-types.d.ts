@@ -862,6 +862,7 @@ export interface SceneObject {
   mask_frames: number;
   mask_backend: string;
   notices: string[];
+  doubts: string[];
   saved: number;
 }
 

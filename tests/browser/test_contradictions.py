@@ -37,3 +37,23 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(browser: 
     page.get_by_role("button", name="Delete drawer_3").click()
     expect(said).to_have_count(0)
     context.close()
+
+
+def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_mends_it(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with Server(tmp_path, live="panels") as server:  # of 0.8 by 1.2 m
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        page = signed_in(context, server, "ann")
+        sample(page)
+        page.get_by_role("link", name="Annotate").click()
+        page.get_by_role("button", name="New object").click()
+        click_frame(page, 20, 60)
+        said = page.locator(".contradicted")
+        expect(said).to_contain_text("1.20 m high")
+        expect(said).to_contain_text("click each as an object of its own; else correct its category")
+        picture(page, "doubt")
+        page.get_by_label("Category of drawer_2").fill("refrigerator")
+        page.get_by_label("Category of drawer_2").press("Enter")
+        expect(said).to_have_count(0)
+        context.close()

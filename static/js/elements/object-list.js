@@ -92,7 +92,9 @@ export class ObjectList extends LiveElement {
       h("div", { class: "head" }, badge, pick, eye, remove),
       h("div", { class: "row muted state" }, state(object, current), this.#stop(object)),
       current ? this.#fields(object) : null,
-      ...contradicted(object).map((line) => h("div", { class: "contradicted", role: "status" }, line)),
+      ...[...contradicted(object), ...object.doubts].map((line) =>
+        h("div", { class: "contradicted", role: "status" }, line),
+      ),
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colourOf(object));

@@ -22,7 +22,9 @@ from r2c2r_core.model.track import FrontPanel
 
 CAMERA = Intrinsics(fx=100.0, fy=100.0, cx=80.0, cy=60.0, width=160, height=120)
 CAPTURE: Any = SimpleNamespace(
-    frames=tuple(SimpleNamespace(index=index, rgb_camera=CAMERA) for index in (0, 3, 7)), world_from_capture=Rigid3()
+    frames=tuple(SimpleNamespace(index=index, rgb_camera=CAMERA) for index in (0, 3, 7)),
+    world_from_capture=Rigid3(),
+    room=SimpleNamespace(walls=()),
 )
 
 

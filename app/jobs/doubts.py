@@ -1,0 +1,28 @@
+"""What is doubtful about a front as soon as its masks are there, before a run would say so."""
+
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.segment.contradictions import find_implausible
+
+
+def doubts_about(prompt: ObjectPrompt, panel: FrontPanel, capture: Capture) -> list[str]:
+    """A line each, with what would mend it; without the object's name, which may change."""
+    track = MaskTrack(
+        name=prompt.name,
+        category=prompt.category,
+        masks={},
+        confidence={},
+        front=panel,
+        box=None,
+        kind="front",
+        backend="",
+        prompt_count=len(prompt.points),
+        warnings=(),
+    )
+    found = find_implausible(track, capture.room.walls)
+    return [f"{_sentence(one.message.removeprefix(prompt.name).strip())}: {one.mend}" for one in found]
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
