@@ -1,11 +1,11 @@
 """One robust fit of a joint to all frames: its axis, its pivot and every state, with covariance from the Jacobian."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.sparse import lil_matrix
+from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Matrix3, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
@@ -65,33 +65,46 @@ def fit_joint(
 ) -> tuple[FittedJoint, np.ndarray, np.ndarray]:
     """The joint near a hypothesis that explains the planes best, and each frame's state with its standard deviation."""
     params = tuned(Params)
-    across = _across(hypothesis)
-    count = len(fixes)
-    whiten = [np.linalg.inv(np.linalg.cholesky(fix.covariance)) for fix in fixes]
+    across, seen = _across(hypothesis), _stacked(fixes)
     prior = np.concatenate([np.full(2, params.axis_rad), np.full(2, params.pivot_m), [params.thickness_m]])
 
     def residuals(x: np.ndarray) -> np.ndarray:
-        axis, pivot = _joint_at(hypothesis, across, x)
-        rows = [
-            white @ (fix.plane - _plane_at(fix, moved(axis, pivot, hypothesis.turns, state), x[4]))
-            for fix, white, state in zip(fixes, whiten, x[5:], strict=True)
-        ]
-        return np.concatenate([*rows, x[:5] / prior, (x[5:] - states) / params.free_state])
+        off = seen.planes - _predicted(seen, hypothesis, across, x)
+        whitened = np.einsum("nij,nj->ni", seen.whiten, off).ravel()
+        return np.concatenate([whitened, x[:5] / prior, (x[5:] - states) / params.free_state])
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return _differences(residuals, x, len(fixes))
 
     start = np.concatenate([np.zeros(5), states])
-    fitted = least_squares(
-        residuals,
-        start,
-        loss="huber",
-        f_scale=params.outlier,
-        jac_sparsity=_sparsity(count),
-        x_scale=_scales(count, hypothesis),
-    )
-    jacobian = np.asarray(fitted.jac.todense()) if hasattr(fitted.jac, "todense") else np.asarray(fitted.jac)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    scales = np.concatenate([prior, np.full(len(fixes), 0.01)])
+    fitted = least_squares(residuals, start, jac=jacobian, loss="huber", f_scale=params.outlier, x_scale=scales)
+    covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
     axis, pivot = _joint_at(hypothesis, across, fitted.x)
     joint = FittedJoint(axis=axis, pivot=pivot, turns=hypothesis.turns, across=across, covariance=covariance[:4, :4])
     return joint, fitted.x[5:], np.sqrt(np.diag(covariance)[5:])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stacked:
+    """The fixes of all frames (n, ...)."""
+
+    planes: np.ndarray
+    whiten: np.ndarray  # (n, 3, 3): residuals of unit variance
+    turned: np.ndarray  # (n, 3, 3) and
+    shifted: np.ndarray  # (n, 3): from the front frame into that of the leaf where it was expected
+    is_back: np.ndarray
+
+
+def _stacked(fixes: Sequence[PlaneFix]) -> _Stacked:
+    inverses = [fix.expected.inverse for fix in fixes]
+    return _Stacked(
+        planes=np.stack([fix.plane for fix in fixes]),
+        whiten=np.stack([np.linalg.inv(np.linalg.cholesky(fix.covariance)) for fix in fixes]),
+        turned=np.stack([inverse.rotation for inverse in inverses]),
+        shifted=np.stack([inverse.translation for inverse in inverses]),
+        is_back=np.array([fix.is_back for fix in fixes]),
+    )
 
 
 def _across(hypothesis: Hypothesis) -> np.ndarray:
@@ -103,27 +116,34 @@ def _joint_at(hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> tupl
     return axis / np.linalg.norm(axis), hypothesis.pivot + x[2] * across[0] + x[3] * across[1]
 
 
-def _plane_at(fix: PlaneFix, pose: Rigid3, thicker_m: float) -> np.ndarray:
-    """The plane that a pose of the leaf predicts, as the fix measures it: in the frame where the leaf was expected."""
-    local = fix.expected.inverse @ pose
-    normal = local.rotation[:, 1]
-    level = float(normal @ local.translation) / normal[1]
-    back = thicker_m / normal[1] if fix.is_back else 0.0
-    return np.array([level + back, -normal[0] / normal[1], -normal[2] / normal[1]])
+def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The planes (n, 3) that the joint and its states predict, as the fixes measure them."""
+    axis, pivot = _joint_at(hypothesis, across, x)
+    states = x[5:]
+    if hypothesis.turns:
+        rotation = Rotation.from_rotvec(axis * states[:, None]).as_matrix()
+        shift = pivot - rotation @ pivot
+    else:
+        rotation, shift = np.tile(np.eye(3), (len(states), 1, 1)), axis * states[:, None]
+    normal = np.einsum("nij,nj->ni", seen.turned, rotation[:, :, 1])
+    origin = np.einsum("nij,nj->ni", seen.turned, shift) + seen.shifted
+    level = ((normal * origin).sum(axis=1) + np.where(seen.is_back, x[4], 0.0)) / normal[:, 1]
+    return np.stack([level, -normal[:, 0] / normal[:, 1], -normal[:, 2] / normal[:, 1]], axis=1)
 
 
-def _sparsity(count: int) -> lil_matrix:
-    """Which residuals depend on what: each frame on its own state, and all on the joint."""
-    pattern = lil_matrix((3 * count + 5 + count, 5 + count), dtype=int)
-    pattern[: 3 * count, :5] = 1
-    for k in range(count):
-        pattern[3 * k : 3 * k + 3, 5 + k] = 1
-        pattern[3 * count + 5 + k, 5 + k] = 1
+def _differences(residuals: Callable[[np.ndarray], np.ndarray], x: np.ndarray, count: int) -> np.ndarray:
+    """The Jacobian by forward differences: all states at once, for each frame depends on its own alone."""
+    step, base = 1e-6, residuals(x)
+    result = np.zeros((len(base), len(x)))
     for k in range(5):
-        pattern[3 * count + k, k] = 1
-    return pattern
-
-
-def _scales(count: int, hypothesis: Hypothesis) -> np.ndarray:
-    state = 0.02 if hypothesis.turns else 0.005
-    return np.concatenate([[0.01, 0.01, 0.005, 0.005, 0.003], np.full(count, state)])
+        moved_x = x.copy()
+        moved_x[k] += step
+        result[:, k] = (residuals(moved_x) - base) / step
+    moved_x = x.copy()
+    moved_x[5:] += step
+    change = (residuals(moved_x) - base) / step
+    frame = np.arange(count)
+    for row in range(3):
+        result[3 * frame + row, 5 + frame] = change[3 * frame + row]
+    result[3 * count + 5 + frame, 5 + frame] = change[3 * count + 5 + frame]
+    return result
