@@ -62,6 +62,7 @@ def gather_evidence(capture: Capture, track: MaskTrack, pool_size: int) -> Evide
     frames = [frame for frame in capture.frames if frame.index in track.masks and track.masks[frame.index].area_px > 0]
     if not frames:
         raise ObjectNotSeen(f"{track.name}: its masks are empty in all frames", hint="click it in a frame that shows it")
+    frames = [frame for frame in frames if frame.index not in track.opened_frames] or frames
     largest = max(frames, key=lambda frame: track.masks[frame.index].area_px)
     centre = object_centre(capture, track, largest)
     chosen = choose_views([_view_of(frame, track, centre) for frame in frames], pool_size)

@@ -10,7 +10,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.front import Front, front_corners, front_mask, front_panel
+from r2c2r_core.segment.fronts.front import Front, front_corners, front_mask, front_panel, sides_mask
 from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.motion.leaf import OpenLeaf
@@ -57,7 +57,7 @@ class FoundFront:
         for leaf in self._leaves.closed_in(frame.index):
             corners.append(leaf.world_from_front.apply(leaf_corners(leaf)))
             parts.append(front_mask(self.front, self.scene, frame, corners[-1]))
-        mask = np.logical_or.reduce([part for part, _ in parts])
+        mask = np.logical_or.reduce([sides_mask(self.front, self.scene, frame), *(part for part, _ in parts)])
         share = float(np.mean([share for _, share in parts]))
         return View(mask, expected_iou(mask, share, frame, np.concatenate(corners), tuned(Params).border_m, self.fit))
 

@@ -121,13 +121,25 @@ def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = N
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
         return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
     slide = front.run.slide_of(frame.index, scene)
-    facets = [Facet(front_corners(front.cell, grid, slide) if part is None else part)]
-    facets += [
+    if part is not None:
+        return visible_mask([Facet(part)], scene, frame)
+    facets = [Facet(front_corners(front.cell, grid, slide))]
+    return visible_mask([*facets, *_side_facets(front, frame, slide)], scene, frame)
+
+
+def sides_mask(front: Front, scene: Scene, frame: Frame) -> Mask:
+    """The visible pixels of the carcass's seen sides alone."""
+    return visible_mask(_side_facets(front, frame, front.run.slide_of(frame.index, scene)), scene, frame)[0]
+
+
+def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list[Facet]:
+    """The seen sides that face the camera."""
+    grid = front.run.grid
+    return [
         Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
-        for side in (front.sides if part is None else ())
+        for side in front.sides
         if side_faces(front.cell, grid, side, frame.world_from_camera.translation)
     ]
-    return visible_mask(facets, scene, frame)
 
 
 def depth_to_wall(front: Front, room: Room, category: Category) -> float | None:

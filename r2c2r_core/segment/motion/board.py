@@ -1,5 +1,7 @@
 """The visible pixels of a leaf that stands open: its board, and what a drawer brings out behind it."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -8,14 +10,28 @@ from r2c2r_core.geometry.camera import pixel_centres, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.leaf import OpenLeaf, behind, corners
-from r2c2r_core.segment.occlusion import Facet, visible_mask
+from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What hides a leaf that stands open: its pose is fitted, and a hand may be on it."""
+
+    before_m: float = param(0.025, "m", "before it, from where something hides it")
+    in_plane_m: float = param(0.012, "m", "the same of one that slides past others", source="tracks lie 2-4 cm apart")
+    behind_m: float = param(0.04, "m", "behind it, from where depth looks past it")
 
 
 def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float]:
     """Its visible pixels in a frame, and the share of its projection that is visible."""
-    mask, share = visible_mask(_faces(opened, frame), scene, frame)
-    return (mask | _drawn_out(opened, scene, frame) if opened.slides_out else mask), share
+    params = tuned(Params)
+    near = Tolerance(
+        front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m
+    )  # a leaf that slides passes others a track away
+    mask, share = visible_mask(_faces(opened, frame), scene, frame, near)
+    return (mask | _drawn_out(opened, scene, frame) if opened.way == "out" else mask), share
 
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class FilmedLeaves:
         if self._filmed is None:
             usual = tuned(Params).usual
             self._filmed = tuple(
-                (leaf, find_motion(leaf, self.scene, dict.fromkeys(ways, usual), part))
+                (leaf, find_motion(leaf, self.scene, dict.fromkeys(ways, usual), part, only=bool(part)))
                 for part, leaf, ways in _leaves(self.panel, self.category)
             )
         return self._filmed
@@ -81,8 +82,9 @@ def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     assert motion.axis_world is not None  # what is fixed is never open
     assert motion.pivot_world is not None
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
-    slides_out = motion.kind == "prismatic" and abs(float(motion.axis_world @ leaf.outward)) > 0.5
-    return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, slides_out=slides_out)
+    outward = abs(float(motion.axis_world @ leaf.outward)) > np.sqrt(0.5)
+    way: Literal["hinge", "out", "along"] = "hinge" if motion.kind == "revolute" else "out" if outward else "along"
+    return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=way)
 
 
 def _leaves(panel: FrontPanel, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:

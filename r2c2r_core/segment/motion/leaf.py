@@ -1,6 +1,7 @@
 """A leaf that may move: the rectangle of a closed front, and points on it and around it."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class OpenLeaf:
 
     leaf: Leaf
     world_from_leaf: Rigid3  # of its outer face, as `front`
-    slides_out: bool
+    way: Literal["hinge", "out", "along"]  # how it was moved there
 
 
 def behind() -> Vector3:

@@ -60,10 +60,13 @@ Seen = dict[int, tuple[float, float]]
 NO_PRIOR: Mapping[Way, float] = MappingProxyType({})
 
 
-def find_motion(leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR, part: str = "") -> JointMotion | None:
+def find_motion(
+    leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR, part: str = "", *, only: bool = False
+) -> JointMotion | None:
     """The joint that a leaf was seen to move on; None where it was never seen anywhere but in its closed place.
 
-    `prior` says by how much each way of opening is likelier than the others before any frame, as a logarithm.
+    `prior` says by how much each way of opening is likelier than the others before any frame, as a logarithm; with `only`, a
+    leaf that turns out to move in no way that it names is none: half a front is a leaf only where it opens as one of a pair.
     """
     params = tuned(Params)
     counts = np.array([closed_counts(leaf, scene, frame) for frame in scene.frames])
@@ -79,7 +82,7 @@ def find_motion(leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR,
             break
         motion = _measured(leaf, course, scene, part) if course.support > params.support else None
         if motion is not None:
-            return motion
+            return None if only and course.hypothesis.way not in prior else motion
     return None
 
 

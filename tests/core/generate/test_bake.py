@@ -12,6 +12,7 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import render_textured
 from r2c2r_core.geometry.transforms import Rigid3
 from tests.core.generate.scenes import appliance_shape, best_thing, front_shape
+from tests.core.motions import motion
 
 FACING = Rigid3(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), np.array([0.0, -2.0, 0.0]))  # looks along +Y from 2 m
 CAMERA = Intrinsics(fx=800.0, fy=800.0, cx=200.0, cy=200.0, width=400, height=400)
@@ -76,6 +77,15 @@ def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
     assert depth[200 + 1, 200] > 0
     assert back.argmax() == 2  # the back is blue, the seat red
     assert seat_edge.argmax() == 0
+
+
+def test_frames_in_which_a_front_stands_open_lend_it_no_colour(front_scene):
+    """Pulled or swung out by too little to show in depth, too."""
+    capture, track = front_scene
+    opened = motion(dict.fromkeys(sorted(track.masks)[::2], 0.02))
+    pool = gather_evidence(capture, replace(track, motions=(opened,)), 20).pool
+    assert {view.frame_index for view in gather_evidence(capture, track, 20).pool} & set(opened.states)
+    assert not {view.frame_index for view in pool} & set(opened.states)
 
 
 def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):

@@ -89,3 +89,9 @@ def test_evidence_overrules_what_is_usual() -> None:
 def test_what_stands_so_all_the_time_is_no_motion(way: str) -> None:
     """A rectangle drawn too wide looks like a leaf that is half slid away: only a change tells a joint."""
     assert find_motion(LEAF, scene(way, np.full(30, 0.3))) is None
+
+
+def test_half_a_front_is_a_leaf_only_where_it_opens_as_one_of_a_pair() -> None:
+    states = opened_and_held(1.0)
+    assert find_motion(LEAF, scene("bottom", states), {"left": 8.0}, "left", only=True) is None
+    assert find_motion(LEAF, scene("left", states), {"left": 8.0}, "left", only=True) is not None
