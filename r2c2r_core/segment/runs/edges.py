@@ -1,6 +1,7 @@
 """Panel edges refined by colour: the first clear change met from inside, near the cut or where depth ends."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -33,6 +34,29 @@ class Params:
     widest_gap_m: float = param(0.012, "m", "of a gap, as blurred as it looks")
     clear: float = param(3.5, "ratio", "to the panel's own median gradient, of an edge")
     strong_share: float = param(0.45, "share", "of the strongest gradient nearby, of an edge")
+    upper_face_m: float = param(
+        0.02,
+        "m",
+        "of a front's upper face, seen in a gap over it",
+        source="fronts are 16-22 mm thick, views slant by up to 45°",
+    )
+    channel_m: float = param(
+        0.02, "m", "of what is dark of a channel over a front, at most", source="worktops are 20-40 mm thick"
+    )
+    open_gap_m: float = param(0.004, "m", "of a gap wide enough to see into", source="gaps between fronts are 2-4 mm")
+
+
+class Profile(NamedTuple):
+    """What a panel's mosaic shows at each position along an axis, over the middle of its span."""
+
+    gradient: np.ndarray  # CIELAB units a cell
+    slope: np.ndarray  # of lightness, signed
+    light: np.ndarray  # relative luminance, 0..1; nan where nothing is known
+    support: np.ndarray  # share of cells for which depth saw the plane
+
+    def mirrored(self) -> "Profile":
+        """As met from the other end."""
+        return Profile(self.gradient[::-1], -self.slope[::-1], self.light[::-1], self.support[::-1])
 
 
 def panel_edges(cell: Cell, lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, cell_m: float) -> Cell:
@@ -40,15 +64,15 @@ def panel_edges(cell: Cell, lab: np.ndarray, seen: np.ndarray, on_plane: np.ndar
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     if rows.stop - rows.start < 12 or columns.stop - columns.start < 12:
         return cell
-    left, right = _ends(cell.left, cell.right, *_profiles(lab, seen, on_plane, rows, axis=0), cell_m)
-    top, bottom = _ends(cell.top, cell.bottom, *_profiles(lab, seen, on_plane, columns, axis=1), cell_m)
-    return Cell(left, _above_shadow(top, bottom, lab[:, columns], cell_m), right, bottom)
+    left, right = _ends(cell.left, cell.right, _profiles(lab, seen, on_plane, rows, axis=0), cell_m)
+    across = _profiles(lab, seen, on_plane, columns, axis=1)
+    top, bottom = _ends(cell.top, cell.bottom, across, cell_m)
+    below = _below_upper_face(top, bottom, across, lab[:, columns], cell_m)
+    return Cell(left, _above_shadow(top, bottom, lab[:, columns], cell_m) if below is None else below, right, bottom)
 
 
-def _profiles(
-    lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, across: slice, axis: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gradient, signed lightness slope and depth support at each position, over the middle of the panel's span."""
+def _profiles(lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, across: slice, axis: int) -> Profile:
+    """Along an axis, over the middle of the panel's span."""
     inset = (across.stop - across.start) // 8
     middle = slice(across.start + inset, across.stop - inset)
     if axis == 0:
@@ -64,7 +88,8 @@ def _profiles(
     gradient[[0, -1]] = 0
     slope = np.where(count > 0, np.mean(_middles(slopes, valid), axis=0), 0.0)
     slope[[0, -1]] = 0
-    return np.where(np.isfinite(gradient), gradient, 0.0), slope, support.mean(axis=0)
+    light = np.where(count > 0, _luminance(np.mean(_middles(colours[..., 0], valid), axis=0)), np.nan)
+    return Profile(np.where(np.isfinite(gradient), gradient, 0.0), slope, light, support.mean(axis=0))
 
 
 def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
@@ -75,25 +100,27 @@ def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     )
 
 
-def _ends(
-    low: float, high: float, gradient: np.ndarray, slope: np.ndarray, support: np.ndarray, cell_m: float
-) -> tuple[float, float]:
-    own = float(np.median(gradient[round(low) + 4 : round(high) - 4]))
-    first = _end(low, high, gradient, slope, support, own, cell_m)
-    mirrored = _end(len(gradient) - high, len(gradient) - low, gradient[::-1], -slope[::-1], support[::-1], own, cell_m)
-    return first, len(gradient) - mirrored
+def _ends(low: float, high: float, profile: Profile, cell_m: float) -> tuple[float, float]:
+    count = len(profile.gradient)
+    own = _own(low, high, profile)
+    first = _end(low, high, profile, own, cell_m)
+    return first, count - _end(count - high, count - low, profile.mirrored(), own, cell_m)
 
 
-def _end(
-    low: float, high: float, gradient: np.ndarray, slope: np.ndarray, support: np.ndarray, own: float, cell_m: float
-) -> float:
+def _own(low: float, high: float, profile: Profile) -> float:
+    """The panel's own median gradient."""
+    return float(np.median(profile.gradient[round(low) + 4 : round(high) - 4]))
+
+
+def _end(low: float, high: float, profile: Profile, own: float, cell_m: float) -> float:
     """The lower edge, in positions where i + 0.5 is the middle of cell i."""
-    params = tuned(Params)
+    params, (gradient, slope, light, support) = tuned(Params), profile
     usual = float(np.median(support[round(low) : round(high)]))
     covered = np.flatnonzero(support[round(low) : round((low + high) / 2)] > 0.4 * usual)
     start = low
     if usual > 0.2 and len(covered) and covered[0] * cell_m > params.depth_ends_m:
         start = low + float(covered[0])  # the cut followed a shadow or an edge of something beside the panel
+    start = max(start, low + _dark_from(round(low), round((low + high) / 2), light, cell_m))
     least = max(params.clear * own, params.least_gradient)
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
@@ -107,13 +134,24 @@ def _end(
         return start + (params.half_gap_m / cell_m if start == low else 0.0)
     window = gradient[first:last]
     i = peaks[-1]  # the innermost
-    gap = _gap_centre(slope[first:last], i, round(params.widest_gap_m / cell_m))
+    gap = _gap(slope, first + i, max(first, first + i - round(params.widest_gap_m / cell_m)))
     if gap is not None:
-        return first + gap + 0.5 + params.half_gap_m / cell_m
+        return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2)
     a, b, c = (float(value) for value in window[i - 1 : i + 2])
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0
     return first + i + 0.5 + offset
+
+
+def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float:
+    """How far a gap reaches into a panel whose cut lies on the gap's other side."""
+    params = tuned(Params)
+    near = light[first : first + round(params.upper_face_m / cell_m)] < params.darkest_shade * float(
+        np.nanmedian(light[first:last])
+    )
+    begins = int(np.argmax(near))
+    inside = np.flatnonzero(~near[begins:])
+    return float(begins + inside[0]) if near[:3].any() and len(inside) else 0.0
 
 
 def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> float:
@@ -132,12 +170,29 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
     first = k = start - max(start - reach, 0)
     while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
         k -= 1
+    mixed = k
+    while mixed > 0 and params.darkest_shade < shade[mixed - 1] < shade[mixed] - 0.005:
+        mixed -= 1  # with what is over the panel
     darkened = shade[k] < params.least_shade
+    other = not (even & (shade > params.least_shade))[max(mixed - reach, 0) : mixed].any()
+    if darkened and even[k] and other and (up := _half_way(shade[: mixed + 1])) is not None:
+        return top - (first - mixed) - up
     while darkened and k > 0 and even[k - 1] and shade[k - 1] > shade[k]:
         k -= 1
     beyond = slice(max(k - reach, 0), k)
     gap = bool((even[beyond] & (shade[beyond] > params.least_shade)).any())  # between two panels of one colour
     return top - (first - k) if darkened and not gap else top
+
+
+def _half_way(shade: np.ndarray) -> float | None:
+    """How far before its last, darkest position light is half way to the uneven light beyond; None where that is dark too."""
+    usual = float(np.median(shade[:-3])) if len(shade) > 3 else 0.0
+    if usual <= shade[-1] / tuned(Params).least_shade:
+        return None
+    half = (usual + shade[-1]) / 2
+    back = int(np.argmax(shade[::-1] >= half))
+    lower, upper = float(shade[-back]), float(shade[-back - 1])
+    return back - 1 + (half - lower) / (upper - lower)
 
 
 def _linear(lab: np.ndarray) -> np.ndarray:
@@ -154,15 +209,61 @@ def _peaks(window: np.ndarray, least: float) -> list[int]:
     ]
 
 
-def _gap_centre(slope: np.ndarray, inner: int, reach: int) -> float | None:
-    """The middle of a dark gap whose inner flank lies at `inner`; None when what is beyond stays dark."""
-    if slope[inner] <= 0:
+def _gap(slope: np.ndarray, inner: int, low: int) -> tuple[int, int] | None:
+    """Outer and inner flank of a dark gap whose inner flank lies at `inner`; None when what is beyond stays dark."""
+    if slope[inner] <= 0 or inner <= low:
         return None
-    low = max(inner - reach, 0)
-    outer = low + int(np.argmin(slope[low:inner])) if inner > low else inner
-    if outer == inner or slope[outer] > -0.4 * slope[inner]:
+    outer = low + int(np.argmin(slope[low:inner]))
+    return (outer, inner) if slope[outer] <= -0.4 * slope[inner] else None
+
+
+def _dark_width(light: np.ndarray, outer: int, inner: int, cell_m: float) -> float:
+    """Width in positions of a gap without light that is as dark as what lies between two flanks, however blurred."""
+    around = round(tuned(Params).half_gap_m / cell_m) + 2
+    low, high = max(outer - around, 0), inner + around + 1
+    beside = min(float(np.nanmax(side, initial=1e-3)) for side in (light[low : outer + 1], light[inner:high]))
+    return float(np.nansum(np.clip(1 - light[low:high] / beside, 0, None)))
+
+
+def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarray, cell_m: float) -> float | None:
+    """The upper edge of a panel below the gap to another of its colour that is wide enough to see into; None where none is.
+
+    From above, a camera sees through such a gap (a recessed channel, mostly) the upper face of the front, of its colour in
+    another light; the front begins where that light changes. Under another colour the same may be a lip's shadow.
+    """
+    params, light, gradient = tuned(Params), profile.light, profile.gradient
+    start, reach = round(top), round(params.upper_face_m / cell_m)
+    low, panel = max(start - 2 * reach, 0), slice(start + reach, max(round((top + bottom) / 2), start + reach + 1))
+    darkness = np.nan_to_num(1 - light[low : start + reach] / float(np.nanmedian(light[panel]))).clip(0)
+    half_dark = np.flatnonzero(darkness > darkness.max() / 2)
+    if not params.open_gap_m < darkness[half_dark].sum() * cell_m or len(half_dark) * cell_m > params.channel_m:
         return None
-    return (outer + inner) / 2
+    middle = low + int(np.argmax(darkness))
+    over = max(middle - reach, 0) + int(np.argmax(gradient[max(middle - reach, 0) : middle + 1]))
+    if not _same_colour(lab[max(over - reach // 2, 0) : max(over - 1, 1)], lab[panel]):
+        return None
+    flank = middle + int(np.argmax(gradient[middle : middle + reach]))
+    least = max(params.clear * _own(top, bottom, profile), params.least_gradient)
+    window = gradient[flank : flank + reach + 2]
+    steps = [
+        i for i in range(1, len(window) - 1) if window[i] >= least and window[i] >= window[i - 1] and window[i] > window[i + 1]
+    ]
+    return flank + steps[-1] + 0.5 if steps else top
+
+
+def _same_colour(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether two patches of CIELAB colours may be of one material in nearly the same light."""
+    params = tuned(Params)
+    one, other = (_linear(np.median(patch.reshape(-1, 3), axis=0)[None])[0] for patch in (first, second))
+    relative = one / np.maximum(other, 1e-3)
+    shade = float(relative.mean())
+    even = np.abs(relative / max(shade, 1e-3) - 1).max() < params.even_shade
+    return bool(even and params.least_shade < shade < 1 / params.least_shade)
+
+
+def _luminance(lightness: np.ndarray) -> np.ndarray:
+    """Relative luminance 0..1 of OpenCV's 8-bit CIELAB lightness."""
+    return np.asarray(((np.asarray(lightness) * (100 / 255) + 16) / 116) ** 3)
 
 
 def as_lab(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,11 +13,11 @@ PANEL = Cell(60, 60, 260, 300)
 EDGE_CELLS = 2.0  # 5 mm: a mosaic is blurred by as much
 
 
-def mosaic(*areas: tuple[Cell, tuple[int, int, int]], background: tuple[int, int, int] = WALL) -> np.ndarray:
+def mosaic(*areas: tuple[Cell, tuple[int, int, int]], background: tuple[int, int, int] = WALL, blur: float = 1.0) -> np.ndarray:
     image = np.full((360, 320, 3), background, np.uint8)
     for cell, colour in areas:
         image[round(cell.top) : round(cell.bottom), round(cell.left) : round(cell.right)] = colour
-    return np.asarray(cv2.GaussianBlur(image, (5, 5), 1.0))
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), blur))
 
 
 def edges(image: np.ndarray, cut: Cell, on_plane: Cell) -> tuple[float, ...]:
@@ -55,3 +55,23 @@ def test_a_gap_between_two_panels_is_no_shadow() -> None:
     upper, gap = Cell(60, 20, 260, 57), Cell(60, 57, 260, 60)
     image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.3)))
     assert edges(image, PANEL, PANEL)[1] == pytest.approx(59, abs=EDGE_CELLS)
+
+
+@pytest.mark.parametrize("stone", [(190, 190, 185), (110, 112, 115)])
+def test_a_blurred_shadow_ends_where_light_is_half_way_to_the_worktop_s(stone: tuple[int, int, int]) -> None:
+    worktop, shadow = Cell(40, 30, 280, 60), Cell(60, 60, 260, 67)
+    image = mosaic((PANEL, BLUE), (worktop, stone), (shadow, in_shade(BLUE, 0.35)), blur=1.8)
+    assert edges(image, PANEL, PANEL)[1] == pytest.approx(60, abs=1.2)
+
+
+def test_the_upper_face_of_a_front_below_a_wide_gap_is_not_its_front() -> None:
+    upper, gap, face = Cell(60, 10, 260, 49), Cell(60, 49, 260, 54), Cell(60, 54, 260, 60)
+    image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.02)), (face, in_shade(BLUE, 0.75)))
+    for cut in (52, 54, 60):
+        assert edges(image, Cell(60, cut, 260, 300), PANEL)[1] == pytest.approx(60, abs=1.0)
+
+
+def test_a_panel_cut_at_the_far_side_of_a_dark_gap_ends_before_it() -> None:
+    gap, lower = Cell(60, 300, 260, 306), Cell(60, 306, 260, 350)
+    image = mosaic((PANEL, BLUE), (gap, in_shade(BLUE, 0.02)), (lower, BLUE))
+    assert edges(image, Cell(60, 60, 260, 306), PANEL)[3] == pytest.approx(300, abs=1.0)
