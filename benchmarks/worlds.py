@@ -84,7 +84,7 @@ def record(world: World, out: Path, *, frames: int, size: tuple[int, int], seed:
             ids = shot.thing[::_OVERSAMPLE, ::_OVERSAMPLE] + 1
             cv2.imwrite(str(out / "masks" / f"{number:06d}.png"), ids.astype(np.uint8))
             view = View(colour=rgb, patch=ids, depth_m=shot.depth_m[::_OVERSAMPLE, ::_OVERSAMPLE])
-            sightings.add(number, view, ids, np.zeros(ids.shape, np.bool_), camera, pose, rng)
+            sightings.add(number, view, ids, np.zeros(ids.shape, np.bool_), np.zeros(ids.shape, np.bool_), camera, pose, rng)
     truth = truth_document(world.things, capture_from_world, sightings)
     (out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
     write_prompts(random_clicks(out, rng), out / "prompts.json")

@@ -38,6 +38,11 @@ class LitScene:
     body_patch: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # (patches,) of what moves: not its front
 
 
+def front_patches(scene: LitScene) -> np.ndarray:
+    """(patches,) which of them are of a front that can move: its panel and its handle."""
+    return np.asarray(np.array([bool(mover) for mover in scene.mover_of_patch]) & ~scene.body_patch)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Emitter:
     """A rectangle that shines."""

@@ -12,7 +12,7 @@ import numpy as np
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.synthetic.atlas import LitScene, light_scene
+from r2c2r_core.synthetic.atlas import LitScene, front_patches, light_scene
 from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.choices import SEEDS_OWN, Choice
 from r2c2r_core.synthetic.hands import grip_of, hand_mover, hand_patches, hand_pose
@@ -160,7 +160,8 @@ def _add_frame(
     writer.add(rgb, lidar.depth_m, lidar.confidence, camera, pose, shot.timestamp_s)
     ids = np.where(view.patch >= 0, scene.object_of_patch[view.patch], 0)
     is_handle = (view.patch >= 0) & scene.handle_patch[view.patch]
-    sightings.add(number, view, ids, is_handle, camera, shot.kitchen_from_camera, rng)
+    is_front = (view.patch >= 0) & front_patches(scene)[view.patch]
+    sightings.add(number, view, ids, is_handle, is_front, camera, shot.kitchen_from_camera, rng)
     for index in np.unique(ids[ids > 0]):
         mask = (ids == index).astype(np.uint8) * np.uint8(255)
         cv2.imwrite(str(folders[index - 1] / f"{number:06d}.png"), mask, _QUICK_PNG)

@@ -16,6 +16,9 @@ from r2c2r_core.synthetic.render import View
 _BINS = 16  # slices of an axis
 _MIN_SHARE = 0.002  # a slice counts as seen when this share of all pixels showed it
 _SAMPLE_STEP = 3
+_FEWEST_PX = 12
+_CLICKED_OPEN = 0.3  # of what is filmed open
+_Click = tuple[float, int, float, float]  # how clear the view is, the frame, x, y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +84,8 @@ class Sightings:
         self._objects = objects
         self._moved = moved
         self._bins = np.zeros((len(objects), 3, _BINS), np.int64)
-        self._clicks: list[list[tuple[float, int, float, float]]] = [[] for _ in objects]
+        self._clicks: list[list[_Click]] = [[] for _ in objects]
+        self._open_clicks: list[list[_Click]] = [[] for _ in objects]
 
     def add(
         self,
@@ -89,18 +93,20 @@ class Sightings:
         view: View,
         ids: np.ndarray,
         is_handle: np.ndarray,
+        is_front: np.ndarray,
         camera: Intrinsics,
         kitchen_from_camera: Rigid3,
         rng: np.random.Generator,
     ) -> None:
-        """Take one frame into account; `ids` (h, w) are instance ids, `is_handle` (h, w) marks handle pixels."""
+        """Take one frame into account; `ids` (h, w) are instance ids, the others mark the pixels of handles and of fronts."""
         v, u = np.mgrid[_SAMPLE_STEP // 2 : camera.height : _SAMPLE_STEP, _SAMPLE_STEP // 2 : camera.width : _SAMPLE_STEP]
         seen, body = ids[v, u], ~is_handle[v, u]
         for index, thing in enumerate(self._objects):
             if frame in self._moved.get(thing.name, ()):
+                self._propose_click(self._open_clicks[index], frame, (ids == index + 1) & is_front, is_handle, rng)
                 continue
             chosen = (seen == index + 1) & body
-            if np.count_nonzero(chosen) < 12:
+            if np.count_nonzero(chosen) < _FEWEST_PX:
                 continue
             uv = np.column_stack([u[chosen], v[chosen]]) + 0.5
             points = kitchen_from_camera.apply(unproject(uv, view.depth_m[v[chosen], u[chosen]].astype(float), camera))
@@ -109,7 +115,7 @@ class Sightings:
                 within = share[(share[:, axis] > -0.02) & (share[:, axis] < 1.02), axis]
                 place = np.clip((within * _BINS).astype(int), 0, _BINS - 1)
                 self._bins[index, axis] += np.bincount(place, minlength=_BINS)
-            self._propose_click(index, frame, ids == index + 1, is_handle, rng)
+            self._propose_click(self._clicks[index], frame, ids == index + 1, is_handle, rng)
 
     def observed_axes(self, index: int) -> list[bool]:
         """Whether the object's width, depth and height were seen from end to end: in all of 16 slices but at most one."""
@@ -118,14 +124,21 @@ class Sightings:
         return [bool(seen[0] and seen[-1] and seen.sum() >= _BINS - 1) for seen in bins >= enough]
 
     def click(self, index: int, rng: np.random.Generator) -> tuple[int, float, float] | None:
-        """A frame and pixel where a person might click the object: one of the ten clearest views."""
-        ranked = sorted(self._clicks[index], reverse=True)[:10]
+        """A frame and pixel where a person might click the object: one of the ten clearest views, now and then of it open."""
+        clicks, ajar = self._clicks[index], self._open_clicks[index]
+        if ajar and rng.random() < _CLICKED_OPEN:
+            clicks = ajar
+        ranked = sorted(clicks, reverse=True)[:10]
         if not ranked:
             return None
         _, frame, x, y = ranked[int(rng.integers(len(ranked)))]
         return frame, x, y
 
-    def _propose_click(self, index: int, frame: int, mask: np.ndarray, is_handle: np.ndarray, rng: np.random.Generator) -> None:
+    def _propose_click(
+        self, clicks: list[_Click], frame: int, mask: np.ndarray, is_handle: np.ndarray, rng: np.random.Generator
+    ) -> None:
+        if np.count_nonzero(mask) < _FEWEST_PX:
+            return
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
         border = top == 0 or left == 0 or bottom == mask.shape[0] or right == mask.shape[1]
@@ -137,7 +150,7 @@ class Sightings:
             return
         pick = int(rng.integers(len(rows)))
         score = float(np.count_nonzero(mask)) * (0.05 if border else 1.0)
-        self._clicks[index].append((score, frame, left + float(columns[pick]) + 0.5, top + float(rows[pick]) + 0.5))
+        clicks.append((score, frame, left + float(columns[pick]) + 0.5, top + float(rows[pick]) + 0.5))
 
 
 def truth_document(

@@ -8,14 +8,18 @@ import cv2
 import numpy as np
 import pytest
 
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.choices import Choice
 from r2c2r_core.synthetic.layout import plan_kitchen
 from r2c2r_core.synthetic.mesh import join_patches
 from r2c2r_core.synthetic.opened_path import walk_and_open
 from r2c2r_core.synthetic.opening import Film, Front, plan_film, share_of
+from r2c2r_core.synthetic.render import View
 from r2c2r_core.synthetic.stage import SamplePaths, write_sample
 from r2c2r_core.synthetic.styled import plan_styled_kitchen
+from r2c2r_core.synthetic.truth import Sightings, true_objects
 
 FRAMES = 240
 KITCHENS = [(2, None), (5, "galley"), (8, "l"), (1, "island")]
@@ -152,3 +156,19 @@ def test_the_same_seed_opens_the_same_in_the_same_bytes(sample: SamplePaths, tmp
     again = write_sample(tmp_path, seed=3, frames=24, size=(240, 180), opened=True)
     assert again.scan.read_bytes() == sample.scan.read_bytes()
     assert again.truth.read_bytes() == sample.truth.read_bytes()
+
+
+def test_what_is_filmed_open_is_clicked_now_and_then_on_its_open_front() -> None:
+    objects = true_objects(plan_kitchen(3))
+    sightings, shape = Sightings(objects, moved={objects[0].name: frozenset({1})}), (60, 80)
+    camera, pose = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60), Rigid3()
+    view = View(colour=np.zeros((*shape, 3), np.uint8), patch=np.zeros(shape, np.int32), depth_m=np.ones(shape))
+    ids, right = np.zeros(shape, int), np.zeros(shape, bool)
+    ids[10:50, 10:70] = 1
+    right[:, 45:] = True
+    for frame in (0, 1):
+        sightings.add(frame, view, ids, np.zeros(shape, bool), right, camera, pose, np.random.default_rng(frame))
+    clicks = [sightings.click(0, np.random.default_rng(draw)) for draw in range(60)]
+    opened = [click for click in clicks if click is not None and click[0] == 1]
+    assert 5 < len(opened) < 35
+    assert all(x > 45 for _, x, _ in opened)
