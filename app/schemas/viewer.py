@@ -53,6 +53,7 @@ class ViewerShow(Shape):
     collision: bool = False  # colliders instead of what is seen (scene only)
     box: ViewerBox | None = None  # with handles to move it by (aligned only, with an object)
     full: bool = False  # every point and face, whatever it costs
+    look: Literal["object", "scene"] | None = None  # what to turn the camera to; None: it stays, unless another thing is shown
 
 
 class ViewerJoint(Shape):

@@ -16,6 +16,7 @@ from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.workspace import Workspace
 
 MAX_POINTS = 300_000
+_HALF_VIEW_RAD = np.radians(75.0 / 2)  # viser's field of view, upright
 POINTS_PER_NODE = 150_000  # one websocket frame each, so that the page stays alive while they arrive
 
 
@@ -46,9 +47,14 @@ class View:
     reduced: bool = False  # fewer points or faces are shown than there are
     gizmo: handles.Gizmo | None = None
     known_capture: Any = None
+    looked_at: tuple[Any, ...] = ()  # what the camera was turned to last
+    steady: bool = False  # it stays where the person moved it
 
     def show(self, wish: dict[str, Any]) -> None:
-        """Replace what is shown."""
+        """Replace what is shown. The camera is turned to what was not shown before, and to what `look` asks for."""
+        subject = (wish["mode"], wish.get("name"), wish.get("candidate"), wish.get("box") is not None)
+        self.steady = subject == self.looked_at and wish.get("look") is None
+        values = {joint.name: joint.value for joint in self.joints} if subject == self.looked_at else {}
         self._clear()
         self.full, self.reduced = bool(wish.get("full")), False
         self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud")
@@ -56,8 +62,11 @@ class View:
         self.text = _MODES[self.mode](self, wish)
         for number, mark in enumerate(wish.get("marks", ())):
             self._add_mark(f"/marks/{number}", mark)
-        if wish.get("focus"):
+        whole = wish.get("look") == "scene" or not self.looked_at  # at first all of the scene
+        if wish.get("focus") and not whole:
             self._look_from_path(np.asarray(wish["focus"], dtype=np.float64), distance=0.6)
+        self.move({joint.name: values[joint.name] for joint in self.joints if joint.name in values})
+        self.looked_at = subject
 
     def move(self, values: dict[str, float]) -> None:
         """Set joints, clamped to their limits; unknown names are refused."""
@@ -178,8 +187,7 @@ class View:
         limits = self.urdf.get_actuated_joint_limits()
         self.joints = [_joint(name, *limits[name]) for name in self.urdf.get_actuated_joint_names()]
         self.move({})  # until the first configuration every joint stands at the origin
-        low, high = np.percentile(self._capture().surface.vertices_world, (5, 95), axis=0)
-        self._look_from_path((low + high) / 2)
+        self._look_at_all(robot.collision_scene if collision else robot.scene)
         return f"{len(self.joints)} joints" + (", colliders" if collision else "")
 
     def _add_mark(self, node: str, mark: dict[str, Any]) -> None:
@@ -218,6 +226,15 @@ class View:
         _ = shown.vertex_normals  # without them every face is shaded flat
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 
+    def _look_at_all(self, scene: Any) -> None:
+        """From where the person who filmed stood, as far back as all of it takes."""
+        low, high = np.asarray(scene.bounds, dtype=np.float64)
+        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
+        back = positions.mean(axis=0) - (low + high) / 2
+        away = max(float(np.linalg.norm(back)), 1e-6)
+        needed = float(np.linalg.norm(high - low)) / 2 / np.sin(_HALF_VIEW_RAD)
+        self._look_from_path((low + high) / 2, distance=max(needed / away, 1.0))
+
     def _look_from_path(self, target: np.ndarray, distance: float = 1.15) -> None:
         """Look at the target from where the person who filmed stood; `distance` as a share of theirs."""
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
@@ -225,6 +242,8 @@ class View:
         self._look(target + distance * (start - target), target)
 
     def _look(self, position: np.ndarray, target: np.ndarray) -> None:
+        if self.steady:
+            return
         place, aim = tuple(float(v) for v in position), tuple(float(v) for v in target)
         self.server.initial_camera.position, self.server.initial_camera.look_at = place, aim
         for client in self.server.get_clients().values():

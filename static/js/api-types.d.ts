@@ -1015,6 +1015,7 @@ export interface ViewerShow {
   collision?: boolean;
   box?: ViewerBox | null;
   full?: boolean;
+  look?: "object" | "scene" | null;
 }
 
 /** What the 3D view shows now. */

@@ -160,6 +160,8 @@ export const KEYMAP = [
   { keys: ["[", "]"], action: "nudge", text: "Turn the object by a degree", page: "review" },
   { keys: ["Enter"], action: "store-move", text: "Use the place it was moved to", page: "review" },
   { keys: ["Escape"], action: "drop-move", text: "Put it back", page: "review" },
+  { keys: ["f"], action: "frame-object", text: "Turn the 3D view to the chosen object", page: "review" },
+  { keys: ["Shift+f"], action: "frame-scene", text: "Turn it to all of the scene", page: "review" },
   { keys: ["1"], action: "view-candidate", text: "Show the candidate alone", page: "review" },
   { keys: ["2"], action: "view-aligned", text: "Show the mesh over the scan", page: "review" },
   { keys: ["3"], action: "view-scene", text: "Show the finished scene", page: "review" },

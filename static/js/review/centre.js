@@ -97,6 +97,11 @@ export class Centre extends EventTarget {
     this.dispatchEvent(new Event("about"));
   }
 
+  /** Turn the camera to the chosen object, or back to where all of the scene is seen. @param {"object" | "scene"} look */
+  look(look) {
+    if (this.bar.mode !== "photo") this.#viewer.show({ ...this.#wanted, look });
+  }
+
   /**
    * @param {string} key
    * @param {boolean} fine

@@ -26,6 +26,8 @@ export function actionsOf({ objects, decisions, centre, comment }) {
     "previous-photo": () => photos.move(-1),
     blink: () => photos.blink(true),
     sweep: () => joints.sweep(objects.group?.name ?? null),
+    "frame-object": () => centre.look("object"),
+    "frame-scene": () => centre.look("scene"),
     "view-candidate": () => bar.set("candidate"),
     "view-aligned": () => bar.set("aligned"),
     "view-scene": () => bar.set("scene"),
