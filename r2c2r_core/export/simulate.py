@@ -62,11 +62,10 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
         findings += [*_rest_findings(rest), *_fixed_overlaps(loose, rest)]
     joints = []
     for name in progress.part(0.0, 0.7).each(joint_names(strict), "joint"):
-        result, notes = JointResult(joint=name, deepest_penetration_m=_NAN, travel_reached=_NAN), list[Finding]()
         with _apart(name, findings):
             result, notes = examine_joint(strict, solid, name)
-        joints.append(result)
-        findings += notes
+            joints.append(result)
+            findings += notes
     progress.at(0.7, "opening joints together")
     with _apart("joints together", findings):
         met = meetings(strict)
