@@ -26,11 +26,11 @@ BETTER = {
 
 
 def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
-    """Number, change of the loss down and up, the mean over the runs that moved it; the largest first."""
+    """Of numbers that stand, change of the loss down and up, the mean over the runs that moved it; the largest first."""
     found: dict[str, list[list[float]]] = {}
     for run in document["runs"]:
         for name, moves in run["numbers"].items():
-            if "error" not in moves:
+            if "error" not in moves and _stands(name):
                 found.setdefault(name, []).append(
                     [moves[at]["loss"] - moves[at]["before"] if at in moves else 0.0 for at in MOVES]
                 )
@@ -43,7 +43,7 @@ def same_everywhere(document: Mapping[str, Any]) -> set[str]:
     """Numbers whose moves changed not a byte of any step of any run that moved them."""
     moved = [(name, moves) for run in document["runs"] for name, moves in run["numbers"].items()]
     other = {name for name, moves in moved if "error" in moves or any(move["changed"] for move in moves.values())}
-    return {name for name, _ in moved} - other
+    return set(filter(_stands, {name for name, _ in moved} - other))
 
 
 def tornado(document: Mapping[str, Any]) -> str:
@@ -75,10 +75,12 @@ def tornado(document: Mapping[str, Any]) -> str:
 
 def table(document: Mapping[str, Any]) -> str:
     """The page of the documentation."""
-    rows, same = [row for row in effects(document) if _stands(row[0])], set(filter(_stands, same_everywhere(document)))
+    rows, same = effects(document), same_everywhere(document)
     still = sorted(name for name, down, up in rows if max(abs(down), abs(up)) == 0.0 and name not in same)
     untouched = sorted(filter(_stands, set.intersection(*(set(run["untouched"]) for run in document["runs"]))))
-    broken = sorted({name for run in document["runs"] for name, moves in run["numbers"].items() if "error" in moves})
+    broken = sorted(
+        {name for run in document["runs"] for name, moves in run["numbers"].items() if "error" in moves and _stands(name)}
+    )
     return "\n".join(
         [
             "# Which numbers matter",
