@@ -9,7 +9,7 @@ from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.front import Front, front_corners, front_panel
+from r2c2r_core.segment.fronts.front import Front, front_corners, front_leaf, front_panel
 from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.scene import Scene
@@ -35,7 +35,7 @@ class FoundAppliance:
     _leaves: FilmedLeaves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_leaves", FilmedLeaves(front_panel(self.front), self.category, self.scene))
+        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene))
 
     def see(self, frame: Frame) -> View:
         """Its pixels: its box, and its doors where they stand open."""

@@ -10,7 +10,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.front import Front, front_corners, front_mask, front_panel, sides_mask
+from r2c2r_core.segment.fronts.front import Front, front_corners, front_leaf, front_mask, front_panel, sides_mask
 from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.motion.leaf import OpenLeaf
@@ -39,7 +39,7 @@ class FoundFront:
     _leaves: FilmedLeaves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_leaves", FilmedLeaves(front_panel(self.front), self.category, self.scene))
+        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene))
 
     def see(self, frame: Frame) -> View:
         """Its pixels where its leaves stand in the frame."""

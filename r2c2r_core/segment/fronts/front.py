@@ -12,6 +12,7 @@ from r2c2r_core.kitchen.walls import wall_behind
 from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.fronts.units import line_clarity, unit_cell
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
@@ -113,6 +114,12 @@ def front_panel(front: Front) -> FrontPanel:
         edges=edge_strengths(front),
         seam=seam_inside(front),
     )
+
+
+def front_leaf(front: Front) -> Leaf:
+    """The measured rectangle alone, as what may have been filmed to move."""
+    pose, cell_m = Rigid3(front.run.region.world_from_plane.rotation, front_middle(front)), front.run.grid.cell_m
+    return Leaf(world_from_front=pose, width_m=front.cell.width * cell_m, height_m=front.cell.height * cell_m)
 
 
 def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = None) -> tuple[Mask, float]:

@@ -16,7 +16,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box
 from r2c2r_core.segment.appliances.fit import fit_box
-from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_panel
+from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_leaf, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -78,13 +78,13 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
     wall = depth_to_wall(front, prepared.scene.capture.room, category)
     if category.kind == "front":
         panel = front_panel(replace(front, depth_m=wall or usual_m))
-        return Measured(kind="front", front=panel, motions=FilmedLeaves(panel, category, prepared.scene).motions)
+        return Measured(kind="front", front=panel, motions=FilmedLeaves(front_leaf(front), category, prepared.scene).motions)
     fitted = fit_box(front, prepared.scene, category, wall)
     front = fitted.front
     assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
     warnings = () if fitted.depth_seen else (assumed,)
     panel = front_panel(front)
-    motions = FilmedLeaves(panel, category, prepared.scene).motions
+    motions = FilmedLeaves(front_leaf(front), category, prepared.scene).motions
     return Measured(kind="appliance", front=panel, box=appliance_box(front), warnings=warnings, motions=motions)
 
 

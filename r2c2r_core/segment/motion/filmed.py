@@ -9,7 +9,6 @@ import numpy as np
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category, Opening
 from r2c2r_core.model.motion import JointMotion
-from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.segment.motion.hypotheses import Way, moved
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
 from r2c2r_core.segment.motion.track import find_motion
@@ -41,7 +40,7 @@ _USUAL: Mapping[Opening, tuple[Way, ...]] = {
 class FilmedLeaves:
     """What moves of an object. Its motions are looked for when they are first asked for."""
 
-    panel: FrontPanel
+    whole: Leaf
     category: Category
     scene: Scene
     _filmed: tuple[tuple[Leaf, JointMotion | None], ...] | None = field(default=None, init=False, repr=False)
@@ -68,7 +67,7 @@ class FilmedLeaves:
             usual = tuned(Params).usual
             self._filmed = tuple(
                 (leaf, find_motion(leaf, self.scene, dict.fromkeys(ways, usual), part, only=bool(part)))
-                for part, leaf, ways in _leaves(self.panel, self.category)
+                for part, leaf, ways in _leaves(self.whole, self.category)
             )
         return self._filmed
 
@@ -87,17 +86,17 @@ def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=way)
 
 
-def _leaves(panel: FrontPanel, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:
+def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:
     """Name, closed rectangle and usual ways of each leaf: of a pair two halves, else the front."""
     if category.opens in ("fixed", "rigid") or category.several_fronts:  # of which only handles tell where one ends
         return []
     if category.opens != "pair":
-        return [("", _part(panel, 0.0, panel.width_m), _USUAL[category.opens])]
-    half = panel.width_m / 2
-    return [("left", _part(panel, -half / 2, half), ("left",)), ("right", _part(panel, half / 2, half), ("right",))]
+        return [("", whole, _USUAL[category.opens])]
+    half = whole.width_m / 2
+    return [("left", _part(whole, -half / 2, half), ("left",)), ("right", _part(whole, half / 2, half), ("right",))]
 
 
-def _part(panel: FrontPanel, x_m: float, width_m: float) -> Leaf:
+def _part(whole: Leaf, x_m: float, width_m: float) -> Leaf:
     """The part of a front about x_m from its middle."""
-    place = panel.world_from_front @ Rigid3(np.eye(3), np.array([x_m, 0.0, 0.0]))
-    return Leaf(world_from_front=place, width_m=width_m, height_m=panel.height_m)
+    place = whole.world_from_front @ Rigid3(np.eye(3), np.array([x_m, 0.0, 0.0]))
+    return Leaf(world_from_front=place, width_m=width_m, height_m=whole.height_m)

@@ -93,14 +93,15 @@ def _moved(leaf: Leaf, hypothesis: Hypothesis, points: Points, outward: Vector3,
     )
 
 
-def closed_counts(leaf: Leaf, scene: Scene, frame: Frame) -> tuple[int, int, int]:
-    """Of the closed leaf's points, how many depth agrees with, sees through, and sees something before."""
+def closed_counts(leaf: Leaf, scene: Scene) -> np.ndarray:
+    """Of the closed leaf's points, how many (frames, 3) depth agrees with, sees through, and sees something before."""
     points = leaf.world_from_front.apply(face_points(leaf))
-    z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+    looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in scene.frames]
+    z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
     margin = 2 * tuned(Params).floor_m
     agrees = scene.noise.agrees(seen, z, margin)
     through = scene.noise.seen_through(seen, z, margin)
-    return int(agrees.sum()), int(through.sum()), int(((seen > 0) & ~agrees & ~through).sum())
+    return np.stack([agrees, through, (seen > 0) & ~agrees & ~through]).sum(axis=2).T
 
 
 def in_view(leaf: Leaf, pose: Rigid3, scene: Scene, frame: Frame) -> bool:

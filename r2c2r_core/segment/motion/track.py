@@ -69,7 +69,7 @@ def find_motion(
     leaf that turns out to move in no way that it names is none: half a front is a leaf only where it opens as one of a pair.
     """
     params = tuned(Params)
-    counts = np.array([closed_counts(leaf, scene, frame) for frame in scene.frames])
+    counts = closed_counts(leaf, scene)
     known = counts.sum(axis=1)
     agrees = np.where(known >= params.least_known, counts[:, 0] / np.maximum(known, 1), np.nan)
     if (agrees < params.vacated_share).sum() < params.least_frames:
