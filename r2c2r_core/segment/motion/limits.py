@@ -21,23 +21,24 @@ class Params:
     least_frames: int = param(3, "count", "that show it at its widest", ge=2)
 
 
-def widest(values: np.ndarray, *, turns: bool) -> float:
-    """The widest state: the median of those that cannot be told from the largest; one frame's error does not count."""
-    still = _still(turns=turns)
-    top = float(np.quantile(values, 1 - min(2 / len(values), 0.05)))
-    return float(np.median(values[values > top - still]))
+def widest(fitted: np.ndarray, values: np.ndarray, *, turns: bool) -> float:
+    """The widest state: of those fitted, or of all that stay so wide for some frames; one frame's error does not count."""
+    still, count = _still(turns=turns), tuned(Params).least_frames
+    top = float(np.quantile(fitted, 1 - min(2 / len(fitted), 0.05)))
+    if len(values) >= count:
+        top = max(top, float(np.lib.stride_tricks.sliding_window_view(values, count).min(axis=1).max()))
+    every = np.concatenate([fitted, values])
+    return float(np.median(every[np.abs(every - top) < still]))
 
 
-def stop_seen(values: np.ndarray, seconds: Sequence[float | None], *, turns: bool) -> bool:
+def stop_seen(values: np.ndarray, seconds: Sequence[float | None], largest: float, *, turns: bool) -> bool:
     """Whether it was moved to its widest state before the camera and stood still there."""
     params, still = tuned(Params), _still(turns=turns)
-    largest = widest(values, turns=turns)
     held = np.abs(values - largest) < still
     times = np.array([k / params.fps if t is None else t for k, t in enumerate(seconds)])
     for start, stop in _stretches(held):
         long = stop - start >= params.least_frames and times[stop - 1] - times[start] >= params.dwell_s
-        beside = [k for k in (start - 1, stop) if 0 <= k < len(values)]
-        moving = any(2 * still < values[k] < largest - still for k in beside)
+        moving = start > 0 and 2 * still < values[start - 1] < largest - still  # before: what it closes from need be no stop
         if long and moving:
             return True
     return False

@@ -12,7 +12,7 @@ class Params:
     """How leaves are moved."""
 
     step_cost: float = param(0.3, "log", "for each step that a state changes between two frames")
-    jump_cost: float = param(8.0, "log", "at most: a recording may pause, and a leaf may be moved unseen")
+    jump_cost: float = param(12.0, "log", "at most: a recording may pause, and a leaf may be moved unseen")
 
 
 def best_path(log: np.ndarray) -> tuple[np.ndarray, float]:

@@ -31,6 +31,7 @@ class Params:
     vacated_share: float = param(0.5, "share", "of the readings towards a closed place, below which it may be vacated")
     closed_share: float = param(0.7, "share", "of them that agree, from which it is closed")
     least_known: int = param(20, "count", "readings towards it that a frame must have", ge=1)
+    least_closed: int = param(5, "count", "of them that tell whether it is filled, where few are in view", ge=1)
     least_frames: int = param(3, "count", "frames that must show it so, and that must show the leaf elsewhere", ge=1)
     closed_cost: float = param(60.0, "log", "against every other state where it is closed")
     gain: float = param(40.0, "log", "by which a course must explain the depth better than a leaf that never moved")
@@ -39,6 +40,7 @@ class Params:
     closed_rad: float = param(float(np.deg2rad(2.0)), "rad", "a door that stands open by less is closed: a frame's error")
     closed_m: float = param(0.01, "m", "what slides and stands open by less is closed: a frame's error, and a handle's relief")
     moves_steps: float = param(4.0, "count", "steps of states that a leaf never seen closed must move over")
+    sure: float = param(20.0, "log", "of a frame's evidence, up to which its neighbours' fits are asked about, too")
     around_steps: float = param(2.0, "count", "steps of states about its course, in which a frame without a fit is asked")
     finer: float = param(6.0, "ratio", "of those steps to the ones then tried: a board is thicker than these", gt=0)
 
@@ -71,16 +73,19 @@ def find_motion(
     params = tuned(Params)
     counts = closed_counts(leaf, scene)
     known = counts.sum(axis=1)
-    agrees = np.where(known >= params.least_known, counts[:, 0] / np.maximum(known, 1), np.nan)
-    if (agrees < params.vacated_share).sum() < params.least_frames:
+    agrees = counts[:, 0] / np.maximum(known, 1)
+    if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
         return None
-    closed = agrees > params.closed_share
+    closed = (agrees > params.closed_share) & (known >= params.least_closed)
+    through = (counts[:, 1] >= params.least_closed) & (counts[:, 1] > counts[:, 0])
     tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
     courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
-        motion = _measured(leaf, course, scene, part) if course.support > params.support else None
+        # A door leaves its place open to be seen into; where that is only hidden, another leaf stands before it.
+        into = course.hypothesis.way == "out" or (through & (course.values > 0)).sum() >= params.least_frames
+        motion = _measured(leaf, course, scene, part) if into and course.support > params.support else None
         if motion is not None:
             return None if only and course.hypothesis.way not in prior else motion
     return None
@@ -110,6 +115,7 @@ def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotio
     turns = course.hypothesis.turns
     states = _states(leaf, course, joint, seen, scene)
     values = np.array([state.value for state in states.values()], dtype=np.float64)
+    largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)
     times = [scene.frames[k].timestamp_s for k in states]
     pivot = joint.pivot - joint.axis * float(joint.axis @ joint.pivot) if turns else np.zeros(3)
     place = leaf.world_from_front
@@ -120,8 +126,8 @@ def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotio
         pivot_world=place.apply(pivot[None])[0],
         covariance=joint.covariance_in(place.rotation),
         states={scene.frames[k].index: state for k, state in states.items()},
-        largest=widest(values, turns=turns),
-        stop_seen=stop_seen(values, times, turns=turns),
+        largest=largest,
+        stop_seen=stop_seen(values, times, largest, turns=turns),
         source="measured",
     )
 
@@ -158,8 +164,8 @@ def _likeliest(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene
     """The state of a frame that has no fit of its own: it may show the leaf edge on, or a part of it."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     beside = [max((j for j in seen if j < k), default=None), min((j for j in seen if j > k), default=None)]
-    near = [seen[j][0] for j in beside if j is not None] if course.log[k] < params.told else []
-    low, high = min([float(course.values[k]), *near]), max([float(course.values[k]), *near])
+    near = [seen[j][0] for j in beside if j is not None] if course.log[k] < params.sure else []
+    low, high = (min([float(course.values[k]), *near]), max([float(course.values[k]), *near]))
     fine = step / params.finer
     tried = np.arange(max(low - params.around_steps * step, 0.0), high + params.around_steps * step + fine, fine)
     log = evidence(

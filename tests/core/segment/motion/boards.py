@@ -45,10 +45,14 @@ def filmed(
     *,
     noise_m: float = 0.004,
     hands: Sequence[int] = (),
+    other: Sequence[int] = (),
     pivot_off: tuple[float, float, float] = (0.0, 0.0, 0.0),
     seed: int = 0,
 ) -> Film:
-    """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`."""
+    """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`.
+
+    In frames `other` it is closed, and a board like it stands before it where it would be, hung on its left and opened by 0.9.
+    """
     rng = np.random.default_rng(seed)
     moving = joint(way)
     frames, depths = [], {}
@@ -58,7 +62,9 @@ def filmed(
         pose = look_at(eye, LEAF.world_from_front.apply(np.array([[0.2 * t, -0.15, -0.05]]))[0])
         turning = Rigid3(np.eye(3), np.array(pivot_off))
         leaf = LEAF.world_from_front @ turning @ moving.pose(state) @ turning.inverse
-        seen = cast_rays([*_unit(), _board(leaf), *([_arm()] if number in hands else [])], pose)
+        before = [_arm()] if number in hands else []
+        before += [_board(LEAF.world_from_front @ joint("left").pose(0.9))] if number in other else []
+        seen = cast_rays([*_unit(), _board(leaf), *before], pose)
         frames.append(
             Frame(
                 index=number,
@@ -91,7 +97,7 @@ def cast_rays(solids: Sequence[Solid], world_from_camera: Rigid3) -> np.ndarray:
 
 def _board(world_from_leaf: Rigid3) -> Solid:
     half_w, half_h = LEAF.half_m
-    return world_from_leaf, (-half_w + 0.0015, 0.0, -half_h + 0.0015), (half_w - 0.0015, THICKNESS_M, half_h - 0.0015)
+    return (world_from_leaf, (-half_w + 0.0015, 0.0, -half_h + 0.0015), (half_w - 0.0015, THICKNESS_M, half_h - 0.0015))
 
 
 def _unit() -> list[Solid]:

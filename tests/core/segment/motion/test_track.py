@@ -70,7 +70,12 @@ def test_an_arm_before_an_open_leaf_leaves_its_joint_as_it_is() -> None:
     assert np.quantile(np.abs(values - states), 0.95) < np.deg2rad(2)
 
 
-@pytest.mark.parametrize("states", [np.linspace(1.2, 0, 30), np.linspace(0, 1.2, 30), np.repeat([0.0, 1.2], 15)])
+HELD_THEN_CLOSED = np.concatenate([np.full(12, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
+
+
+@pytest.mark.parametrize(
+    "states", [np.linspace(1.2, 0, 30), np.linspace(0, 1.2, 30), np.repeat([0.0, 1.2], 15), HELD_THEN_CLOSED]
+)
 def test_open_at_the_start_left_open_or_opened_unseen(states: np.ndarray) -> None:
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
@@ -95,3 +100,8 @@ def test_half_a_front_is_a_leaf_only_where_it_opens_as_one_of_a_pair() -> None:
     states = opened_and_held(1.0)
     assert find_motion(LEAF, scene("bottom", states), {"left": 8.0}, "left", only=True) is None
     assert find_motion(LEAF, scene("left", states), {"left": 8.0}, "left", only=True) is not None
+
+
+def test_another_leaf_that_stands_where_this_one_would_is_not_this_one() -> None:
+    """Its place is only hidden then: a door that is open leaves it to be seen into."""
+    assert find_motion(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
