@@ -22,7 +22,7 @@ from r2c2r_core.synthetic.truth import TrueObject
 
 _MODEL = "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml"
 _DRAWN = 1  # the group of geoms that are seen; the others collide
-_GRIPS = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
+_GRIPS = (int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE))  # a model holds plain numbers
 _BODIES = {  # name and category: the bodies it is made of, the one that may move last; the knobs on the hood are nobody's
     ("oven_0", "range"): ("Burner 1", "Burner 2", "Burner 3", "Burner 4", "ovenroot"),
     ("hood_0", "hood"): ("hoodroot",),
