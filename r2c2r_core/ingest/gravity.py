@@ -1,7 +1,7 @@
 """Which way is up, where the floor lies, how the room is turned, and its walls."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,13 @@ class Params:
         "height of the lowest camera over the floor",
         source="nobody films from lower; keeps a table top from being the floor",
     )
+    lining_m: tuple[float, float] = param(
+        (0.03, 0.18),
+        "m",
+        "before a wall, where a plane is its lining: panels, casings of pipes, chimney breasts",
+        source="beyond the walls' own unevenness, and less than any cupboard is deep",
+    )
+    least_lining_m2: float = param(0.3, "m²", "of what is seen of a lining")
 
 
 class Levelled(NamedTuple):
@@ -135,29 +142,57 @@ def _off_axis(directions: np.ndarray, yaw: float) -> np.ndarray:
 
 
 def find_walls(planes: Sequence[Plane], points: Points, centres: Points) -> tuple[Wall, ...]:
-    """Large upright planes with next to nothing behind them; fronts of furniture have a wall or a worktop behind."""
+    """Large upright planes with next to nothing behind them, and what lines them.
+
+    Fronts of furniture have a wall or a worktop behind.
+    """
     walls: list[Wall] = []
-    for plane in planes:
-        if abs(plane.normal[2]) > np.sin(np.radians(8.0)):
+    upright = [_Upright.of(plane, centres) for plane in planes if abs(plane.normal[2]) <= np.sin(np.radians(8.0))]
+    for sheet in upright:
+        left, right = sheet.span_m
+        low, high = np.quantile(sheet.plane.points[:, 2], (0.02, 0.98))
+        if sheet.plane.area_m2 < 0.8 or right - left < 1.0 or high - low < 0.8:
             continue
+        along = points @ np.cross(_UP, sheet.normal)
+        beside = (along > left) & (along < right)
+        behind = int((beside & (points @ sheet.normal < sheet.offset_m - 0.12)).sum())
+        if behind > 0.1 * len(sheet.plane.points):
+            continue
+        if all(sheet.normal @ w.normal < 0.97 or abs(sheet.offset_m - w.offset_m) > 0.1 for w in walls):
+            walls.append(sheet.wall())
+    linings = [replace(sheet.wall(), span_m=sheet.span_m) for sheet in upright if any(_lines(sheet, wall) for wall in walls)]
+    return (*walls, *linings)
+
+
+class _Upright(NamedTuple):
+    """An upright plane that faces the cameras."""
+
+    plane: Plane
+    normal: Vector3
+    offset_m: float
+    span_m: tuple[float, float]  # along up x normal
+
+    @classmethod
+    def of(cls, plane: Plane, centres: Points) -> "_Upright":
         normal = np.array([plane.normal[0], plane.normal[1], 0.0])
         normal /= np.linalg.norm(normal)
         offset = float(np.median(plane.points @ normal))
         if np.median(centres @ normal) < offset:
             normal, offset = -normal, -offset
-        along = np.cross(_UP, normal)
-        left, right = np.quantile(plane.points @ along, (0.02, 0.98))
-        low, high = np.quantile(plane.points[:, 2], (0.02, 0.98))
-        if plane.area_m2 < 0.8 or right - left < 1.0 or high - low < 0.8:
-            continue
-        beside = (points @ along > left) & (points @ along < right)
-        behind = int((beside & (points @ normal < offset - 0.12)).sum())
-        if behind > 0.1 * len(plane.points):
-            continue
-        if all(normal @ w.normal < 0.97 or abs(offset - w.offset_m) > 0.1 for w in walls):
-            spread_m = float(np.sqrt(np.mean((plane.points @ normal - offset) ** 2)))
-            walls.append(Wall(normal=normal, offset_m=offset, area_m2=plane.area_m2, spread_m=spread_m))
-    return tuple(walls)
+        left, right = np.quantile(plane.points @ np.cross(_UP, normal), (0.02, 0.98))
+        return cls(plane, normal, offset, (float(left), float(right)))
+
+    def wall(self) -> Wall:
+        spread_m = float(np.sqrt(np.mean((self.plane.points @ self.normal - self.offset_m) ** 2)))
+        return Wall(normal=self.normal, offset_m=self.offset_m, area_m2=self.plane.area_m2, spread_m=spread_m)
+
+
+def _lines(sheet: _Upright, wall: Wall) -> bool:
+    """Whether a plane stands before a wall by less than any furniture does."""
+    params = tuned(Params)
+    before = sheet.offset_m - wall.offset_m
+    parallel = float(sheet.normal @ wall.normal) > np.cos(np.radians(params.aligned_deg))
+    return parallel and params.lining_m[0] < before < params.lining_m[1] and sheet.plane.area_m2 > params.least_lining_m2
 
 
 def _given_walls(walls: Sequence[Vector3]) -> tuple[Wall, ...]:

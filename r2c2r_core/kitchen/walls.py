@@ -26,10 +26,18 @@ class Params:
 def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -> list[float]:
     """Metres from a front back to each wall that faces the same way, nearest first; negative for walls before it.
 
+    A lining counts where it reaches along the wall to the front.
+
     `middle` is the middle of the front and `outward` its unit normal, both in the world; distances are along that normal.
     """
-    parallel = [wall for wall in walls if float(wall.normal @ outward) > np.cos(tuned(Params).parallel_rad)]
+    facing = [wall for wall in walls if float(wall.normal @ outward) > np.cos(tuned(Params).parallel_rad)]
+    parallel = [wall for wall in facing if _reaches(wall, middle)]
     return sorted(float((wall.normal @ middle - wall.offset_m) / (wall.normal @ outward)) for wall in parallel)
+
+
+def _reaches(wall: Wall, point: Vector3) -> bool:
+    along = float(np.cross([0.0, 0.0, 1.0], wall.normal) @ point)
+    return wall.span_m is None or wall.span_m[0] < along < wall.span_m[1]
 
 
 def wall_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> float | None:

@@ -73,6 +73,7 @@ class Wall:
     offset_m: float
     area_m2: float  # of the surface seen on it
     spread_m: float | None = None  # of that surface about the plane, one sigma; None: nothing was seen there
+    span_m: tuple[float, float] | None = None  # of a lining, from where to where along up x normal it reaches; None: all along
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

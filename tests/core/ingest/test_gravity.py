@@ -13,8 +13,11 @@ from r2c2r_core.model.inputs import Overrides
 TILTS = [(0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (70.0, 12.0, -25.0), (-120.0, 40.0, 10.0)]
 
 
-def kitchen(noise_m: float = 0.004) -> SurfaceSample:
-    """Floor z = 0, two walls, and a base unit 0.9 m high along one of them; oriented points, +Z up."""
+LINING = ((0.9, 2.42, 0.95), (1.3, 0, 0), (0, 0, 0.6), (0, -1, 0))  # 8 cm before the wall y = 2.5
+
+
+def kitchen(noise_m: float = 0.004, *more: tuple[tuple[float, ...], ...]) -> SurfaceSample:
+    """Floor z = 0, two walls, a base unit 0.9 m high along one of them, and `more`; oriented points, +Z up."""
     rng = np.random.default_rng(3)
     rectangles = [  # origin, edge, edge, normal
         ((0, 0, 0), (3, 0, 0), (0, 2.5, 0), (0, 0, 1)),
@@ -22,6 +25,7 @@ def kitchen(noise_m: float = 0.004) -> SurfaceSample:
         ((3, 0, 0), (0, 2.5, 0), (0, 0, 2.2), (-1, 0, 0)),
         ((0.3, 1.9, 0), (2, 0, 0), (0, 0, 0.9), (0, -1, 0)),
         ((0.3, 1.9, 0.9), (2, 0, 0), (0, 0.6, 0), (0, 0, 1)),
+        *more,
     ]
     points, normals = [], []
     for origin, a, b, normal in rectangles:
@@ -183,6 +187,15 @@ def test_a_clean_room_is_sure_of_itself():
     assert room.yaw_spread_deg < 0.2
     assert room.floor_spread_m == pytest.approx(0.004, abs=0.001)  # the noise it was made with
     assert all(w.spread_m == pytest.approx(0.004, abs=0.001) for w in room.walls)
+
+
+def test_what_lines_a_wall_is_a_wall_as_far_as_it_reaches():
+    rng = np.random.default_rng(0)
+    room = level_room(kitchen(0.004, LINING), cameras(), np.array([0.0, 0.0, 1.0]), None, rng).room
+    (lining,) = [wall for wall in room.walls if wall.span_m is not None]
+    assert len(room.walls) == 3
+    assert lining.offset_m == pytest.approx(-2.42, abs=0.005)
+    assert lining.span_m == pytest.approx((0.9, 2.2), abs=0.05)
 
 
 def test_a_wall_without_a_direction_is_refused():

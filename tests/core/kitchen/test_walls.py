@@ -1,5 +1,6 @@
 """Segment, generate and synthesize mean the same wall behind a front, at the same distance."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -63,6 +64,14 @@ def test_the_nearest_wall_that_is_possible_is_meant() -> None:
     walls = (wall_at(0.7), wall_at(0.1), wall_at(0.55))
     assert wall_behind(walls, MIDDLE, OUTWARD, category_of("cabinet").depth) == pytest.approx(0.55)
     np.testing.assert_allclose(distances_behind(walls, MIDDLE, OUTWARD), [0.1, 0.55, 0.7])
+
+
+def test_a_lining_counts_for_what_stands_before_it_alone() -> None:
+    along = float(np.cross([0.0, 0.0, 1.0], OUTWARD) @ MIDDLE)
+    before = replace(wall_at(0.55), span_m=(along - 0.2, along + 0.5))
+    beside = replace(wall_at(0.55), span_m=(along + 0.2, along + 0.9))
+    assert distances_behind((wall_at(0.63), before), MIDDLE, OUTWARD) == pytest.approx([0.55, 0.63])
+    assert distances_behind((wall_at(0.63), beside), MIDDLE, OUTWARD) == pytest.approx([0.63])
 
 
 def test_what_reaches_into_a_wall_is_told_in_metres() -> None:
