@@ -20,7 +20,10 @@ class Params:
     raised_m: float = param(0.012, "m", "before the plane, from where it is a handle: above depth noise")
     highest_m: float = param(0.10, "m", "before the plane that is kept: below things that stand in front")
     handle_thick_m: float = param(0.05, "m", "of a handle, whose holes are closed")
+    shadow_m: float = param(0.01, "m", "beside a handle, where it hides the plane")
     ledge_m: float = param(0.035, "m", "width of what is long and raised and no handle")
+    sunk_m: float = param(0.013, "m", "of the panel in a frame, at most", source="shaker doors 6-10 mm, routed ones to 12")
+    board_m: float = param(0.022, "m", "between two fronts one before the other", source="boards of 16-22 mm, and play between")
     end_window_m: float = param(0.02, "m", "beyond an end of the plane there are no points of it for this far")
 
 
@@ -49,24 +52,32 @@ class Relief:
     def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
         """Where the plane begins or ends, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
         params = tuned(Params)
-        flat = self._blocks(_box_mean(self.count * (1 - self.raised), 1), axis, block, columns, rows)
-        raised = self._blocks(_box_mean(self.count * self.raised, 1), axis, block, columns, rows)
-        share = raised / np.maximum(flat + raised, 0.05)
+        points = self.count * (1 - self.raised)
+        flat, raised, depth = (
+            self._blocks(_box_mean(values, 1), axis, block, columns, rows)
+            for values in (points, self.count * self.raised, points * self.level_m)
+        )
+        level = depth / np.maximum(flat, 1e-6)
+        handle, shadow = (round(size_m / self.cell_m) * STEP for size_m in (params.handle_thick_m, params.shadow_m))
+        flat, raised = _behind_handles(flat, raised, handle, shadow)
         reach = max(2, round(params.end_window_m / self.cell_m) * STEP)
-        before, after = _windows(flat, reach)
-        high, low = np.maximum(before, after), np.minimum(before, after)
         usual = float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
-        step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
-        score = 6 * np.clip((step - 0.55) / 0.3, 0, 1)
+        # The plane ends, or all that is near it: beside the end of a door whose handle is there, little of the plane is left.
+        found = [_ends(density, usual, reach) for density in (flat, flat + raised)]
         # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
+        share = raised / np.maximum(flat + raised, 0.05)
         ledge = _windows(share, round(params.ledge_m / self.cell_m) * STEP)
         beside = _windows(share, reach)
         rise = np.maximum(ledge[0] - beside[1], ledge[1] - beside[0])
-        score = np.maximum(score, 6 * np.clip((rise - 0.5) / 0.2, 0, 1))
-        score[:, :reach] = score[:, -reach:] = 0
-        peak = score >= cv2.dilate(score.astype(np.float32), np.ones((1, 2 * reach + 1), np.uint8)) - 1e-3
+        found.append((6 * np.clip((rise - 0.5) / 0.2, 0, 1), rise))
+        # Or it goes on further back than the panel of a frame is sunk: a door that slides before another.
+        seen = [np.maximum(window, 1e-6) for window in _windows(flat, reach)]
+        before, after = (window / n for window, n in zip(_windows(flat * level, reach), seen, strict=True))
+        back = np.where(np.minimum(*seen) > 0.4 * usual, np.abs(after - before), 0)
+        found.append((6 * np.clip((back - params.sunk_m) / (params.board_m - params.sunk_m), 0, 1), back))
+        peaks = np.max([_at_peaks(score, sharp, reach) for score, sharp in found], axis=0)
         # Ends wander by a cell or two from block to block: widened, so that blocks agree.
-        return np.asarray(cv2.dilate(np.where(peak, score, 0).astype(np.float32), np.ones((1, 5), np.uint8)))
+        return np.asarray(cv2.dilate(peaks.astype(np.float32), np.ones((1, 5), np.uint8)))
 
     def _blocks(self, values: np.ndarray, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
         """Means over blocks of the grid, (blocks, positions)."""
@@ -135,6 +146,35 @@ def _windows(values: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
         cv2.filter2D(values, -1, window, anchor=(reach - 1, 0), borderType=cv2.BORDER_CONSTANT),
         cv2.filter2D(values, -1, window, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT),
     )
+
+
+def _ends(density: np.ndarray, usual: float, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """How surely (0..6) points end at each position, and how sharply."""
+    before, after = _windows(density, reach)
+    high, low = np.maximum(before, after), np.minimum(before, after)
+    step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
+    return 6 * np.clip((step - 0.55) / 0.3, 0, 1), (high - low) / usual
+
+
+def _at_peaks(score: np.ndarray, sharp: np.ndarray, reach: int) -> np.ndarray:
+    """A score where it is sharpest: it is as sure a centimetre beside."""
+    score = score.copy()
+    score[:, :reach] = score[:, -reach:] = 0
+    sharp = np.where(score > 0, sharp, 0).astype(np.float32)
+    return np.where(sharp >= cv2.dilate(sharp, np.ones((1, 2 * reach + 1), np.uint8)) - 1e-4, score, 0)
+
+
+def _behind_handles(flat: np.ndarray, raised: np.ndarray, width: int, shadow: int) -> tuple[np.ndarray, np.ndarray]:
+    """Both without what is raised over less than `width` positions between parts of the plane, and without its shadow.
+
+    The plane goes on behind a handle; it ends at a worktop's edge.
+    """
+    element = np.ones((1, width | 1), np.uint8)
+    flat, raised = flat.astype(np.float32), raised.astype(np.float32)
+    closed = cv2.morphologyEx(flat, cv2.MORPH_CLOSE, element)
+    narrow = np.minimum(raised - cv2.morphologyEx(raised, cv2.MORPH_OPEN, element), closed)
+    handle = cv2.dilate(narrow, np.ones((1, 2 * shadow + 1), np.uint8)) > 0.5 * closed
+    return np.where(handle, closed, flat), np.where(handle, raised - narrow, raised)
 
 
 def _box_mean(values: np.ndarray, radius: int) -> np.ndarray:
