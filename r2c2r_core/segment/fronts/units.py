@@ -14,20 +14,23 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """What sizes and rows say for a panel."""
 
-    usual_worth: float = param(
-        0.6, "score", "of a usual size, beside 1 for an edge's clarity", source="as much as two and a half clear edges"
+    edge_weight: float = param(
+        0.5, "ratio", "of the network's log-odds of an edge: the cut has made use of them already", gt=0
     )
-    row_worth: float = param(0.15, "score", "of being one of a row")
+    seam_worth: float = param(
+        -3.0, "log", "of an upright seam from top to bottom inside", source="one machine in twenty: a control strip at its side"
+    )
+    row_worth: float = param(1.0, "log", "of an upper or lower edge in line with a front's beside it")
     same_area: float = param(0.85, "share", "of the largest area: less is nested, more differs by a strip of shadow")
     nested_worth: float = param(
-        0.08, "score", "by which a window inside a front may be clearer: of equals the outermost is the front"
+        1.0, "log", "by which a window inside a front may be likelier: of equals the outermost is the front"
     )
     row_m: float = param(0.015, "m", "how exactly the fronts of a row line up")
     tall_m: float = param(0.35, "m", "height from which a front is one of a row upright")
 
 
 def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
-    """The rectangle between lines of the run around a click of the size of such a unit, with the clearest edges."""
+    """The rectangle between lines of the run around a click that is the likeliest of such a unit."""
     params = tuned(Params)
     cell_m = run.grid.cell_m
     widest, tallest = unit.width.high / cell_m, unit.height.high / cell_m
@@ -45,7 +48,7 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
         if unit.height.holds((bottom - top) * cell_m)
     ]
     rated = [(_worth(run, cell, unit), cell) for cell in options]
-    best = max((worth for worth, _ in rated), default=0.0)
+    best = max((worth for worth, _ in rated), default=-np.inf)
     equal = [(worth, cell) for worth, cell in rated if worth > best - params.nested_worth]
     largest = max((cell.width * cell.height for _, cell in equal), default=0.0)
     outer = [(worth, cell) for worth, cell in equal if cell.width * cell.height > params.same_area * largest]
@@ -68,11 +71,20 @@ def line_clarity(run: Run, cell: Cell) -> tuple[float, ...]:
 
 
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
+    """Log-likelihood of a rectangle as such a unit: of its edges, what is inside, its size, and its row."""
     params = tuned(Params)
     cell_m = run.grid.cell_m
     off = np.array([unit.width.deviation(cell.width * cell_m), unit.height.deviation(cell.height * cell_m)])
-    usual = float(np.exp(-0.5 * (off @ off)))
-    return float(np.mean(line_clarity(run, cell))) + params.usual_worth * usual + params.row_worth * _in_row(run, cell)
+    edges = params.edge_weight * sum(edge_odds(run, cell)) + params.seam_worth * _seam_inside(run, cell)
+    return edges - 0.5 * float(off @ off) + params.row_worth * _in_row(run, cell)
+
+
+def _seam_inside(run: Run, cell: Cell) -> float:
+    """The probability of the likeliest of the run's upright lines that would part a rectangle from top to bottom."""
+    slack = tuned(Params).row_m / run.grid.cell_m
+    inside = {other.left for other in run.cells if cell.left + slack < other.left < cell.right - slack}
+    odds = max((run.odds.along(0, at, cell.top, cell.bottom) for at in inside), default=-np.inf)
+    return float(1 / (1 + np.exp(-odds)))
 
 
 def _in_row(run: Run, cell: Cell) -> int:

@@ -111,3 +111,18 @@ def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     )
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines)
     assert unit_cell(run, 120.0, 150.0, category_of("oven")) == frame
+
+
+def test_a_range_reaches_up_to_its_own_edge_beside_a_door_that_ends_lower() -> None:
+    """Three clear edges, a usual size and a row do not make up for a fourth that nothing shows."""
+    cells = (whole := Cell(0, 0, 240, 372), Cell(240, 0, 372, 108), Cell(240, 108, 372, 372))
+    lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (108, 240, 372), (372, 0, 372)])
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines)
+    assert unit_cell(run, 120.0, 300.0, category_of("range")) == whole
+
+
+def test_a_machine_is_parted_from_the_drawers_beside_it() -> None:
+    cells = (oven := Cell(0, 0, 160, 288), *(Cell(160, top, 320, top + 96) for top in (0, 96, 192)))
+    lines = odds(332, 300, [(0, 0, 288), (160, 0, 288), (320, 0, 288)], [(0, 0, 320), (288, 0, 320)])
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=0.0028), odds=lines)
+    assert unit_cell(run, 80.0, 150.0, category_of("oven")) == oven
