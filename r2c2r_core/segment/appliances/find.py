@@ -11,7 +11,7 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
-from r2c2r_core.segment.fronts.front import Front, depth_to_wall, near_plane, nudged
+from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.runs.edges import as_lab, panel_edges
 from r2c2r_core.segment.runs.handles import find_handles
@@ -40,9 +40,17 @@ class Params:
 
 
 def appliance_front(
-    prepared: PreparedCapture, prompt: ObjectPrompt, kind: Category, negatives: Points, *, glimpse: bool = False
+    prepared: PreparedCapture,
+    prompt: ObjectPrompt,
+    kind: Category,
+    negatives: Points,
+    others: Points = NOWHERE,
+    *,
+    glimpse: bool = False,
 ) -> tuple[Front, bool] | None:
     """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
+
+    `others` are clicks on other objects: those on its own plane are beside it.
 
     Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
     the photographs and the handle, which take most of the time.
@@ -58,7 +66,8 @@ def appliance_front(
     on = run.grid.cells_of(np.array([point, *_on_plane(prepared, region, clicks[1:])]))
     off = run.grid.cells_of(near_plane(run, negatives))
     past = looked_past(run, prepared.scene, on[0], kind)
-    cell = _rectangle(run, on, off, kind, past, _support_row(prepared, run, point, kind))
+    beside = run.grid.cells_of(near_plane(run, others))
+    cell = _rectangle(run, on, off, beside, kind, past, _support_row(prepared, run, point, kind))
     if cell is None:
         return None
     lab, seen_colour = as_lab(run.mosaic)
@@ -70,19 +79,22 @@ def appliance_front(
     return replace(fitted.front, cell=_nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)), fitted.depth_seen
 
 
-def _rectangle(run: Run, on: np.ndarray, off: np.ndarray, kind: Category, past: Mask, support_row: float | None) -> Cell | None:
-    """The rectangle around the first click; the others change the choice only where they are not just beside its border."""
-    cell = find_rectangle(run, on[:1], kind, off[:0], past, support_row)
+def _rectangle(
+    run: Run, on: np.ndarray, off: np.ndarray, beside: np.ndarray, kind: Category, past: Mask, support_row: float | None
+) -> Cell | None:
+    """The rectangle around the first click and beside other objects'; more clicks change it where not just at its border."""
+    cell = find_rectangle(run, on[:1], kind, beside, past, support_row)
     if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
         on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
-        cell = find_rectangle(run, on[:1], kind, off[:0], past, support_row)
+        cell = find_rectangle(run, on[:1], kind, beside, past, support_row)
     if cell is None:
         return None
     missed = [click for click in on[1:] if nudged(cell, click[0], click[1], 1, run.grid.cell_m) is None]
     wrong = [click for click in off if nudged(cell, click[0], click[1], 0, run.grid.cell_m) is None]
     if not missed and not wrong:
         return cell
-    return find_rectangle(run, np.array([on[0], *missed]), kind, np.array(wrong).reshape(-1, 2), past, support_row) or cell
+    refused = np.array([*wrong, *beside]).reshape(-1, 2)
+    return find_rectangle(run, np.array([on[0], *missed]), kind, refused, past, support_row) or cell
 
 
 def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Category) -> float | None:

@@ -13,7 +13,7 @@ from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import Front, depth_to_wall, find_front, seen_sides
+from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, find_front, seen_sides
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
@@ -44,7 +44,7 @@ def find_object(
         if found is not None:
             return found
     if category.kind == "appliance":
-        appliance = _appliance(prepared, prompt, category, negatives.points)
+        appliance = _appliance(prepared, prompt, category, negatives.points, others)
         if appliance is not None:
             return appliance
     thing = _thing(prepared, prompt, category, positives, negatives.points) if positives.clicks else None
@@ -115,9 +115,15 @@ def _fit(front: Front, category: Category) -> float:
 
 
 def _appliance(
-    prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, negatives: Points, *, glimpse: bool = False
+    prepared: PreparedCapture,
+    prompt: ObjectPrompt,
+    category: Category,
+    negatives: Points,
+    others: Points = NOWHERE,
+    *,
+    glimpse: bool = False,
 ) -> FoundAppliance | None:
-    front, seen = appliance_front(prepared, prompt, category, negatives, glimpse=glimpse) or (None, False)
+    front, seen = appliance_front(prepared, prompt, category, negatives, others, glimpse=glimpse) or (None, False)
     if front is None:
         return None
     return FoundAppliance(front, prepared.scene, category, warnings=() if seen else (_assumed_depth(front, prompt),))

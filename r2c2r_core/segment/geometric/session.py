@@ -22,6 +22,7 @@ from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
+from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.fronts.found import FoundFront
@@ -151,13 +152,13 @@ class GeometricSession:
         return find_object(self, prompt, hint, positives, negatives, others)
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
-        """Clicks on other fronts and machines that fall on the same front, by its name; things lie or hang on fronts."""
+        """Clicks on other fronts and machines that fall on the same front or machine, by its name; things lie on fronts."""
         beside = [prompt for prompt in prompts if category_of(prompt.category).kind != "thing"]
         clicks = [(prompt, click) for prompt in beside for click in prompt.points if click.label == 1]
         hits = [(prompt, click, point) for prompt, click in clicks if (point := self._hit(click)) is not None]
         found: dict[str, tuple[PromptPoint, ...]] = {}
         for prompt in prompts:
-            if category_of(prompt.category).kind != "front" or prompt.front is not None:
+            if category_of(prompt.category).kind == "thing" or prompt.front is not None:
                 continue
             with contextlib.suppress(R2C2RError):  # what is not found is told by `track`
                 own = self.find(prompt)
@@ -227,7 +228,7 @@ class GeometricSession:
 
 
 def _is_on(found: Found, point: Vector3) -> bool:
-    return isinstance(found, FoundFront) and found.front.holds(point)
+    return isinstance(found, FoundFront | FoundAppliance) and found.front.holds(point)
 
 
 def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:
