@@ -43,6 +43,7 @@ class FrontPanel:
     roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
     edges: tuple[float, ...] = ()  # probability of each edge: left, right, top, bottom; empty where a person drew it
     seam: float = 0.0  # probability of the likeliest seam inside it that was not cut
+    slides: float = 0.0  # probability that it slides sideways, over what it stands before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

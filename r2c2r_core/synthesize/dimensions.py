@@ -56,6 +56,7 @@ class Params:
         "of the width, from the middle, beyond which a handle is at an edge",
         source="handles of two doors meet in the middle",
     )
+    slides: float = param(0.7, "share", "probability that a door slides, from which it is built so", gt=0, lt=1)
     foot_m: float = param(
         0.035,
         "m",
@@ -159,6 +160,10 @@ def measure_object(
         placed_pose=pose,
         warnings=tuple(warnings),
     )
+    if front is not None and front.slides > tuned(Params).slides and spec.opens == "side":
+        warnings.append(f"it stands before a panel beside it: taken for a sliding door ({front.slides:.0%})")
+        measured = replace(measured, spec=category_of("sliding_door"), opened_m=None, warnings=tuple(warnings))
+        return _corrected(measured, override)
     return _corrected(replace(measured, spec=_at_width(spec, float(measured.dimensions_m[0]), handle)), override)
 
 

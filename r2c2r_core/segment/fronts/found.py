@@ -1,6 +1,6 @@
 """A front that clicks found: its rectangle, and its mask in any frame, where its leaves stand there."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class FoundFront:
     scene: Scene
     category: Category
     fit: float = 1.0  # 0..1: how well its size fits its category
+    slides: float = 0.0  # probability that it slides sideways
     kind: Kind = "front"
     warnings: tuple[str, ...] = ()
     _leaves: FilmedLeaves = field(init=False, repr=False)
@@ -63,7 +64,7 @@ class FoundFront:
 
     def panel(self) -> FrontPanel | None:
         """The rectangle and its handle."""
-        return front_panel(self.front)
+        return replace(front_panel(self.front), slides=self.slides)
 
     def motions(self) -> tuple[JointMotion, ...]:
         """How its leaves were filmed to move."""

@@ -14,9 +14,7 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """What sizes and rows say for a panel."""
 
-    edge_weight: float = param(
-        0.5, "ratio", "of the network's log-odds of an edge: the cut has made use of them already", gt=0
-    )
+    edge_weight: float = param(0.5, "ratio", "of the network's log-odds of an edge: the cut has made use of them already", gt=0)
     seam_worth: float = param(
         -3.0, "log", "of an upright seam from top to bottom inside", source="one machine in twenty: a control strip at its side"
     )

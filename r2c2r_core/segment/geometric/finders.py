@@ -14,6 +14,7 @@ from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, find_front, seen_sides
+from r2c2r_core.segment.fronts.sliding import sliding_chance
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
@@ -105,7 +106,8 @@ def _front(
         return None
     best = replace(best, depth_m=depth_to_wall(best, prepared.scene.capture.room, category) or category.depth.usual)
     best = replace(best, sides=seen_sides(best, prepared.scene))
-    return FoundFront(best, prepared.scene, category, fit=_fit(best, category))
+    slides = sliding_chance(best, prepared.planes) if category.opens == "side" else 0.0
+    return FoundFront(best, prepared.scene, category, fit=_fit(best, category), slides=slides)
 
 
 def _fit(front: Front, category: Category) -> float:

@@ -59,8 +59,8 @@ class Relief:
         )
         level = depth / np.maximum(flat, 1e-6)
         handle, shadow = (round(size_m / self.cell_m) * STEP for size_m in (params.handle_thick_m, params.shadow_m))
-        flat, raised = _behind_handles(flat, raised, handle, shadow)
         reach = max(2, round(params.end_window_m / self.cell_m) * STEP)
+        flat, raised = _behind_handles(flat, raised, handle, shadow, reach)
         usual = float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
         # The plane ends, or all that is near it: beside the end of a door whose handle is there, little of the plane is left.
         found = [_ends(density, usual, reach) for density in (flat, flat + raised)]
@@ -164,14 +164,15 @@ def _at_peaks(score: np.ndarray, sharp: np.ndarray, reach: int) -> np.ndarray:
     return np.where(sharp >= cv2.dilate(sharp, np.ones((1, 2 * reach + 1), np.uint8)) - 1e-4, score, 0)
 
 
-def _behind_handles(flat: np.ndarray, raised: np.ndarray, width: int, shadow: int) -> tuple[np.ndarray, np.ndarray]:
+def _behind_handles(flat: np.ndarray, raised: np.ndarray, width: int, shadow: int, least: int) -> tuple[np.ndarray, np.ndarray]:
     """Both without what is raised over less than `width` positions between parts of the plane, and without its shadow.
 
-    The plane goes on behind a handle; it ends at a worktop's edge.
+    The plane goes on behind a handle, for `least` positions or more; it ends at a worktop's edge.
     """
     element = np.ones((1, width | 1), np.uint8)
     flat, raised = flat.astype(np.float32), raised.astype(np.float32)
-    closed = cv2.morphologyEx(flat, cv2.MORPH_CLOSE, element)
+    panel = cv2.morphologyEx(flat, cv2.MORPH_OPEN, np.ones((1, least | 1), np.uint8))
+    closed = np.maximum(flat, cv2.morphologyEx(panel, cv2.MORPH_CLOSE, element))
     narrow = np.minimum(raised - cv2.morphologyEx(raised, cv2.MORPH_OPEN, element), closed)
     handle = cv2.dilate(narrow, np.ones((1, 2 * shadow + 1), np.uint8)) > 0.5 * closed
     return np.where(handle, closed, flat), np.where(handle, raised - narrow, raised)

@@ -1,0 +1,113 @@
+"""Whether a door slides sideways: it stands before a panel beside it that is as high, one track behind (Bayes' rule).
+
+The rival is a hinged door beside a blind panel, which is set back by the door's own thickness.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.segment.fronts.front import Front, front_middle
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs.edges import as_lab
+from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.tuning import param, tuned
+
+_GUESS = "a guess, stated as one"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What is seen beside doors that slide, and beside hinged ones."""
+
+    prior: float = param(0.03, "share", "of doors without a word on how they open that slide", gt=0, lt=1, source=_GUESS)
+    beside: float = param(22.0, "ratio", "of how often such a panel is beside a leaf to beside a hinged door", source=_GUESS)
+    back_m: tuple[float, float] = param((0.015, 0.06), "m", "from a leaf back to the next track", source="boards of 16-22 mm")
+    overlay_m: float = param(0.02, "m", "from a hinged door back to a blind panel", source="boards of 16-22 mm on buffers")
+    overlay_sigma_m: float = param(0.004, "m", "about that, with depth's own error", gt=0)
+    odd: float = param(0.2, "share", "of blind panels that are set back by any other depth", gt=0, lt=1)
+    pull_away: float = param(0.9, "share", "of leaves with the pull at the edge away from the panel", gt=0, lt=1)
+    same_colour: tuple[float, float] = param((0.9, 0.3), "share", "of panels beside leaves, and doors, in the front's colour")
+    colour: float = param(12.0, "grey", "CIELAB units within which two colours are one: shading differs")
+    wide: float = param(0.6, "share", "of the door's width that the panel goes on beside it")
+    covers: float = param(0.6, "share", "of that strip in which depth saw the panel")
+    level_m: float = param(0.03, "m", "by which their upper and lower edges may differ")
+    parallel: float = param(float(np.cos(np.radians(8.0))), "cosine", "between both")
+
+
+def sliding_chance(front: Front, planes: Sequence[PlaneRegion]) -> float:
+    """The probability that a front slides sideways over what is beside it; 0 where nothing is set back there."""
+    odds = max((_odds(front, sign, plane) for plane in planes for sign in (-1, 1)), default=-np.inf)
+    return float(1 / (1 + np.exp(-odds)))
+
+
+def _odds(front: Front, sign: int, plane: PlaneRegion) -> float:
+    """Log-odds (natural) of it over a plane on the left (-1) or right of the front."""
+    params, grid = tuned(Params), front.run.grid
+    middle = front_middle(front)
+    back_m = float((middle - plane.world_from_plane.translation) @ grid.outward)
+    parallel = float(plane.outward @ grid.outward) > params.parallel
+    if not parallel or not params.back_m[0] < back_m < params.back_m[1] or not _goes_on(front, sign, plane):
+        return -np.inf
+    spread = params.overlay_sigma_m
+    overlay = np.exp(-0.5 * ((back_m - params.overlay_m) / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    anywhere = 1 / (params.back_m[1] - params.back_m[0])
+    odds = np.log(params.prior / (1 - params.prior)) + np.log(params.beside)
+    odds -= np.log((1 - params.odd) * overlay / anywhere + params.odd)
+    return float(odds + _by_pull(front, sign) + _by_colour(front, sign))
+
+
+def _goes_on(front: Front, sign: int, plane: PlaneRegion) -> bool:
+    """Whether depth saw the plane beside the front, over its height and no higher or lower."""
+    params, cell_m = tuned(Params), front.run.grid.cell_m
+    strip, slack = _beside(front, sign), params.level_m / cell_m
+    above = Cell(strip.left, strip.top - 3 * slack, strip.right, strip.top - slack)
+    below = Cell(strip.left, strip.bottom + slack, strip.right, strip.bottom + 3 * slack)
+    inside, over, under = (_seen_share(front, part, plane) for part in (strip, above, below))
+    return inside > params.covers and max(over, under) < 1 - params.covers
+
+
+def _seen_share(front: Front, part: Cell, plane: PlaneRegion) -> float:
+    """The share of a rectangle (cells of the front's grid) behind which depth saw a plane."""
+    columns, rows = np.meshgrid(np.linspace(part.left, part.right, 12), np.linspace(part.top, part.bottom, 12))
+    points = front.run.grid.points_at(np.stack([columns.ravel(), rows.ravel()], axis=1))
+    return float(plane.supports(points, 0.0).mean())
+
+
+def _beside(front: Front, sign: int) -> Cell:
+    """The strip beside the front, as high, that a panel goes on over."""
+    cell, wide = front.cell, tuned(Params).wide * front.cell.width
+    if sign > 0:
+        return Cell(cell.right, cell.top, cell.right + wide, cell.bottom)
+    return Cell(cell.left - wide, cell.top, cell.left, cell.bottom)
+
+
+def _by_pull(front: Front, sign: int) -> float:
+    """Log of the ratio of both likelihoods by where the handle is; of hinged doors half have it on either side."""
+    if front.handle is None:
+        return 0.0
+    middle = (front.cell.left + front.cell.right) / 2
+    is_away = sign * ((front.handle.left + front.handle.right) / 2 - middle) < 0
+    away = tuned(Params).pull_away
+    return float(np.log((away if is_away else 1 - away) / 0.5))
+
+
+def _by_colour(front: Front, sign: int) -> float:
+    """The same by whether the panel has the front's colour; 0 where no photograph shows it."""
+    params = tuned(Params)
+    lab, seen = as_lab(front.run.mosaic)
+    here, there = (_colour(lab, seen, part) for part in (front.cell, _beside(front, sign)))
+    if here is None or there is None:
+        return 0.0
+    leaf, hinged = params.same_colour
+    if np.linalg.norm(here - there) < params.colour:
+        return float(np.log(leaf / hinged))
+    return float(np.log((1 - leaf) / (1 - hinged)))
+
+
+def _colour(lab: np.ndarray, seen: np.ndarray, part: Cell) -> np.ndarray | None:
+    rows = slice(max(round(part.top), 0), max(round(part.bottom), 0))
+    columns = slice(max(round(part.left), 0), max(round(part.right), 0))
+    pixels = lab[rows, columns][seen[rows, columns]]
+    return np.median(pixels, axis=0) if len(pixels) > 100 else None
