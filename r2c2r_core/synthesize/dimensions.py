@@ -160,9 +160,9 @@ def measure_object(
         placed_pose=pose,
         warnings=tuple(warnings),
     )
-    if front is not None and front.slides > tuned(Params).slides and spec.opens == "side":
+    if front is not None and front.slides > tuned(Params).slides and spec.opens == "side" and not track.motions:
         warnings.append(f"it stands before a panel beside it: taken for a sliding door ({front.slides:.0%})")
-        measured = replace(measured, spec=category_of("sliding_door"), opened_m=None, warnings=tuple(warnings))
+        measured = replace(measured, spec=category_of("sliding_door"), warnings=tuple(warnings))
         return _corrected(measured, override)
     return _corrected(replace(measured, spec=_at_width(spec, float(measured.dimensions_m[0]), handle)), override)
 
