@@ -1,6 +1,6 @@
 """A mask painted, kept and said not to be there in one frame, taken back, and in prompts.json."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -55,4 +55,57 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, serve
     page.keyboard.press("Control+z")
     expect(page.locator(".toast", has_text="Undone")).to_be_visible()
     assert said(page) == [painted]
+    context.close()
+
+
+def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Annotate").click()
+    page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
+    page.keyboard.press("1")
+    box = page.locator("r2c2r-frame-canvas canvas").bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    saved = page.locator(".stage-tools .chip").nth(1)
+
+    def drag(*path: tuple[float, float]) -> None:
+        page.mouse.move(x + path[0][0], y + path[0][1])
+        page.mouse.down()
+        for dx, dy in path[1:]:
+            page.mouse.move(x + dx, y + dy, steps=4)
+        page.mouse.up()
+
+    def area() -> int:
+        expect(saved).to_contain_text("saved")
+        (one,) = said(page)
+        return sum(one["mask"]["runs"][1::2])
+
+    def stored(act: Callable[[], None]) -> int:
+        with page.expect_response(lambda answer: answer.request.method == "PUT"):
+            act()
+        return area()
+
+    page.keyboard.press("l")
+    lassoed = stored(lambda: drag((-80, -60), (80, -60), (80, 60), (-80, 60), (-80, -60)))
+    page.keyboard.press("Shift+B")
+    erased = stored(lambda: drag((-70, 0), (70, 0)))
+    assert 0 < erased < lassoed
+    page.keyboard.press("o")
+    for dx, dy in ((-120, -90), (120, -90), (120, 90), (-120, 90)):
+        page.mouse.click(x + dx, y + dy)
+    around = stored(lambda: page.keyboard.press("Enter"))
+    assert around > lassoed
+    page.keyboard.press("Escape")
+    page.keyboard.press("Control+z")
+    expect(page.locator(".toast", has_text="Undone")).to_be_visible()
+    assert area() == erased
+    page.keyboard.press("ArrowRight")
+    with page.expect_response(lambda answer: answer.request.method == "PUT"):
+        page.keyboard.press("w")  # what is found in the next frame stands
+    expect(saved).to_contain_text("saved")
+    kept = said(page)
+    assert len(kept) == 2
+    assert all(one["mask"] is not None and sum(one["mask"]["runs"][1::2]) > 0 for one in kept)
     context.close()
