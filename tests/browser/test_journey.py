@@ -85,7 +85,9 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     expect(page.locator("r2c2r-job")).to_contain_text("segment")
     picture(page, "4-running")
     page.get_by_role("heading", name="Result").wait_for(timeout=LONG_MS)
-    expect(page.get_by_role("row", name=re.compile("top_drawer"))).to_contain_text("prismatic")
+    expect(page.get_by_role("row", name=re.compile("top_drawer"))).to_contain_text("Slides out, opens")
+    limit = page.get_by_role("row", name=re.compile("top_drawer")).locator(".chip").first
+    expect(limit).to_have_attribute("title", re.compile(f"limits: {limit.inner_text()}"))
     expect(page.get_by_role("heading", name=re.compile("Certificate"))).to_contain_text("passed")
     picture(page, "5-result")
 

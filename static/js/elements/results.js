@@ -2,6 +2,7 @@
 
 import { h } from "../dom.js";
 import { centimetres, counted, jointValue } from "../lib/format.js";
+import { motionOf } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").SceneSummary} SceneSummary */
 /** @typedef {import("../api-types").Certificate} Certificate */
@@ -37,12 +38,12 @@ export function sceneTable(scene) {
 /** @param {SceneSummary["items"][number]} item */
 function row(item) {
   const joints = item.joints.map((joint) => {
-    const source = joint.sources.axis ?? "";
+    const source = joint.sources.limits ?? ""; // it stands beside the limit
     return h(
       "div",
       {},
-      `${joint.type}, opens ${jointValue(joint.type, joint.upper)} `,
-      source ? h("span", { class: "chip" }, source) : "",
+      `${motionOf(joint)}, opens ${jointValue(joint.type, joint.upper)} `,
+      source ? h("span", { class: `chip ${source === "default" ? "warn" : ""}`, title: said(joint) }, source) : "",
     );
   });
   const rms = item.placement_rms_m === null ? "–" : `${(1000 * item.placement_rms_m).toFixed(1)} mm`;
@@ -62,6 +63,13 @@ function row(item) {
     h("td", { class: "number" }, rms),
     h("td", { class: "muted" }, item.warnings.join("; ")),
   );
+}
+
+/** Where each of its numbers comes from. @param {import("../api-types").SceneItem["joints"][number]} joint */
+function said(joint) {
+  return Object.entries(joint.sources)
+    .map(([what, source]) => `${what}: ${source}`)
+    .join(", ");
 }
 
 /**
