@@ -78,14 +78,17 @@ def find_motion(
         return None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
     through = (counts[:, 1] >= params.least_closed) & (counts[:, 1] > counts[:, 0])
+    filled = (counts[:, 0] >= params.least_closed) & (counts[:, 1] < counts[:, 0])
     tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
     courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
-        # A door leaves its place open to be seen into; where that is only hidden, another leaf stands before it.
-        into = course.hypothesis.way == "out" or (through & (course.values > 0)).sum() >= params.least_frames
-        motion = _measured(leaf, course, scene, part) if into and course.support > params.support else None
+        # A door leaves its place open to be seen into; where what shows of it is filled, another leaf stands before it.
+        opened = course.values > 0
+        hidden = (through & opened).sum() < params.least_frames and (filled & opened).sum() > opened.sum() / 2
+        hidden &= course.hypothesis.way != "out"
+        motion = _measured(leaf, course, scene, part) if not hidden and course.support > params.support else None
         if motion is not None:
             return None if only and course.hypothesis.way not in prior else motion
     return None
