@@ -77,8 +77,8 @@ def find_motion(
     if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
         return None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
-    through = (counts[:, 1] >= params.least_closed) & (counts[:, 1] > counts[:, 0])
-    filled = (counts[:, 0] >= params.least_closed) & (counts[:, 1] < counts[:, 0])
+    through = counts[:, 1] >= params.least_closed
+    filled = (counts[:, 0] >= params.least_closed) & ~through
     tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
     courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
