@@ -7,7 +7,6 @@ here it is seen from poses by which the room would hang from its floor. Pixel ce
 """
 
 import csv
-import io
 import re
 from functools import partial
 from typing import Any
@@ -91,9 +90,9 @@ def _calibration_name(files: Files) -> str:
 
 def _trajectory(files: Files, name: str) -> Trajectory:
     """The tracked base's poses by time."""
-    rows = csv.DictReader(io.StringIO(files.read(name).decode("utf-8", errors="replace")), skipinitialspace=True)
+    lines = files.read(name).decode("utf-8", errors="replace").splitlines()  # of any line endings, damaged ones too
     timed = []
-    for row in rows:
+    for row in csv.DictReader(lines, skipinitialspace=True):
         values = read_numbers(" ".join(str(row.get(column)) for column in _COLUMNS).encode())
         pose = None if values is None or values.size != len(_COLUMNS) else pose_of_quaternion(values[1:])
         if values is not None and pose is not None and np.isfinite(values[0]):
