@@ -14,6 +14,7 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.walls import floor_height
 from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
 
 WORLD = "world"
@@ -76,7 +77,8 @@ def plan_bundle(scene: ArticulatedScene) -> Plan:
         raise ExportFailed("the scene has no object", hint="add prompts, or see why the earlier stages failed")
     taken: set[str] = {WORLD}
     bodies = tuple(body for item in scene.objects for body in _bodies_of(item, taken))
-    return Plan(name=_clean(scene.name) or "scene", bodies=bodies, floor_z_m=_floor_height(bodies))
+    lowest_m = floor_height(corners for body in bodies for corners in collider_corners_world(body))
+    return Plan(name=_clean(scene.name) or "scene", bodies=bodies, floor_z_m=lowest_m)
 
 
 def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
@@ -155,11 +157,6 @@ def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:
     turn = new_from_old.rotation
     com = new_from_old.apply(inertial.com_link[None])[0]
     return Inertial(mass_kg=inertial.mass_kg, com_link=com, inertia=turn @ inertial.inertia @ turn.T)
-
-
-def _floor_height(bodies: Sequence[Body]) -> float:
-    """World height of the floor plane: 0, or lower where a collider reaches below it (levelling leaves millimetres)."""
-    return min([0.0, *(float(c[:, 2].min()) for body in bodies for c in collider_corners_world(body))])
 
 
 def collider_corners_world(body: Body) -> list[Points]:

@@ -1,6 +1,6 @@
-"""The wall behind a front: which of the room's walls that is, and how far away, for every stage."""
+"""The wall behind a front: which of the room's walls that is, and how far away, for every stage; and the floor."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,3 +48,8 @@ def wall_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth:
 def depths_in(walls: Sequence[Wall], points_world: Points) -> np.ndarray:
     """(n walls,) how far the foremost of the points reaches behind each wall, metres; negative where all are in the room."""
     return np.array([float((wall.offset_m - points_world @ wall.normal).max()) for wall in walls])
+
+
+def floor_height(parts_world: Iterable[Points]) -> float:
+    """World height of the floor plane: 0, or lower where a part of the scene reaches below it (levelling leaves millimetres)."""
+    return min([0.0, *(float(points[:, 2].min()) for points in parts_world)])

@@ -9,7 +9,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.failing import spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.walls import depths_in
+from r2c2r_core.kitchen.walls import depths_in, floor_height
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
 from r2c2r_core.tuning import param, tuned
@@ -87,12 +87,18 @@ def free_travel(
     corners = _corners(moving)
     near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < params.behind_m]
     before = np.maximum(depths_in(near_walls, corners), 0.0)
+    lowest_m = floor_height([corners, _corners(obstacles.boxes)]) - params.touch_m
 
     def blockers_at(positions: np.ndarray) -> list[str | None]:
         motions = [motion_at(item, joint, float(position)) for position in positions]
-        walled = [(depths_in(near_walls, m.apply(corners)) > before + params.wall_touch_m).any() for m in motions]
+        places = [motion.apply(corners) for motion in motions]
+        walled = [(depths_in(near_walls, place) > before + params.wall_touch_m).any() for place in places]
+        grounded = [place[:, 2].min() < lowest_m for place in places]
         found = _blockers([_moved(moving, motion) for motion in motions], obstacles, np.flatnonzero(near), objects)
-        return ["a wall" if wall else name for wall, name in zip(walled, found, strict=True)]
+        return [
+            "a wall" if wall else "the floor" if floor else name
+            for wall, floor, name in zip(walled, grounded, found, strict=True)
+        ]
 
     positions = np.linspace(0.0, joint.upper, params.steps + 1)
     blockers = blockers_at(positions)

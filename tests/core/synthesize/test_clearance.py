@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.model.scene import Box, SceneObject
 from r2c2r_core.synthesize.clearance import free_travel, gathered, motion_at, open_freely, rotation_about
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
-from tests.core.synthesize.kitchen_units import Unit, capture, placed_unit
+from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 SPARE_M, SPARE_RAD = 0.003, np.deg2rad(1.0)  # kept free before an obstacle
 ROOM = Rigid3(rotation_about_z(0.7), np.array([2.0, -1.0, 0.3]))
@@ -102,6 +103,23 @@ def test_a_door_opens_until_it_meets_a_wall_beside_its_hinge() -> None:
     assert blocker == "a wall"
     reach = 0.1 + 0.01  # to the wall, and into its centimetre of plaster
     assert np.pi / 2 < free < np.pi / 2 + np.arcsin(reach / 0.6)
+
+
+def test_a_flap_stops_where_its_handle_meets_the_floor_and_opens_wholly_above_a_plinth() -> None:
+    def oven(bottom_m: float) -> SceneObject:
+        handle = Handle(0.0, 0.3, vertical=False)
+        made = placed_unit(Unit("a", "oven", (0.0, 0.0, bottom_m + 0.35), (0.6, 0.58, 0.7), handle=handle), rng)
+        return build_scene(capture(), *([m] for m in made), Overrides(objects={}), SynthesizeConfig()).objects[0]
+
+    rng = np.random.default_rng(0)
+    grounded = oven(0.002)
+    assert grounded.warnings == ("a_door_joint opens to 86 deg of 90 deg: the floor is in the way",)
+    joint = grounded.joints[0]
+    flap = next(link for link in grounded.links if link.name == joint.child)
+    touching = motion_at(grounded, joint, joint.upper + SPARE_RAD) @ grounded.world_from_object @ flap.object_from_link
+    corners = [(touching @ box.link_from_box).apply(box_corners(box.size_m)) for box in flap.boxes]
+    assert -1e-3 < np.concatenate(corners)[:, 2].min() <= 0.0  # half a millimetre may touch; a 64th of a step
+    assert oven(0.1).joints[0].upper == pytest.approx(np.pi / 2)
 
 
 @pytest.mark.parametrize("category", ["drawer", "cabinet"])
