@@ -3,7 +3,7 @@
 Carving needs every mask to hold every bar: what a few of them lost is carved off. Depth points vote for what is there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,6 +35,11 @@ class Params:
     apart_m: float = param(0.09, "m", "between two legs, at least: nearer, a mirror image is the same leg, seen twice")
     lower: float = param(0.45, "share", "of the height, below which a leg is")
     foot_m: float = param(0.15, "m", "above the floor, from where a bar goes on down to it")
+    off_floor_m: float = param(0.03, "m", "above the floor, from where depth beside the masks is no floor")
+    leg_cell_m: float = param(0.02, "m", "side of the cells in which legs that masks left out are counted", gt=0)
+    level_m: float = param(0.03, "m", "between heights at which such a leg has a middle", gt=0)
+    slender_m: float = param(0.10, "m", "across, at every height, of such a leg")
+    tall: float = param(0.5, "share", "of the height below which a leg is, that one which masks left out has")
 
 
 class Bars(NamedTuple):
@@ -47,10 +52,13 @@ class Bars(NamedTuple):
 def find_bars(carving: Carving, views: Sequence[View]) -> Bars | None:
     """What depth saw, thickened, with the legs that it lost; None where it saw too little."""
     params = tuned(Params)
-    cells = _in_one_piece(_seen_cells(carving, views), params.cell_m)
+    cells = _in_one_piece(_seen_cells(carving, views, _in_mask, params.cell_m), params.cell_m)
     if len(cells) < params.least_cells:
         return None
-    seen, floor, count = carving.seen, carving.seen.floor, len(cells)
+    seen, floor = carving.seen, carving.seen.floor
+    if floor is not None:
+        cells = _in_one_piece(np.concatenate([cells, _unmasked_legs(carving, views, floor)]), params.cell_m)
+    count = len(cells)
     if floor is not None:
         cells = _in_one_piece(np.concatenate([cells, _lost_legs(cells, floor, float(seen.high[2]))]), params.cell_m)
     mirrored = max(len(cells) - count, 0) / len(cells)
@@ -84,18 +92,49 @@ def _lost_legs(cells: Points, floor: float, top: float) -> Points:
     return lost
 
 
-def _seen_cells(carving: Carving, views: Sequence[View]) -> Points:
-    """Middles (local) of the depth points in the cells that enough views see filled."""
+def _unmasked_legs(carving: Carving, views: Sequence[View], floor: float) -> Points:
+    """Middle lines of the tall and slender pieces that depth shows between floor and seat, and masks left out: dark legs."""
+    params = tuned(Params)
+    lowest = floor + params.off_floor_m
+    tall_m = params.lower * (float(carving.seen.high[2]) - floor)
+
+    def beside(view: View, points: Points) -> np.ndarray:
+        return ~_in_mask(view, points) & (points[:, 2] > lowest) & (points[:, 2] < floor + tall_m)
+
+    cells = _seen_cells(carving, views, beside, params.leg_cell_m)
+    legs = [_middle_line(piece) for piece in _pieces(cells, params.leg_cell_m) if np.ptp(piece[:, 2]) > params.tall * tall_m]
+    return np.concatenate([cells[:0], *(leg for leg in legs if leg is not None)])
+
+
+def _middle_line(piece: Points) -> Points | None:
+    """Points up the middle of a piece; None for one that is no leg: too wide at some height."""
+    params = tuned(Params)
+    level = np.floor(piece[:, 2] / params.level_m)
+    slices = [piece[level == z] for z in np.unique(level)]
+    if max(np.ptp(points[:, :2], axis=0).max() for points in slices) > params.slender_m:
+        return None
+    middles = np.array([np.median(points, axis=0) for points in slices])
+    heights = np.arange(middles[0, 2], middles[-1, 2], params.cell_m / 2)
+    return np.column_stack([*(np.interp(heights, middles[:, 2], middles[:, k]) for k in (0, 1)), heights])
+
+
+def _in_mask(view: View, _: Points) -> np.ndarray:
+    """Which of a view's depth points lie in the thing's mask."""
+    return depth_mask(view)[view.depth_m > 0]
+
+
+def _seen_cells(carving: Carving, views: Sequence[View], choose: Callable[[View, Points], np.ndarray], cell_m: float) -> Points:
+    """Middles (local) of the depth points that `choose` takes of each view's, in the cells that enough views see filled."""
     params = tuned(Params)
     local_from_world = carving.seen.world_from_local.inverse
-    low, high = carving.seen.low - params.cell_m, carving.seen.high + params.cell_m
-    shape = tuple(np.ceil((high - low) / params.cell_m).astype(int) + 1)
+    low, high = carving.seen.low - cell_m, carving.seen.high + cell_m
+    shape = tuple(np.ceil((high - low) / cell_m).astype(int) + 1)
     keys, means = [], []
     for view in views:
-        inside = depth_mask(view) & (view.depth_m > 0)
-        points = local_from_world.apply(view.world_from_camera.apply(depth_points(view.depth_m, view.depth_camera)[inside]))
-        points = points[((points > low) & (points < high)).all(axis=1)]
-        flat = np.ravel_multi_index(tuple(np.floor((points - low) / params.cell_m).astype(int).T), shape)
+        known = depth_points(view.depth_m, view.depth_camera)[view.depth_m > 0]
+        points = local_from_world.apply(view.world_from_camera.apply(known))
+        points = points[choose(view, points) & ((points > low) & (points < high)).all(axis=1)]
+        flat = np.ravel_multi_index(tuple(np.floor((points - low) / cell_m).astype(int).T), shape)
         unique, member = np.unique(flat, return_inverse=True)
         count = np.bincount(member, minlength=len(unique))
         keys.append(unique)
@@ -114,18 +153,10 @@ def _seen_cells(carving: Carving, views: Sequence[View]) -> Points:
 
 def _in_one_piece(cells: Points, cell_m: float) -> Points:
     """The cells of the largest piece and of those near it, each joined to it by the shortest bar."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     params = tuned(Params)
-    if len(cells) == 0:
-        return cells
-    pairs = cKDTree(cells).query_pairs(1.8 * cell_m, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
-    _, labels = connected_components(links, directed=False)
-    sizes = np.bincount(labels)
-    left = [cells[labels == k] for k in np.argsort(-sizes) if sizes[k] >= params.least_cells]
+    left = _pieces(cells, cell_m)
     if not left:
         return cells[:0]
     whole = left.pop(0)
@@ -142,6 +173,21 @@ def _in_one_piece(cells: Points, cell_m: float) -> Points:
         bridge = piece[at] + steps * (whole[index[at]] - piece[at])
         whole = np.concatenate([whole, piece, bridge])
     return whole
+
+
+def _pieces(cells: Points, cell_m: float) -> list[Points]:
+    """The cells by connected piece, largest first, without crumbs."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    if len(cells) == 0:
+        return []
+    pairs = cKDTree(cells).query_pairs(1.8 * cell_m, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    _, labels = connected_components(links, directed=False)
+    sizes = np.bincount(labels)
+    return [cells[labels == k] for k in np.argsort(-sizes) if sizes[k] >= tuned(Params).least_cells]
 
 
 def _feet(cells: Points, floor: float) -> list[Points]:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -79,6 +80,30 @@ def test_the_bars_that_depth_saw_are_the_legs_and_there_is_air_between_them(carv
         for x, y in LEGS:  # a leg's outer sides are seen, not its middle
             sides = [(x + dx, y + dy, height) for dx, dy in ((half, 0), (-half, 0), (0, half), (0, -half))]
             assert min(distance(side) for side in sides) < 0
+
+
+def test_legs_that_every_mask_left_out_are_there_where_depth_shows_them(carving, everything):
+    """Dark legs before a dark floor: colour cuts them off at the seat, depth does not."""
+    local_from_world = carving.seen.world_from_local.inverse
+
+    def on_legs(points):
+        return points[:, 2] < -0.05
+
+    def legless(view):
+        size = view.mask.shape[1::-1]
+        kept = without(view, local_from_world, on_legs) > 0
+        return replace(
+            view, mask=view.mask & cv2.resize(kept.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST).astype(bool)
+        )
+
+    found = find_bars(carving, [legless(view) for view in everything.views])
+    grid = carving.grid
+    solid = grid.centres()[found.field.ravel() < 0]
+    for height in (-0.35, -0.2, -0.1):
+        at_height = solid[np.abs(solid[:, 2] - height) < grid.voxel_m]
+        away = [np.hypot(*(at_height[:, :2] - leg).T) for leg in LEGS]
+        assert max(distances.min() for distances in away) < 0.03  # each within its own half width and a bar's
+        assert np.min(away, axis=0).max() < 0.06  # and nothing between them
 
 
 def test_where_a_corner_is_seen_to_be_empty_there_are_no_four_legs(carving, everything):
