@@ -10,6 +10,7 @@ import numpy as np
 
 from r2c2r_core.export.plan import Body, Plan
 from r2c2r_core.export.scan_fit import ScanFit
+from r2c2r_core.export.seen import Seen
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.placement import Placement, Spread
@@ -22,7 +23,11 @@ SCHEMA = 1
 
 
 def manifest_of(
-    reconstruction: Reconstruction, plan: Plan, created: str | None, fits: Mapping[str, ScanFit] | None = None
+    reconstruction: Reconstruction,
+    plan: Plan,
+    created: str | None,
+    fits: Mapping[str, ScanFit] | None = None,
+    seen: Mapping[str, Seen] | None = None,
 ) -> dict[str, Any]:
     """The manifest as a JSON document; `created` is an ISO 8601 time or None where nobody gave one."""
     capture = reconstruction.capture
@@ -38,7 +43,8 @@ def manifest_of(
         },
         "world_from_capture": _plain(capture.world_from_capture.matrix),
         "objects": [
-            _object_entry(reconstruction, plan, item, (fits or {}).get(item.name)) for item in reconstruction.scene.objects
+            _object_entry(reconstruction, plan, item, (fits or {}).get(item.name), (seen or {}).get(item.name))
+            for item in reconstruction.scene.objects
         ],
         "contradictions": [
             {"rule": found.rule, "objects": list(found.objects), "message": found.message, "mend": found.mend}
@@ -73,7 +79,9 @@ def tool_version() -> str:
         return "unknown"
 
 
-def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject, fit: ScanFit | None) -> dict[str, Any]:
+def _object_entry(
+    reconstruction: Reconstruction, plan: Plan, item: SceneObject, fit: ScanFit | None, seen: Seen | None
+) -> dict[str, Any]:
     bodies = plan.of(item.name)
     joints = [_joint_entry(item, body) for body in bodies if body.joint is not None]
     track = next((t for t in reconstruction.tracks if t.name == item.name), None)
@@ -96,6 +104,7 @@ def _object_entry(reconstruction: Reconstruction, plan: Plan, item: SceneObject,
         "placement": None if placement is None else _placement_entry(placement),
         "warp": {"residual_m": _plain(item.warp_residual_m), "paper_residual_m": _plain(item.warp_residual_paper_m)},
         "scan_fit": None if fit is None else _plain(asdict(fit)),
+        "seen": None if seen is None else _plain({"share": seen.share, "sides": seen.sides, "unseen": list(seen.unseen)}),
         "meshes": {
             "visual": [body.visual_file for body in bodies if body.visual_file is not None],
             "collision": [name for body in bodies for name in body.collision_files],

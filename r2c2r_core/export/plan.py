@@ -6,7 +6,6 @@ when a scene brings them elsewhere, because URDF and MJCF turn a body about its 
 
 import hashlib
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,6 +63,11 @@ class Plan:
     def of(self, object_name: str) -> tuple[Body, ...]:
         """The bodies of one object, its base first."""
         return tuple(body for body in self.bodies if body.object_name == object_name and not body.is_support)
+
+    def numbers(self, object_name: str) -> list[int]:
+        """Places, from 1, of the object's own bodies."""
+        own = self.of(object_name)
+        return [number for number, body in enumerate(self.bodies, start=1) if body in own]
 
     def notes(self, object_name: str) -> tuple[str, ...]:
         """What a person should know about how the object is exported."""

@@ -9,6 +9,7 @@ from r2c2r_core.export.alone import ALLOWED_DRIFT_M
 from r2c2r_core.export.certify import certificate_to_json
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M
 from r2c2r_core.export.rules.table import EVERY_RULE
+from r2c2r_core.export.seen import unseen_words
 from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import formats
 from r2c2r_core.model.report import Certificate
@@ -80,6 +81,7 @@ def _object_row(entry: dict[str, Any]) -> dict[str, Any]:
         "placement_inliers": placement.get("inliers"),
         "warp_residual_m": entry["warp"]["residual_m"],
         "scan_fit": entry["scan_fit"],
+        "seen": entry["seen"],
         "mass_kg": entry["mass_kg"],
         "warnings": entry["warnings"],
     }
@@ -162,6 +164,7 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
                 _millimetres(entry["warp"]["residual_m"]),
                 _millimetres(fit.get("median_m")),
                 _percent(fit.get("f_score_1cm")),
+                _seen(entry),
             ]
         )
     head = [
@@ -174,14 +177,22 @@ def _objects(objects: list[dict[str, Any]], pictures: dict[str, str]) -> str:
         "front fits within",
         "scan to mesh",
         "F at 1 cm",
+        "seen",
     ]
     legend = '<p class="quiet">m measured · ≥ as far as it was seen to open · i inferred · d default of the category · '
     legend += "p given by a person. "
     legend += (
         "Scan to mesh: median distance of the depth points to the closed model; F: points and visible surface within 1 cm. "
+        "Seen: share of the surface that a frame shows, but for the underside; the rest is a guess. "
     )
     pair = "Pictures: the photo, and the closed model from the same camera.</p>" if pictures else "</p>"
     return "<h2>Objects</h2>" + _table(head, rows, numeric=(3, 4, 5, 6, 7, 8), below=below) + legend + pair
+
+
+def _seen(entry: dict[str, Any]) -> str:
+    if entry["seen"] is None:
+        return "–"
+    return f'{_percent(entry["seen"]["share"])}<br><span class="quiet">{_text(unseen_words(entry["seen"]["unseen"]))}</span>'
 
 
 def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str:

@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Image, Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.seen import Seen, unseen_words
 from r2c2r_core.export.writers.meshes import box_mesh, convex_hull
 from r2c2r_core.model.report import Certificate, Finding
 
@@ -22,12 +24,12 @@ _JPEG_QUALITY = 85
 _STEPS = 65535  # positions are whole steps of their box: 0.03 mm on a fixture of 2 m
 
 
-def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> str:
+def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None, seen: Mapping[str, Seen] | None = None) -> str:
     """The page; `seen_from` is where the camera's path was, in the world, so that fronts face the reader."""
     page = (_ASSETS / "page.html").read_text(encoding="utf-8")
     for mark, content in (("STYLE", (_ASSETS / "page.css").read_text(encoding="utf-8")), ("VIEWER", _script())):
         page = page.replace(f"/*{mark}*/", content)
-    document = json.dumps(_scene(plan, certificate, seen_from), allow_nan=False)
+    document = json.dumps(_scene(plan, certificate, seen_from, seen or {}), allow_nan=False)
     return page.replace("/*SCENE*/", document.replace("<", "\\u003c"))  # no name can end the script element
 
 
@@ -37,7 +39,7 @@ def _script() -> str:
     return "(() => {\n" + "\n".join(_EXPORT.sub("", text) for text in texts) + "})();"
 
 
-def _scene(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> dict[str, Any]:
+def _scene(plan: Plan, certificate: Certificate, seen_from: Vector3 | None, seen: Mapping[str, Seen]) -> dict[str, Any]:
     numbers = {body.name: k for k, body in enumerate(plan.bodies)}
     pictures: dict[str, Image] = {}
     for body in plan.bodies:
@@ -49,7 +51,10 @@ def _scene(plan: Plan, certificate: Certificate, seen_from: Vector3 | None) -> d
         "passed": certificate.passed,
         "yaw": _yaw(plan, seen_from),
         "textures": [_jpeg_address(pictures[file]) for file in files],
-        "objects": [{"name": name, "text": _caption(plan, name)} for name in dict.fromkeys(b.object_name for b in plan.bodies)],
+        "objects": [
+            {"name": name, "text": _caption(plan, name, seen.get(name))}
+            for name in dict.fromkeys(body.object_name for body in plan.bodies)
+        ],
         "findings": [_finding(one, plan) for one in certificate.findings],
         "bodies": [_body(body, numbers, files) for body in plan.bodies],
     }
@@ -113,10 +118,12 @@ def _finding(finding: Finding, plan: Plan) -> dict[str, Any]:
     return {"severity": finding.severity, "message": f"{finding.where}: {finding.message}", "object": owner}
 
 
-def _caption(plan: Plan, object_name: str) -> str:
+def _caption(plan: Plan, object_name: str, seen: Seen | None) -> str:
     joints = sum(body.joint is not None for body in plan.of(object_name))
     mass = sum(body.link.inertial.mass_kg for body in plan.of(object_name))
-    return f"{object_name}: {mass:.1f} kg" + (f", {joints} joint{'s' if joints > 1 else ''}" if joints else "")
+    jointed = f", {joints} joint{'s' if joints > 1 else ''}" if joints else ""
+    guess = f"; {words}" if seen is not None and (words := unseen_words(seen.unseen)) else ""
+    return f"{object_name}: {mass:.1f} kg{jointed}{guess}"
 
 
 def _yaw(plan: Plan, seen_from: Vector3 | None) -> float:

@@ -7,35 +7,30 @@ the figures need no truth and mean the same for a real kitchen as for a syntheti
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
 from r2c2r_core.arrays import Faces, Mask, Points
+from r2c2r_core.export.looks import HIDDEN_M, Look, Looks, showing, spread
 from r2c2r_core.export.plan import Plan
-from r2c2r_core.export.preview import Soup, scene_soup, soup_faces
+from r2c2r_core.export.preview import Soup, soup_faces
 from r2c2r_core.failing import apart
 from r2c2r_core.geometry.camera import depth_points, sample_through
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.meshes import distances_to_mesh
-from r2c2r_core.geometry.raster import rasterize
-from r2c2r_core.model.capture import Capture, Frame
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 
 FRAMES = 8
-_SHARED_FRAMES = 40
 _POINTS = 6000  # of each side, an object
 _DENSE_POINTS = (
     60_000  # of the scan, to be near to: 6000 on a refrigerator lie 2 cm apart, and half a perfect mesh 1 cm off them
 )
 _FEWEST_POINTS = 100
-_HIDDEN_M = 0.02  # a surface further behind the measured one is hidden by something that is not in the model
-_SHOWS_SHARE = 0.25  # frames with less than this of the object's largest mask are not asked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,32 +44,19 @@ class ScanFit:
     points: int
 
 
-class _Seen(NamedTuple):
-    """One frame: what the sensor measured, and what of the model shows, by depth pixel."""
-
-    measured_m: np.ndarray
-    known: Mask
-    drawn_m: np.ndarray
-    bodies: np.ndarray  # number of the body that shows, 0: none
-
-
-def scan_fits(reconstruction: Reconstruction, plan: Plan, *, progress: Progress = SILENT) -> dict[str, ScanFit]:
+def scan_fits(reconstruction: Reconstruction, plan: Plan, looks: Looks, *, progress: Progress = SILENT) -> dict[str, ScanFit]:
     """The fit of every object by its name; objects with too few depth points, or whose fit fails, are left out."""
-    soup = scene_soup(plan, 0.0)
-    capture = reconstruction.capture
-    shared = _spread(capture.frames, _SHARED_FRAMES)
-    seen = lru_cache(maxsize=_SHARED_FRAMES)(lambda frame: _look(capture, frame, soup))
     found = {}
     for track in progress.each(reconstruction.tracks, "comparing with the scan"):
-        bodies = [k for k, body in enumerate(plan.bodies, start=1) if body.object_name == track.name and not body.is_support]
+        bodies = plan.numbers(track.name)
         if not bodies:
             continue
         with apart("export", track.name, {}):
-            frames = _frames(capture.frames, shared, track)
-            sides = [_sides(seen(frame), frame, track, bodies) for frame in frames]
+            frames = _frames(looks, track)
+            sides = [_sides(looks.at(frame), frame, track, bodies) for frame in frames]
             scan, surface = (np.concatenate([np.zeros((0, 3)), *(side[k] for side in sides)]) for k in (0, 1))
             if len(scan) >= _FEWEST_POINTS:
-                found[track.name] = _fit(scan, surface, soup, _turned_to(frames, soup, bodies))
+                found[track.name] = _fit(scan, surface, looks.soup, _turned_to(frames, looks.soup, bodies))
     return found
 
 
@@ -105,42 +87,17 @@ def f_score(to_mesh_m: np.ndarray, to_scan_m: np.ndarray, within_m: float) -> fl
     return 2 * precision * recall / max(precision + recall, 1e-12)
 
 
-def _frames(frames: Sequence[Frame], shared: Sequence[Frame], track: MaskTrack) -> Sequence[Frame]:
+def _frames(looks: Looks, track: MaskTrack) -> Sequence[Frame]:
     """Frames that show the object large and closed: of the shared ones, drawn only once, if enough of them do."""
-    largest = max((mask.area_px for mask in track.masks.values()), default=0)
-
-    def shows(frame: Frame) -> bool:
-        mask = track.masks.get(frame.index)
-        return mask is not None and mask.area_px > _SHOWS_SHARE * largest and frame.index not in track.opened_frames
-
-    some = [frame for frame in shared if shows(frame)]
-    return _spread(some if len(some) >= FRAMES // 2 else [frame for frame in frames if shows(frame)], FRAMES)
+    some = showing(looks.shared, track)
+    return spread(some if len(some) >= FRAMES // 2 else showing(looks.frames, track), FRAMES)
 
 
-def _spread(frames: Sequence[Frame], count: int) -> list[Frame]:
-    """At most `count` of the frames, evenly spread."""
-    if not frames:
-        return []
-    return [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
-
-
-def _look(capture: Capture, frame: Frame, soup: Soup) -> _Seen:
-    depth = capture.images.depth(frame.index)
-    attributes = np.repeat(soup.ids[:, None], 3, axis=1)
-    drawn = rasterize(soup.corners, soup_faces(soup), attributes, frame.depth_camera, frame.world_from_camera.inverse)
-    return _Seen(
-        measured_m=depth.metres,
-        known=depth.valid & (depth.metres > 0),
-        drawn_m=drawn.depth_m,
-        bodies=np.rint(drawn.attributes[..., 0]).astype(int),
-    )
-
-
-def _sides(seen: _Seen, frame: Frame, track: MaskTrack, bodies: list[int]) -> tuple[Points, Points]:
+def _sides(seen: Look, frame: Frame, track: MaskTrack, bodies: list[int]) -> tuple[Points, Points]:
     """World points of one frame: the scan's inside the mask; the mesh's where it shows and something was measured."""
     inside = _inside(unpack_mask(track.masks[frame.index]), frame) & seen.known
     shows = np.isin(seen.bodies, bodies)
-    judged = shows & ~_rim(shows) & seen.known & (seen.drawn_m < seen.measured_m + _HIDDEN_M)
+    judged = shows & ~_rim(shows) & seen.known & (seen.drawn_m < seen.measured_m + HIDDEN_M)
     return _in_world(frame, seen.measured_m, inside), _in_world(frame, seen.drawn_m, judged)
 
 

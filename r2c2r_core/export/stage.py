@@ -16,6 +16,7 @@ from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.archive import building_folder, opened_bundle, replace_folder, write_zip
 from r2c2r_core.export.certify import certificate_to_json, certify
+from r2c2r_core.export.looks import looks_of
 from r2c2r_core.export.manifest import manifest_of, with_blockers
 from r2c2r_core.export.pictures import write_pictures
 from r2c2r_core.export.plan import Plan, plan_bundle
@@ -25,6 +26,7 @@ from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.review import review_html
 from r2c2r_core.export.scan_fit import ScanFit, scan_fits
 from r2c2r_core.export.seal import check_seal, checksums
+from r2c2r_core.export.seen import Seen, seen_sides
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_body
 from r2c2r_core.export.writers.table import write_formats
@@ -73,10 +75,12 @@ def write_bundle(
             reconstruction, scene=_without(reconstruction.scene, lost), failures=reconstruction.failures | lost
         )
         write_formats(plan, folder, progress=progress.part(0.05, 0.1))
-        fits, pictures = dict[str, ScanFit](), dict[str, str]()
+        fits, seen, pictures = dict[str, ScanFit](), dict[str, Seen](), dict[str, str]()
         with apart("export", "the fit to the scan", {}):
-            fits = scan_fits(reconstruction, plan, progress=progress.part(0.1, 0.2))
-        manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build(), fits)
+            looks = looks_of(reconstruction.capture, plan)
+            seen = seen_sides(reconstruction, plan, looks)
+            fits = scan_fits(reconstruction, plan, looks, progress=progress.part(0.1, 0.2))
+        manifest = manifest_of(reconstruction, plan, created or _epoch_of_the_build(), fits, seen)
         _write_json(folder / "manifest.json", manifest)
         (folder / "README.txt").write_text(readme_text(plan))
         progress.at(0.2, "drawing the preview")
@@ -89,7 +93,7 @@ def write_bundle(
         manifest = with_blockers(manifest, plan, certificate.joints)
         _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
         with apart("export", "review.html", {}):
-            review = review_html(plan, certificate, _filmed_from(reconstruction.capture))
+            review = review_html(plan, certificate, _filmed_from(reconstruction.capture), seen)
             (folder / "review.html").write_text(review, encoding="utf-8")
         _write_json(folder / "manifest.json", manifest | {"files": checksums(folder)})  # last: it vouches for the others
         progress.at(0.9, "packing")

@@ -51,5 +51,5 @@ def depths_in(walls: Sequence[Wall], points_world: Points) -> np.ndarray:
 
 
 def floor_height(parts_world: Iterable[Points]) -> float:
-    """World height of the floor plane: 0, or lower where a part of the scene reaches below it (levelling leaves millimetres)."""
+    """World height of the floor plane: 0, or lower where a part reaches below it (levelling leaves millimetres)."""
     return min([0.0, *(float(points[:, 2].min()) for points in parts_world)])

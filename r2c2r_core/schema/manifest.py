@@ -156,6 +156,18 @@ class ManifestScanFit(Document):
     points: int = Field(ge=0, description="points of the scan that were compared")
 
 
+class ManifestSeen(Document):
+    """How much of its surface the frames saw; the rest is a guess. The underside does not count."""
+
+    share: float = Field(ge=0, le=1, description="of all sides together, by their area")
+    sides: dict[Literal["front", "back", "left", "right", "top"], float] = Field(
+        description="of each side of its box, 0 to 1; one that shows nothing of it is left out"
+    )
+    unseen: list[Literal["front", "back", "left", "right", "top"]] = Field(
+        description="sides of which less than a quarter was seen"
+    )
+
+
 class ManifestMeshes(Document):
     """Files of the bundle."""
 
@@ -182,6 +194,7 @@ class ManifestObject(Document):
     placement: ManifestPlacement | None = Field(description="null for what was made from the scan without clicks")
     warp: ManifestWarp = Field(description="how the mesh was fitted")
     scan_fit: ManifestScanFit | None = Field(description="the mesh beside the scan; null where it was not seen")
+    seen: ManifestSeen | None = Field(default=None, description="what was seen of it; null where that is not known")
     meshes: ManifestMeshes = Field(description="its files")
     mass_kg: float = Field(gt=0, description="kg of all its links")
     warnings: list[str] = Field(description="what every stage said about it")

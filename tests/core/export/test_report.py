@@ -112,4 +112,4 @@ def test_findings_of_one_rule_share_a_row_and_remarks_stand_under_their_object()
     manifest["objects"][0]["warnings"] = [EVIL]
     noted = report_html(manifest, report_of(manifest, certificate(), {}), {})
     assert '<tr class="noted"><td rowspan="2">' in noted
-    assert '<td colspan="8"><ul class="quiet"><li>&lt;script&gt;' in noted
+    assert '<td colspan="9"><ul class="quiet"><li>&lt;script&gt;' in noted

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.export import pictures, scan_fit
+from r2c2r_core.export.looks import looks_of
 from r2c2r_core.export.pictures import write_pictures
-from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.plan import Plan, plan_bundle
 from r2c2r_core.export.preview import scene_soup, soup_faces
-from r2c2r_core.export.scan_fit import f_score, scan_fits
+from r2c2r_core.export.scan_fit import ScanFit, f_score, scan_fits
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Depth
@@ -51,10 +52,14 @@ def filmed(behind_m: float, hidden_columns: int = 0) -> Reconstruction:
     return replace(item, tracks=tracks, capture=replace(item.capture, images=images))
 
 
+def fits_of(item: Reconstruction, plan: Plan) -> dict[str, ScanFit]:
+    return scan_fits(item, plan, looks_of(item.capture, plan))
+
+
 @pytest.mark.parametrize("behind_m", [0.0, 0.004, 0.015])
 def test_a_model_as_far_from_the_scan_as_it_is(behind_m: float) -> None:
     item = filmed(behind_m)
-    fit = scan_fits(item, plan_bundle(item.scene))["drawer_1"]  # a flat front, filmed straight on
+    fit = fits_of(item, plan_bundle(item.scene))["drawer_1"]  # a flat front, filmed straight on
     assert fit.median_m == pytest.approx(behind_m, abs=0.0015)
     assert fit.f_score_1cm == pytest.approx(1.0 if behind_m < 0.01 else 0.0, abs=0.02)
     assert fit.f_score_2cm == pytest.approx(1.0, abs=0.02)
@@ -74,7 +79,7 @@ def test_an_object_that_cannot_be_judged_or_pictured_ends_nothing(tmp_path: Path
     monkeypatch.setattr(scan_fit, "unpack_mask", unpacked)
     window = pictures._window
     monkeypatch.setattr(pictures, "_window", lambda mask: (unpacked(mask), window(mask))[1])
-    assert set(scan_fits(item, plan)) == clicked - {item.tracks[0].name}
+    assert set(fits_of(item, plan)) == clicked - {item.tracks[0].name}
     assert set(write_pictures(item, plan, tmp_path)) == clicked - {item.tracks[0].name}
 
 
@@ -84,7 +89,7 @@ def test_surface_that_something_unnamed_hides_is_not_judged() -> None:
     left, width = item.tracks[0].masks[0].left, item.tracks[0].masks[0].box_width
     covered = filmed(0.0, hidden_columns=left + width // 2)
     assert covered.tracks[0].masks[0].area_px < 0.7 * item.tracks[0].masks[0].area_px
-    assert scan_fits(covered, plan_bundle(item.scene))[name].f_score_1cm == pytest.approx(1.0, abs=0.02)
+    assert fits_of(covered, plan_bundle(item.scene))[name].f_score_1cm == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
@@ -95,7 +100,7 @@ def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
     for mask in masks.values():
         mask[np.flatnonzero(mask.any(axis=1))[0]] = False
     shorter = replace(item.tracks[2], masks={index: pack_mask(mask) for index, mask in masks.items()})
-    fits = scan_fits(replace(item, tracks=(shorter,)), plan_bundle(item.scene))
+    fits = fits_of(replace(item, tracks=(shorter,)), plan_bundle(item.scene))
     assert fits["double_1"].f_score_1cm > 0.995
 
 
@@ -103,7 +108,7 @@ def test_frames_in_which_a_door_stands_open_are_not_asked() -> None:
     item = filmed(0.0)
     opened = motion(dict.fromkeys(item.tracks[0].masks, 1.0), "left")
     tracks = (replace(item.tracks[0], motions=(opened,)), *item.tracks[1:])
-    found = scan_fits(replace(item, tracks=tracks), plan_bundle(item.scene))
+    found = fits_of(replace(item, tracks=tracks), plan_bundle(item.scene))
     assert item.tracks[0].name not in found
     assert item.tracks[1].name in found
 
@@ -111,7 +116,7 @@ def test_frames_in_which_a_door_stands_open_are_not_asked() -> None:
 def test_objects_without_depth_points_have_no_fit() -> None:
     item = filmed(0.0)
     empty = tuple(replace(track, masks={}) for track in item.tracks)
-    assert scan_fits(replace(item, tracks=empty), plan_bundle(item.scene)) == {}
+    assert fits_of(replace(item, tracks=empty), plan_bundle(item.scene)) == {}
 
 
 def test_the_f_score_is_the_harmonic_mean_of_both_shares() -> None:
