@@ -13,7 +13,7 @@ from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
-from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.prepared import PreparedCapture
@@ -70,8 +70,8 @@ def appliance_front(
     cell = _rectangle(run, on, off, beside, kind, past, _support_row(prepared, run, point, kind))
     if cell is None:
         return None
-    lab, seen_colour = as_lab(run.mosaic)
-    cell = panel_edges(cell, lab, seen_colour, np.ones_like(run.seen), run.grid.cell_m)
+    surface = surface_of(run.mosaic, run.relief, np.ones_like(run.seen))
+    cell = panel_edges(cell, surface, run.grid.cell_m)
     handle = None if glimpse else find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_to_wall(front, prepared.scene.capture.room, kind)

@@ -14,7 +14,7 @@ from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.fronts.units import line_clarity, unit_cell
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.occlusion import Facet, visible_mask
-from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import GridHandle, find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.runs.run import Run
@@ -93,8 +93,8 @@ def find_front(
         if cell.contains(float(column), float(row)):
             cell = _parted(cell, float(column), float(row), run, on)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
-    lab, seen = as_lab(run.mosaic)
-    return Front(run, panel_edges(_supported(cell, run), lab, seen, run.seen, run.grid.cell_m), handle, 0.0)
+    surface = surface_of(run.mosaic, run.relief, run.seen)
+    return Front(run, panel_edges(_supported(cell, run), surface, run.grid.cell_m), handle, 0.0)
 
 
 def front_panel(front: Front) -> FrontPanel:

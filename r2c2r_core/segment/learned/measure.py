@@ -20,7 +20,7 @@ from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_leaf, fr
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
-from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import find_handles
 from r2c2r_core.segment.runs.orthomosaic import Cell, joined
 from r2c2r_core.segment.runs.prepared import PreparedCapture
@@ -99,8 +99,7 @@ def _front(
     if voted is None:
         return None
     cell = _as_cut(run, voted)
-    lab, seen = as_lab(run.mosaic)
-    cell = panel_edges(cell, lab, seen, run.seen, run.grid.cell_m)
+    cell = panel_edges(cell, surface_of(run.mosaic, run.relief, run.seen), run.grid.cell_m)
     handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
     return Front(run, cell, handle, category.depth.usual)
 

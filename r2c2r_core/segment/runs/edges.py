@@ -6,7 +6,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
+from r2c2r_core.segment.runs.relief import Relief
 from r2c2r_core.tuning import param, tuned
 
 
@@ -44,6 +45,24 @@ class Params:
         0.02, "m", "of what is dark of a channel over a front, at most", source="worktops are 20-40 mm thick"
     )
     open_gap_m: float = param(0.004, "m", "of a gap wide enough to see into", source="gaps between fronts are 2-4 mm")
+    known: float = param(0.15, "share", "of the panel's depth points, of what depth sees")
+    recess_m: float = param(0.0125, "m", "of a recessed channel as depth shows it", source="the least that hands reach into")
+    thick_m: float = param(0.014, "m", "of fronts at least, and so the depth of a channel", source="boards of 16-22 mm")
+    behind_m: float = param(0.006, "m", "behind the plane, on average, of what is not the panel", source="depth of many frames")
+    before_m: float = param(0.004, "m", "before the plane, on average, of a lip", source="worktops stand 1-3 cm over fronts")
+    depth_off_m: float = param(
+        0.005, "m", "by which depth of many frames is off along the plane", source="a cell of the relief"
+    )
+
+
+class Surface(NamedTuple):
+    """What a run shows of its plane, on grid cells (rows, columns)."""
+
+    lab: np.ndarray  # (rows, columns, 3), the mosaic's CIELAB colours
+    seen: np.ndarray  # where it has colour
+    on_plane: np.ndarray  # where depth saw the plane
+    height_m: np.ndarray  # mean height of depth over the plane; 0 where there is none
+    points: np.ndarray  # of depth that the mean is of
 
 
 class Profile(NamedTuple):
@@ -53,43 +72,52 @@ class Profile(NamedTuple):
     slope: np.ndarray  # of lightness, signed
     light: np.ndarray  # relative luminance, 0..1; nan where nothing is known
     support: np.ndarray  # share of cells for which depth saw the plane
+    height: np.ndarray  # metres over the plane; nan where nothing is known
+    points: np.ndarray  # of depth, in a cell
 
     def mirrored(self) -> "Profile":
         """As met from the other end."""
-        return Profile(self.gradient[::-1], -self.slope[::-1], self.light[::-1], self.support[::-1])
+        return Profile(
+            self.gradient[::-1], -self.slope[::-1], self.light[::-1], self.support[::-1], self.height[::-1], self.points[::-1]
+        )
 
 
-def panel_edges(cell: Cell, lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, cell_m: float) -> Cell:
-    """The panel's rectangle: `lab` is the mosaic, `seen` where it has colour, `on_plane` where depth saw the plane."""
+def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Cell:
+    """The panel's rectangle, refined from where it was cut."""
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     if rows.stop - rows.start < 12 or columns.stop - columns.start < 12:
         return cell
-    left, right = _ends(cell.left, cell.right, _profiles(lab, seen, on_plane, rows, axis=0), cell_m)
-    across = _profiles(lab, seen, on_plane, columns, axis=1)
+    left, right = _ends(cell.left, cell.right, _profiles(surface, rows, axis=0), cell_m)
+    across, lab = _profiles(surface, columns, axis=1), surface.lab[:, columns]
     top, bottom = _ends(cell.top, cell.bottom, across, cell_m)
-    below = _below_upper_face(top, bottom, across, lab[:, columns], cell_m)
-    return Cell(left, _above_shadow(top, bottom, lab[:, columns], cell_m) if below is None else below, right, bottom)
+    below = _below_upper_face(top, bottom, across, lab, cell_m)
+    if below is None:
+        below = _above_shadow(top, bottom, lab, cell_m) if _lip_over(top, across, cell_m) else top
+    return Cell(left, below, right, bottom)
 
 
-def _profiles(lab: np.ndarray, seen: np.ndarray, on_plane: np.ndarray, across: slice, axis: int) -> Profile:
+def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
     """Along an axis, over the middle of the panel's span."""
     inset = (across.stop - across.start) // 8
     middle = slice(across.start + inset, across.stop - inset)
     if axis == 0:
-        colours, known, support = lab[middle], seen[middle], on_plane[middle]
+        colours, known, support, height, points = (values[middle] for values in surface)
     else:
-        colours, known, support = lab[:, middle].transpose(1, 0, 2), seen[:, middle].T, on_plane[:, middle].T
+        colours, known, support, height, points = (np.swapaxes(values[:, middle], 0, 1) for values in surface)
     change = np.linalg.norm(np.roll(colours, -1, axis=1) - np.roll(colours, 1, axis=1), axis=2) / 2
     slopes = (np.roll(colours[..., 0], -1, axis=1) - np.roll(colours[..., 0], 1, axis=1)) / 2
     valid = known & np.roll(known, 1, axis=1) & np.roll(known, -1, axis=1)
     count = valid.sum(axis=0)
-    _, middle = _middles(change, valid)
-    gradient = np.where(count > 0.3 * len(valid), middle, 0.0)
+    _, middle_change = _middles(change, valid)
+    gradient = np.where(count > 0.3 * len(valid), middle_change, 0.0)
     gradient[[0, -1]] = 0
     slope = np.where(count > 0, np.mean(_middles(slopes, valid), axis=0), 0.0)
     slope[[0, -1]] = 0
     light = np.where(count > 0, _luminance(np.mean(_middles(colours[..., 0], valid), axis=0)), np.nan)
-    return Profile(np.where(np.isfinite(gradient), gradient, 0.0), slope, light, support.mean(axis=0))
+    high = np.where(points.any(axis=0), (height * points).sum(axis=0) / np.maximum(points.sum(axis=0), 1e-6), np.nan)
+    return Profile(
+        np.where(np.isfinite(gradient), gradient, 0.0), slope, light, support.mean(axis=0), high, points.mean(axis=0)
+    )
 
 
 def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
@@ -114,7 +142,7 @@ def _own(low: float, high: float, profile: Profile) -> float:
 
 def _end(low: float, high: float, profile: Profile, own: float, cell_m: float) -> float:
     """The lower edge, in positions where i + 0.5 is the middle of cell i."""
-    params, (gradient, slope, light, support) = tuned(Params), profile
+    params, (gradient, slope, light, support, *_) = tuned(Params), profile
     usual = float(np.median(support[round(low) : round(high)]))
     covered = np.flatnonzero(support[round(low) : round((low + high) / 2)] > 0.4 * usual)
     start = low
@@ -122,6 +150,9 @@ def _end(low: float, high: float, profile: Profile, own: float, cell_m: float) -
         start = low + float(covered[0])  # the cut followed a shadow or an edge of something beside the panel
     start = max(start, low + _dark_from(round(low), round((low + high) / 2), light, cell_m))
     least = max(params.clear * own, params.least_gradient)
+    begins = _plane_from(low, high, profile, cell_m)
+    if begins is not None:
+        return _step_near(begins, gradient, least, cell_m)
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
@@ -152,6 +183,40 @@ def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float
     begins = int(np.argmax(near))
     inside = np.flatnonzero(~near[begins:])
     return float(begins + inside[0]) if near[:3].any() and len(inside) else 0.0
+
+
+def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> int | None:
+    """Where depth shows a panel to begin beside a recessed channel: a strip behind its plane, between two on it; else None."""
+    params, first = tuned(Params), round(low)
+    inside = slice(first, round(high))
+    height = profile.height - float(np.nanmedian(profile.height[inside]))
+    known = profile.points > params.known * float(np.median(profile.points[inside]))
+    reach = round(params.channel_m / cell_m)
+    start, stop = max(first - 2 * reach, 0), min(first + reach, round((low + high) / 2))
+    behind = start + np.flatnonzero((known & (height < -params.behind_m))[start:stop])
+    if len(behind) * cell_m < params.recess_m or height[behind].min() > -params.thick_m:
+        return None
+    beyond = slice(max(int(behind[0]) - reach, 0), int(behind[0]))
+    return int(behind[-1]) + 1 if (known & (height > -params.behind_m / 2))[beyond].any() else None
+
+
+def _step_near(begins: int, gradient: np.ndarray, least: float, cell_m: float) -> float:
+    """The innermost clear step of colour from where depth shows a panel to begin, or else the clearest one there."""
+    params = tuned(Params)
+    off = round(params.depth_off_m / cell_m)
+    first, last = begins - off, begins + round(params.inside_m / cell_m) + 1
+    peaks = _peaks(gradient[first - 1 : last], least)
+    if peaks:
+        return first - 1 + peaks[-1] + 0.5
+    return first + int(np.argmax(gradient[first : begins + off + 1])) + 0.5
+
+
+def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
+    """Whether something stands out directly over a panel, which may throw a shadow on it."""
+    params, start = tuned(Params), round(top)
+    over = profile.height[max(start - round(params.shadow_m / cell_m), 0) : start]
+    known = over[np.isfinite(over)]
+    return not len(known) or bool(np.median(known) > params.before_m)
 
 
 def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> float:
@@ -264,6 +329,17 @@ def _same_colour(first: np.ndarray, second: np.ndarray) -> bool:
 def _luminance(lightness: np.ndarray) -> np.ndarray:
     """Relative luminance 0..1 of OpenCV's 8-bit CIELAB lightness."""
     return np.asarray(((np.asarray(lightness) * (100 / 255) + 16) / 116) ** 3)
+
+
+def surface_of(mosaic: np.ndarray, relief: Relief, on_plane: np.ndarray) -> Surface:
+    """Of a mosaic (rows, columns, 3), the relief of the same plane and where depth saw the plane."""
+    lab, seen = as_lab(mosaic)
+    height = relief.raised * relief.lift_m + (1 - relief.raised) * relief.level_m
+    height, points = (
+        np.repeat(np.repeat(values, STEP, axis=0), STEP, axis=1)[: lab.shape[0], : lab.shape[1]]
+        for values in (height, relief.count)
+    )
+    return Surface(lab, seen, on_plane, height, points)
 
 
 def as_lab(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

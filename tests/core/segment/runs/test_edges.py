@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.runs.edges import as_lab, panel_edges
+from r2c2r_core.segment.runs.edges import Surface, as_lab, panel_edges
 from r2c2r_core.segment.runs.orthomosaic import Cell
 
 CELL_M = 0.0025
@@ -20,10 +20,17 @@ def mosaic(*areas: tuple[Cell, tuple[int, int, int]], background: tuple[int, int
     return np.asarray(cv2.GaussianBlur(image, (0, 0), blur))
 
 
-def edges(image: np.ndarray, cut: Cell, on_plane: Cell) -> tuple[float, ...]:
-    plane = np.zeros(image.shape[:2], bool)
-    plane[round(on_plane.top) : round(on_plane.bottom), round(on_plane.left) : round(on_plane.right)] = True
-    found = panel_edges(cut, *as_lab(image), plane, CELL_M)
+def area(cell: Cell) -> tuple[slice, slice]:
+    return slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
+
+
+def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, float]) -> tuple[float, ...]:
+    """Where depth sees nothing but what has a height (m over the plane) and the plane."""
+    plane, height, points = (np.zeros(image.shape[:2]) for _ in range(3))
+    plane[area(on_plane)] = points[area(on_plane)] = 1
+    for cell, height_m in heights:
+        height[area(cell)], points[area(cell)] = height_m, 1
+    found = panel_edges(cut, Surface(*as_lab(image), plane > 0, height, points), CELL_M)
     return found.left, found.top, found.right, found.bottom
 
 
@@ -75,3 +82,34 @@ def test_a_panel_cut_at_the_far_side_of_a_dark_gap_ends_before_it() -> None:
     gap, lower = Cell(60, 300, 260, 306), Cell(60, 306, 260, 350)
     image = mosaic((PANEL, BLUE), (gap, in_shade(BLUE, 0.02)), (lower, BLUE))
     assert edges(image, Cell(60, 60, 260, 306), PANEL)[3] == pytest.approx(300, abs=1.0)
+
+
+CHANNEL = Cell(60, 45, 260, 60)
+
+
+@pytest.mark.parametrize("rail", [(150, 150, 150), (30, 32, 35)])
+def test_a_front_below_a_recessed_channel_begins_where_depth_meets_its_plane(rail: tuple[int, int, int]) -> None:
+    upper, recess, face = Cell(60, 0, 260, 45), Cell(60, 45, 260, 52), Cell(60, 52, 260, 60)
+    image = mosaic((PANEL, BLUE), (upper, BLUE), (recess, rail), (face, in_shade(BLUE, 0.8)))
+    depth = ((upper, 0.0), (recess, -0.022), (face, -0.011))
+    for cut in (50, 54, 60):
+        assert edges(image, Cell(60, cut, 260, 300), PANEL, *depth)[1] == pytest.approx(60, abs=1.5)
+
+
+def test_a_front_above_a_recessed_channel_ends_where_depth_leaves_its_plane() -> None:
+    recess, face, lower = Cell(60, 300, 260, 307), Cell(60, 307, 260, 315), Cell(60, 315, 260, 360)
+    image = mosaic((PANEL, BLUE), (recess, (150, 150, 150)), (face, in_shade(BLUE, 0.8)), (lower, BLUE))
+    depth = ((recess, -0.022), (face, -0.011), (lower, 0.0))
+    assert edges(image, Cell(60, 60, 260, 307), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
+
+
+def test_depth_that_falls_off_at_a_free_end_moves_no_edge() -> None:
+    image = mosaic((PANEL, BLUE))
+    flying = (Cell(60, 60, 260, 66), -0.015)  # depth of an edge is mixed with that of what is behind it
+    assert edges(image, PANEL, PANEL, flying)[1] == pytest.approx(60, abs=EDGE_CELLS)
+
+
+def test_a_wall_darker_than_the_front_before_it_is_no_shadow_on_it() -> None:
+    wall = Cell(0, 0, 320, 60)
+    image = mosaic((PANEL, (200, 203, 190)), (wall, (165, 171, 168)), (Cell(60, 50, 260, 60), in_shade((200, 203, 190), 0.7)))
+    assert edges(image, PANEL, PANEL, (wall, -0.03))[1] == pytest.approx(60, abs=EDGE_CELLS)
