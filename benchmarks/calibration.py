@@ -31,6 +31,7 @@ from r2c2r_core.evaluate.iou import MIN_TRUTH_PX
 from r2c2r_core.evaluate.joints import joint_errors
 from r2c2r_core.evaluate.records import ObjectRecord, read_truth
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.ledger import Stage
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import Prompts
 from r2c2r_core.model.scene import SceneObject
@@ -50,23 +51,26 @@ RIGHT = {
 SLOPE_SPREAD = 0.5  # standard deviation of a slope about 1 before any claim is known: few claims keep their order of sureness
 MOST_FRAMES = 45  # of a recording, spread over it
 LOOSE = (1.5, 0.015)  # degrees, metres: the accuracy that a placement is asked for
+EDGE_M = 0.01  # an edge is right within it
+SEAM_M = 0.035  # beyond the truth, a front holds some of the next one
 Claim = dict[str, Any]
 
 
-def claims_of(folder: Path, work: Workspace, config: ReconstructConfig) -> list[Claim]:
+def claims_of(folder: Path, work: Workspace, config: ReconstructConfig, until: Stage) -> list[Claim]:
     """Everything that is claimed of a recording, and whether it is so; a run that is finished in `work` is taken as it is."""
     recording = recording_in(folder)
-    if not work.names("synthesize"):
+    if not work.names(until):
         reconstruct(Request(source=recording, prompts=Prompts(objects=()), config=config), work, until="ingest")
         capture: Capture = work.load_latest("ingest", "scene")
         prompts = clicked(folder, [frame.index for frame in capture.frames])
-        reconstruct(Request(source=recording, prompts=prompts, config=config), work, until="synthesize")
+        reconstruct(Request(source=recording, prompts=prompts, config=config), work, until=until)
     capture = work.load_latest("ingest", "scene")
     truth = {item.name: item for item in read_truth(folder / "truth.json", capture.world_from_capture)}
-    scene = work.load_latest("synthesize", "scene")
-    built = {item.name: item for item in scene.objects if item.name in truth}  # not the worktops that were added
+    objects = work.load_latest("synthesize", "scene").objects if work.names("synthesize") else ()
+    built = {item.name: item for item in objects if item.name in truth}  # not the worktops that were added
     return [
         *_masks(folder, work, capture),
+        *_edges(truth, work),
         *_hinges(truth, built),
         *_poses(truth, work, built),
         *_dimensions(truth, built),
@@ -82,6 +86,24 @@ def _masks(folder: Path, work: Workspace, capture: Capture) -> Iterator[Claim]:
             if frame.index in track.masks and true is not None and np.count_nonzero(true) >= MIN_TRUTH_PX:
                 iou = mask_iou(true, unpack_mask(track.masks[frame.index]))
                 yield {"of": "mask", "kind": track.kind, "object": name, "claim": track.confidence[frame.index], "right": iou}
+
+
+def _edges(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim]:
+    """Of fronts of furniture: each edge; and whether it reaches over a seam, onto another."""
+    for name in work.names("segment"):
+        track, true = work.load_latest("segment", name), truth[name]
+        if track.kind != "front" or track.front is None or not track.front.edges:
+            continue
+        half = true.dimensions_m / 2
+        corners = np.array([[x, -half[1], z] for x in (-half[0], half[0]) for z in (-half[2], half[2])])
+        pose = track.front.world_from_front
+        across, _, up = pose.inverse.apply(true.world_from_object.apply(corners)).T
+        width, height = track.front.width_m / 2, track.front.height_m / 2
+        beyond = np.array([across.min() + width, width - across.max(), height - up.max(), up.min() + height])
+        for side, sure, off in zip(("left", "right", "top", "bottom"), track.front.edges, beyond, strict=True):
+            yield {"of": "edge", "kind": side, "object": name, "claim": sure, "right": float(abs(off) <= EDGE_M), "off_m": off}
+        over = float(beyond.max() > SEAM_M)
+        yield {"of": "seam", "kind": track.category, "object": name, "claim": track.front.seam, "right": over}
 
 
 def _hinges(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObject]) -> Iterator[Claim]:
@@ -305,6 +327,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
     parser.add_argument("--frames", type=int, default=40)
+    parser.add_argument("--until", choices=("segment", "synthesize"), default="synthesize")
     parser.add_argument("--workdir", type=Path)
     parser.add_argument("--claims", type=Path, default=Path("claims.json"))
     options = parser.parse_args(arguments)
@@ -315,7 +338,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 continue
             started, config = time.monotonic(), config_from(RAW | {"ingest": {"most_frames": options.frames}}, "calibration")
             work = Workspace((options.workdir or Path(scratch)) / folder.name)
-            claims[_name(folder)] = claims_of(folder, work, config)
+            claims[_name(folder)] = claims_of(folder, work, config, options.until)
             options.claims.write_text(json.dumps(claims) + "\n", encoding="utf-8")
             print(f"{folder.name}: {len(claims[_name(folder)])} claims, {time.monotonic() - started:.0f} s", flush=True)
     if claims:

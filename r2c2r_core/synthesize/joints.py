@@ -28,7 +28,6 @@ class Params:
         source="backends.md 2.8: handles at 0.38-0.56 did not",
     )
     adjacent_m: float = param(0.06, "m", "between two doors that may open as a pair")
-    trusted: float = param(0.25, "score", "least confidence, 0 to 1, of a handle that tells the side")
     certain_off_centre: float = param(
         0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
     )
@@ -116,7 +115,7 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
     """The hinge opposite the handle, where the handle is clearly on one side; a low centred bar on a wall flap means top."""
     params = tuned(Params)
     handle = item.handle
-    if handle is None or handle.confidence < params.trusted:
+    if handle is None:
         return None
     half = item.dimensions_m[[0, 2]] / 2
     x, z = handle.centre

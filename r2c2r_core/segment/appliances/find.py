@@ -14,7 +14,7 @@ from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
-from r2c2r_core.segment.runs.handles import find_handles
+from r2c2r_core.segment.runs.handles import find_handle
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
@@ -72,7 +72,7 @@ def appliance_front(
         return None
     surface = surface_of(run.mosaic, run.relief, np.ones_like(run.seen))
     cell = panel_edges(cell, surface, run.grid.cell_m)
-    handle = None if glimpse else find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    handle = None if glimpse else find_handle(run.odds, run.relief, cell)
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_to_wall(front, prepared.scene.capture.room, kind)
     fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)

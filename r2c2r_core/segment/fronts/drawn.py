@@ -15,7 +15,7 @@ from r2c2r_core.segment.fronts.front import Front, front_panel
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
 from r2c2r_core.segment.runs.edge_odds import edge_odds
-from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.handles import GridHandle, find_handle
 from r2c2r_core.segment.runs.lines import gather, scored
 from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, PlaneGrid, blend, choose_frames, frame_quality, make_tile
 from r2c2r_core.segment.runs.relief import measure_relief
@@ -83,6 +83,7 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
         for tile in tiles:
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles, max(frame_count // 2, 8))
+    odds = edge_odds(mosaic, relief, vertical, horizontal)
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
     return Run(
         region=region,
@@ -92,10 +93,10 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
         horizontal=horizontal,
         mosaic=mosaic,
         relief=relief,
-        odds=edge_odds(mosaic, relief, vertical, horizontal),
+        odds=odds,
         seen=seen[: grid.rows, : grid.columns],
         cells=(cell,),
-        handles=find_handles(mosaic, relief, (cell,), grid.cell_m),
+        handles=(find_handle(odds, relief, cell),),
         poses_agree=poses_agree,
         slides={tile.frame_index: tile.shift for tile in tiles},
     )

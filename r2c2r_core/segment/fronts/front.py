@@ -15,7 +15,7 @@ from r2c2r_core.segment.fronts.units import line_clarity, unit_cell
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
-from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.handles import GridHandle, find_handle
 from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.runs.xy_cut import Line, LineField, halves
@@ -329,7 +329,7 @@ def _supported(cell: Cell, run: Run) -> Cell:
 def _handle_on(run: Run, cell: Cell) -> GridHandle | None:
     if cell in run.cells:
         return run.handles[run.cells.index(cell)]
-    return find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    return find_handle(run.odds, run.relief, cell)
 
 
 def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:

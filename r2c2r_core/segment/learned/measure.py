@@ -21,7 +21,7 @@ from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
-from r2c2r_core.segment.runs.handles import find_handles
+from r2c2r_core.segment.runs.handles import find_handle
 from r2c2r_core.segment.runs.orthomosaic import Cell, joined
 from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
@@ -100,7 +100,7 @@ def _front(
         return None
     cell = _as_cut(run, voted)
     cell = panel_edges(cell, surface_of(run.mosaic, run.relief, run.seen), run.grid.cell_m)
-    handle = find_handles(run.mosaic, run.relief, (cell,), run.grid.cell_m)[0]
+    handle = find_handle(run.odds, run.relief, cell)
     return Front(run, cell, handle, category.depth.usual)
 
 

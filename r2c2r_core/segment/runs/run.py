@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Image
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.runs.edge_odds import edge_odds
-from r2c2r_core.segment.runs.handles import GridHandle, find_handles
+from r2c2r_core.segment.runs.handles import GridHandle, find_handle
 from r2c2r_core.segment.runs.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
 from r2c2r_core.segment.runs.orthomosaic import (
     STEP,
@@ -106,7 +106,7 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
     seen = seen[: grid.rows, : grid.columns]
     slides = {tile.frame_index: tile.shift for tile in tiles}
-    handles = find_handles(mosaic, relief, cells, cell_m)
+    handles = tuple(find_handle(odds, relief, cell) for cell in cells)
     return Run(region, grid, roll, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
 
 

@@ -1,0 +1,56 @@
+"""Handles on a panel, from the network's log-odds and the relief."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.segment.runs.handles import find_handle
+from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
+from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.runs.relief import Relief
+
+ROWS, COLUMNS, CELL_M = 120, 80, 0.005  # of the network's cells
+PANEL = Cell(10 * STEP, 10 * STEP, 70 * STEP, 110 * STEP)
+LIFT_M = 0.03
+
+
+def found(*parts: tuple[slice, slice, float], raised: tuple[slice, slice] | None = None) -> tuple[PanelOdds, Relief]:
+    """A panel with nothing but these rectangles likely a handle, and one of them standing out."""
+    nothing = np.full((ROWS, COLUMNS), -4.0, np.float32)
+    handle, share = nothing.copy(), np.zeros((ROWS, COLUMNS))
+    for rows, columns, odds in parts:
+        handle[rows, columns] = odds
+    if raised is not None:
+        share[raised] = 1.0
+    relief = Relief(
+        CELL_M, np.ones((ROWS + 1, COLUMNS + 1)), *(np.pad(v, ((0, 1), (0, 1))) for v in (share, LIFT_M * share, share))
+    )
+    return PanelOdds(nothing, nothing, handle, -nothing), relief
+
+
+def test_the_handle_is_where_the_network_sees_it_as_far_out_as_depth_does() -> None:
+    bar = (slice(20, 50), slice(60, 64))
+    handle = find_handle(*found((*bar, 3.0), raised=bar), PANEL)
+    assert handle is not None
+    assert (handle.left, handle.right, handle.top, handle.bottom) == (60 * STEP, 64 * STEP, 20 * STEP, 50 * STEP)
+    assert handle.protrusion_m == pytest.approx(LIFT_M)
+    assert handle.confidence == pytest.approx(1 / (1 + np.exp(-3.0)))
+
+
+def test_a_panel_on_which_nothing_is_likelier_a_handle_than_not_has_none() -> None:
+    assert find_handle(*found((slice(20, 50), slice(60, 64), -0.1)), PANEL) is None
+    assert find_handle(*found((slice(20, 50), slice(2, 6), 3.0)), PANEL) is None  # the neighbour's
+    assert find_handle(*found((slice(20, 50), slice(60, 64), 3.0)), Cell(0, 0, 0, 0)) is None
+
+
+def test_parts_of_a_bar_are_one_handle_and_a_speck_elsewhere_is_none_of_it() -> None:
+    upper, lower, speck = (slice(20, 32), slice(60, 64)), (slice(38, 50), slice(60, 64)), (slice(90, 92), slice(20, 22))
+    handle = find_handle(*found((*upper, 2.0), (*lower, 2.0), (*speck, 4.0)), PANEL)
+    assert handle is not None
+    assert (handle.top, handle.bottom) == (20 * STEP, 50 * STEP)
+    assert handle.protrusion_m == 0.0  # depth saw nothing stand out
+
+
+def test_a_handle_at_the_edge_of_its_panel_stays_as_large_as_it_is() -> None:
+    handle = find_handle(*found((slice(20, 50), slice(12, 16), 2.0)), PANEL)
+    assert handle is not None
+    assert handle.left == 12 * STEP
