@@ -85,7 +85,6 @@ class ObjectOverride:
     joint_lower: float | None = None  # of its only joint; rad or m
     joint_upper: float | None = None
     joints: Mapping[str, JointLimits] = field(default_factory=dict)  # by the joint's name or its part's
-    front_world: Vector3 | None = None  # direction the front faces, in the world
     rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
     regenerate: int = 0  # times a reviewer asked for further candidates
 

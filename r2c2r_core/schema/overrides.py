@@ -81,7 +81,6 @@ class ObjectCorrections(Document):
         max_length=MOST_JOINTS,
         description=JOINTS_SAID,
     )
-    front: Direction | None = Field(default=None, description="three numbers: the direction that the front faces, in the world")
     rejected: list[CandidateId] = Field(
         default_factory=list, max_length=_MOST_REJECTED, description="a list of the ids of candidates that a reviewer rejected"
     )
@@ -98,7 +97,6 @@ class ObjectCorrections(Document):
             joint_lower=lower,
             joint_upper=upper,
             joints={name: JointLimits(*limits) for name, limits in (self.joints or {}).items()},
-            front_world=_array(self.front),
             rejected=tuple(self.rejected),
             regenerate=self.regenerate,
         )
