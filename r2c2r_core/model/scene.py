@@ -93,7 +93,6 @@ class SceneObject:
     links: tuple[Link, ...]  # links[0] is the base
     joints: tuple[Joint, ...]
     movable: bool  # a free body in simulation (bottle, chair) rather than fixed to the world
-    front_texture: Image | None
     warp_residual_m: float | None  # front corners, after the fit; None before warp
     warnings: tuple[str, ...]
     warp_residual_paper_m: float | None = None  # what the paper's affine map leaves of its own four corners, for comparison

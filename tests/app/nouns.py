@@ -178,7 +178,6 @@ def scene(name: str) -> ArticulatedScene:
         links=links,
         joints=(joint,),
         movable=False,
-        front_texture=None,
         warp_residual_m=0.001,
         warnings=("a warning",),
     )

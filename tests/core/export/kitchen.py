@@ -306,7 +306,6 @@ def _object(
         links=links,
         joints=joints,
         movable=False,
-        front_texture=None,
         warp_residual_m=0.002,
         warnings=(),
     )
