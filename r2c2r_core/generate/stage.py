@@ -95,13 +95,12 @@ def generate_candidates(
     config: GenerateConfig,
     *,
     uploads: tuple[Path, ...] = (),
-    rejected: tuple[str, ...] = (),
     seed: int = 0,
     batch: int = 0,
     earlier: CandidateSet | None = None,
     progress: Progress = SILENT,
 ) -> CandidateSet:
-    """Candidates of one object, each in an arbitrary frame and unit, and the consensus among those nobody rejected.
+    """Candidates of one object, each in an arbitrary frame and unit, and their consensus.
 
     With `batch` n there are n more times as many: a candidate's draw (frames, settings, seed) follows from its id, and ids go
     on, so no draw comes again. `earlier` is what the batches before this one gave, made anew where it is not at hand.
@@ -123,7 +122,7 @@ def generate_candidates(
         )
     if not made:  # what the person gave stands alone; why is said with it
         given = [_warned(asset, f"{generator} made no mesh: {failures[0]}") for asset in given]
-    return choose_candidate([*made, *given], rejected=rejected, rule=config.rule)
+    return choose_candidate([*made, *given], rule=config.rule)
 
 
 def _count_of(failures: list[str]) -> str:

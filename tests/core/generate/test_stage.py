@@ -8,9 +8,11 @@ import pytest
 
 from r2c2r_core.config import config_from
 from r2c2r_core.errors import Cancelled, GenerationFailed, InputError, ObjectNotSeen
+from r2c2r_core.generate.candidates import select_candidate
 from r2c2r_core.generate.completion import Completion
 from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, join_vertices, volume
+from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.progress import Progress
 
 FEW = GenerateConfig(count=3, pool_frames=10)
@@ -78,8 +80,8 @@ def test_the_choice_has_a_reason_in_one_sentence_and_ranks_all(bottles):
     assert bottles.reason.count(". ") == 0
 
 
-def test_rejected_candidates_are_passed_over(bottles, bottle_scene):
-    other = generate_candidates(*bottle_scene, "completion", FEW, rejected=(bottles.chosen_id,))
+def test_rejected_candidates_are_passed_over(bottles):
+    other = select_candidate(bottles, ObjectOverride(rejected=(bottles.chosen_id,)), FEW.rule)
     assert other.chosen_id != bottles.chosen_id
     assert other.ranking[-1] == bottles.chosen_id
 
