@@ -9,6 +9,7 @@ from r2c2r_core.geometry.camera import Intrinsics
 
 DEPTH_STEP_M = 0.00025  # of the stored uint16: a quarter of the finest sensor step, and 16.4 m of range
 _FAR = np.float32(1e6)
+_GRAZING_DEG = 84.0  # between a ray and a surface across it, from where depth says nothing
 
 
 def usable_depth(
@@ -45,7 +46,7 @@ def ridges(depth_m: DepthMetres) -> Mask:
     return found & valid
 
 
-def flying_pixels(depth_m: DepthMetres, camera: Intrinsics, *, grazing_deg: float = 84.0) -> Mask:
+def flying_pixels(depth_m: DepthMetres, camera: Intrinsics) -> Mask:
     """Pixels that hang between two surfaces, or lie on one seen too flatly to be measured.
 
     Along a row or a column, a mixed pixel lies well inside the range of its two neighbours on either side, while that range
@@ -63,7 +64,7 @@ def flying_pixels(depth_m: DepthMetres, camera: Intrinsics, *, grazing_deg: floa
         margin = np.minimum(0.2 * step, most_margin)
         between = (depth_m > low + margin) & (depth_m < high - margin)
         flying |= between & (step > least_step) & (wide_high - wide_low < 1.5 * step)
-        flying |= _steepness(depth_m, across) * focal > depth_m * np.tan(np.radians(grazing_deg))
+        flying |= _steepness(depth_m, across) * focal > depth_m * np.tan(np.radians(_GRAZING_DEG))
     return flying & valid
 
 

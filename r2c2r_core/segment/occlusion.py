@@ -86,9 +86,7 @@ def _shown(
     return refined
 
 
-def refine_border(
-    rgb: Image, mask: Mask, band_px: int, *, within: Mask | None = None, gradient_depth: np.ndarray | None = None
-) -> Mask:
+def refine_border(rgb: Image, mask: Mask, band_px: int, *, within: Mask | None = None) -> Mask:
     """Move a mask's border onto the strongest colour edge within `band_px`; outside `within` nothing is added."""
     solid = mask.astype(np.uint8)
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * band_px + 1, 2 * band_px + 1))
@@ -103,10 +101,7 @@ def refine_border(
     markers[outer & ~not_sure] = 2
     if not (markers == 1).any() or not (markers == 2).any():
         return mask
-    ridges = colour_gradient(rgb)
-    if gradient_depth is not None:
-        ridges = ridges + gradient_depth
-    return np.asarray((flood(ridges, markers, outer) == 1) & outer)
+    return np.asarray((flood(colour_gradient(rgb), markers, outer) == 1) & outer)
 
 
 def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -> np.ndarray:
@@ -131,9 +126,9 @@ def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -
     return labels
 
 
-def colour_gradient(rgb: Image, sigma: float = 1.0) -> np.ndarray:
+def colour_gradient(rgb: Image) -> np.ndarray:
     """The largest Sobel magnitude over the Lab channels."""
-    lab = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), (0, 0), sigma).astype(np.float32)
+    lab = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), (0, 0), 1.0).astype(np.float32)
     dx, dy = cv2.Sobel(lab, cv2.CV_32F, 1, 0), cv2.Sobel(lab, cv2.CV_32F, 0, 1)
     return np.asarray(np.sqrt(dx**2 + dy**2).max(axis=2))
 

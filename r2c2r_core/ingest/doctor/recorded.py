@@ -10,6 +10,8 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.readers.protocol import Recording, UnreadableFrame
 from r2c2r_core.model.capture import Frame
 
+_FRAMES = 12  # that tell what depth was recorded
+
 
 class Timing(NamedTuple):
     """When frames were taken, and which are not there."""
@@ -78,10 +80,10 @@ class Recorded(NamedTuple):
     confidence: tuple[float, float, float] | None
 
 
-def measure_recorded(recording: Recording, frames: int = 12) -> Recorded:
+def measure_recorded(recording: Recording) -> Recorded:
     """Depth as it was recorded, before anything was rejected: its median, and the shares of low, medium, high confidence."""
     counts, medians = np.zeros(3), []
-    for frame in recording.frames[:: max(1, len(recording.frames) // frames)]:
+    for frame in recording.frames[:: max(1, len(recording.frames) // _FRAMES)]:
         try:
             metres, confidence = recording.depth_of(frame)
         except (UnreadableFrame, CaptureError):

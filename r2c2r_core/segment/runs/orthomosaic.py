@@ -61,10 +61,10 @@ class PlaneGrid:
         z = self.top_m - cells[:, 1] * self.cell_m
         return self.world_from_plane.apply(np.stack([x, np.full(len(x), depth_m), z], axis=1))
 
-    def pixel_from_cell(self, frame: Frame, camera: Intrinsics, out_m: float = 0.0) -> Matrix3:
-        """Homography from continuous cells to continuous pixels; its third row gives z in metres. `out_m` lifts the plane."""
+    def pixel_from_cell(self, frame: Frame, camera: Intrinsics) -> Matrix3:
+        """Homography from continuous cells to continuous pixels; its third row gives z in metres."""
         rotation = self.world_from_plane.rotation
-        origin = self.world_from_plane.apply(np.array([[self.left_m, -out_m, self.top_m]]))[0]
+        origin = self.world_from_plane.apply(np.array([[self.left_m, 0.0, self.top_m]]))[0]
         world = np.column_stack([rotation[:, 0] * self.cell_m, -rotation[:, 2] * self.cell_m, origin])
         seen = frame.world_from_camera.inverse
         local = seen.rotation @ world
@@ -175,15 +175,15 @@ def _stored_size(scene: Scene, frame: Frame) -> tuple[int, int]:
     return stored.shape[1], stored.shape[0]
 
 
-def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int, out_m: float = 0.0) -> Tile | None:
+def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int) -> Tile | None:
     """One frame warped onto the grid; None when it shows too little of it."""
     frame = scene.frame(frame_index)
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.05:
         return None
-    visible, z = visible_cells(grid, scene, frame, out_m)
+    visible, z = visible_cells(grid, scene, frame)
     if visible.mean() < 0.02:
         return None
-    homography = grid.pixel_from_cell(frame, frame.rgb_camera, out_m)
+    homography = grid.pixel_from_cell(frame, frame.rgb_camera)
     image = cv2.warpPerspective(
         scene.rgb(frame_index),
         _for_opencv(homography),
@@ -195,10 +195,10 @@ def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int, out_m: float = 0.
     return Tile(frame_index, cv2.cvtColor(image, cv2.COLOR_RGB2LAB), weight)
 
 
-def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Cells (rows, columns) inside the image with no occluder in front, and the plane's z-depth there."""
     column, row = np.arange(grid.columns) + 0.5, np.arange(grid.rows) + 0.5
-    homography = grid.pixel_from_cell(frame, frame.rgb_camera, out_m)
+    homography = grid.pixel_from_cell(frame, frame.rgb_camera)
     z, u, v = (
         (homography[k, 0] * column).astype(np.float32) + (homography[k, 1] * row + homography[k, 2]).astype(np.float32)[:, None]
         for k in (2, 0, 1)
@@ -209,7 +209,7 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame, out_m: float = 0.
     inside = (z > 0.15) & (u > 3) & (v > 3) & (u < camera.width - 3) & (v < camera.height - 3)
     depth = scene.filled_depth(frame.index)
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-    to_depth = grid.pixel_from_cell(frame, frame.depth_camera, out_m)
+    to_depth = grid.pixel_from_cell(frame, frame.depth_camera)
     seen = cv2.warpPerspective(depth, _for_opencv(to_depth), (grid.columns, grid.rows), flags=flags)
     occluded = scene.noise.occluded(seen, z, tuned(Params).in_front_m)
     grown = cv2.dilate(occluded.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
