@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
+from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.model.motion import JointMotion, Source
