@@ -9,7 +9,7 @@ import numpy as np
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
 from r2c2r_core.kitchen.category import Category
-from r2c2r_core.kitchen.walls import wall_behind
+from r2c2r_core.kitchen.walls import front_depth
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.tuning import param, tuned
 
@@ -46,8 +46,9 @@ def depths_behind(
     usually is.
     """
     params = tuned(Params)
-    usual = category.depth.usual
-    wall = wall_behind(capture.room.walls, world_from_front.translation, -world_from_front.rotation[:, 1], category.depth)
+    wall, usual = front_depth(
+        capture.room.walls, world_from_front.translation, -world_from_front.rotation[:, 1], category.depth
+    )
     sheet = _sheet_behind(capture, world_from_front, width_m, height_m)
     walls = [d for d in (wall, sheet) if d is not None and category.depth.holds(d)]
     found = [DepthBehind(d - params.wall_gap_m, "wall") for d in sorted(walls, key=lambda d: abs(d - usual))[:1]]

@@ -1,7 +1,8 @@
-"""The wall behind a front: which of the room's walls that is, and how far away, for every stage; and the floor."""
+"""How deep a front is when nobody sees it: to which of the walls behind it, else the usual; for every stage. And the floor."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,24 @@ class Params:
     )
 
 
+class FrontDepth(NamedTuple):
+    """How far a front reaches back, before anything shows it."""
+
+    wall_m: float | None  # to the nearest wall that a thing of its category may stand against
+    usual_m: float  # of its category
+
+    @property
+    def depth_m(self) -> float:
+        """To the wall where there is one."""
+        return self.usual_m if self.wall_m is None else self.wall_m
+
+
+def front_depth(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> FrontDepth:
+    """The depth of a front with this middle and unit normal (world), of a category as deep as this."""
+    to_wall = next((d for d in distances_behind(walls, middle, outward) if depth.holds(d)), None)
+    return FrontDepth(to_wall, depth.usual)
+
+
 def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -> list[float]:
     """Metres from a front back to each wall that faces the same way, nearest first; negative for walls before it.
 
@@ -38,11 +57,6 @@ def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -
 def _reaches(wall: Wall, point: Vector3) -> bool:
     along = float(np.cross([0.0, 0.0, 1.0], wall.normal) @ point)
     return wall.span_m is None or wall.span_m[0] < along < wall.span_m[1]
-
-
-def wall_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> float | None:
-    """The distance to the nearest wall that a thing of this depth may stand against; None where there is none."""
-    return next((d for d in distances_behind(walls, middle, outward) if depth.holds(d)), None)
 
 
 def depths_in(walls: Sequence[Wall], points_world: Points) -> np.ndarray:

@@ -18,7 +18,7 @@ from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.kitchen.walls import wall_behind
+from r2c2r_core.kitchen.walls import FrontDepth, front_depth
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
@@ -259,22 +259,22 @@ def _believable_depth(
     """The depth, up to the wall where it ends near or beyond it, and within what the category allows."""
     depth = float(high[1] - low[1])
     low, high = low.copy(), high.copy()
-    to_wall = distance_to_wall(capture, rotation, low, high, spec.depth)
+    behind = depth_behind(capture, rotation, low, high, spec.depth)
     source: Source = "inferred"
     # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
     near = tuned(Params).to_wall_m if track.kind == "front" else 0.0
-    if to_wall is not None and depth > to_wall - near:
-        depth = to_wall
+    if behind.wall_m is not None and depth > behind.wall_m - near:
+        depth = behind.wall_m
     if not spec.depth.holds(depth):
-        depth, source = (to_wall, "inferred") if to_wall is not None else (spec.depth.usual, "default")
+        depth, source = behind.depth_m, "default" if behind.wall_m is None else "inferred"
     high[1] = low[1] + depth
     return low, high, source
 
 
-def distance_to_wall(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> float | None:
-    """From the front of a box along the columns of `rotation` back to the wall that a thing of this depth may stand against."""
+def depth_behind(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> FrontDepth:
+    """How deep a thing is behind the front of its box along the columns of `rotation`, as far as its room tells."""
     front_centre = rotation @ np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    return wall_behind(capture.room.walls, front_centre, -rotation[:, 1], depth)
+    return front_depth(capture.room.walls, front_centre, -rotation[:, 1], depth)
 
 
 def _depth_source(

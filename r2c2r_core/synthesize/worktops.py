@@ -11,7 +11,7 @@ import numpy as np
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.motion import Source
-from r2c2r_core.synthesize.dimensions import MeasuredObject, distance_to_wall
+from r2c2r_core.synthesize.dimensions import MeasuredObject, depth_behind
 from r2c2r_core.synthesize.facets import Colour, Facets, most_common
 from r2c2r_core.synthesize.facets import Params as FacetsParams
 from r2c2r_core.synthesize.slabs import Params as SlabsParams
@@ -183,7 +183,7 @@ def _rear(capture: Capture, top: _Top) -> tuple[float, Source]:
     run, behind = top.run, top.level.middles[:, 1]
     front, back = run.least(1), run.most(1)
     low, high = np.array([run.least(0), front, run.least(2)]), np.array([run.most(0), back, run.most(2)])
-    to_wall = distance_to_wall(capture, run.rotation, low, high, category_of("counter").depth)
+    to_wall = depth_behind(capture, run.rotation, low, high, category_of("counter").depth).wall_m
     if to_wall is not None and front + to_wall < back + params.behind_m:
         return max(front + to_wall, back), "measured"
     least, reached = top.shown * (run.most(0) - run.least(0)), back

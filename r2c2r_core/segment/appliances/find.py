@@ -11,7 +11,7 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
-from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, near_plane, nudged
+from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import find_handle
@@ -74,7 +74,7 @@ def appliance_front(
     cell = panel_edges(cell, surface, run.grid.cell_m)
     handle = None if glimpse else find_handle(run.odds, run.relief, cell)
     front = Front(run, cell, handle, kind.depth.usual)
-    wall = depth_to_wall(front, prepared.scene.capture.room, kind)
+    wall = depth_behind(front, prepared.scene.capture.room, kind).wall_m
     fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)
     return replace(fitted.front, cell=_nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)), fitted.depth_seen
 

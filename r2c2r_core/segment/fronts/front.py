@@ -8,7 +8,7 @@ from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
-from r2c2r_core.kitchen.walls import wall_behind
+from r2c2r_core.kitchen.walls import FrontDepth, front_depth
 from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.fronts.units import line_clarity, unit_cell
@@ -149,9 +149,9 @@ def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list
     ]
 
 
-def depth_to_wall(front: Front, room: Room, category: Category) -> float | None:
-    """Distance from a front to the wall behind it; None where none is as far as things of that kind are deep."""
-    return wall_behind(room.walls, front_middle(front), front.run.grid.outward, category.depth)
+def depth_behind(front: Front, room: Room, category: Category) -> FrontDepth:
+    """How deep a front of that category is here, as far as its room tells."""
+    return front_depth(room.walls, front_middle(front), front.run.grid.outward, category.depth)
 
 
 def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:

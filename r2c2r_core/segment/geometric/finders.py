@@ -13,7 +13,7 @@ from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_to_wall, find_front, seen_sides
+from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
@@ -66,10 +66,10 @@ def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFron
     """The front that a person drew, as it was drawn: nothing is cut. Raises ObjectNotSeen where no frame sees it."""
     scene = prepared.scene
     front = drawn_front(drawn, scene, prepared.config)
-    depth_m = depth_to_wall(front, scene.capture.room, category)
-    front = replace(front, depth_m=depth_m or category.depth.usual)
+    behind = depth_behind(front, scene.capture.room, category)
+    front = replace(front, depth_m=behind.depth_m)
     if category.kind == "appliance":
-        return FoundAppliance(front, scene, category, warnings=() if depth_m else (_assumed_depth(front, prompt),))
+        return FoundAppliance(front, scene, category, warnings=() if behind.wall_m else (_assumed_depth(front, prompt),))
     return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, category)
 
 
@@ -104,7 +104,7 @@ def _front(
             break
     if best is None:
         return None
-    best = replace(best, depth_m=depth_to_wall(best, prepared.scene.capture.room, category) or category.depth.usual)
+    best = replace(best, depth_m=depth_behind(best, prepared.scene.capture.room, category).depth_m)
     best = replace(best, sides=seen_sides(best, prepared.scene))
     slides = sliding_chance(best, prepared.planes) if category.opens == "side" else 0.0
     return FoundFront(best, prepared.scene, category, fit=_fit(best, category), slides=slides)

@@ -1,7 +1,7 @@
 """Masks to measures: the front's rectangle and handle, an appliance's box, a thing's box, whoever drew the masks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box
 from r2c2r_core.segment.appliances.fit import fit_box
-from r2c2r_core.segment.fronts.front import Front, depth_to_wall, front_leaf, front_panel
+from r2c2r_core.segment.fronts.front import Front, depth_behind, front_leaf, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -68,18 +68,17 @@ class Measured:
 def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
     """The object's front or box: `masks` say which part of the scan it is, `body` is that part of the fused surface."""
     category = category_of(prompt.category)
-    usual_m = category.depth.usual
     if category.kind == "thing":
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category))
     front = _front(prepared, prompt, masks, body, category)
     if front is None:
         said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
-    wall = depth_to_wall(front, prepared.scene.capture.room, category)
     if category.kind == "front":
-        panel = front_panel(replace(front, depth_m=wall or usual_m))
-        return Measured(kind="front", front=panel, motions=FilmedLeaves(front_leaf(front), category, prepared.scene).motions)
-    fitted = fit_box(front, prepared.scene, category, wall)
+        return Measured(
+            kind="front", front=front_panel(front), motions=FilmedLeaves(front_leaf(front), category, prepared.scene).motions
+        )
+    fitted = fit_box(front, prepared.scene, category, depth_behind(front, prepared.scene.capture.room, category).wall_m)
     front = fitted.front
     assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
     warnings = () if fitted.depth_seen else (assumed,)

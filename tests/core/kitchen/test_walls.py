@@ -10,10 +10,10 @@ import pytest
 from r2c2r_core.generate.priors import depths_behind
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.kitchen.walls import depths_in, distances_behind, wall_behind
+from r2c2r_core.kitchen.walls import depths_in, distances_behind, front_depth
 from r2c2r_core.model.capture import Wall
-from r2c2r_core.segment.fronts.front import depth_to_wall
-from r2c2r_core.synthesize.dimensions import distance_to_wall
+from r2c2r_core.segment.fronts.front import depth_behind as depth_behind_front
+from r2c2r_core.synthesize.dimensions import depth_behind as depth_behind_box
 from tests.core.synthesize.kitchen_units import capture
 
 OUTWARD = np.array([0.0, -1.0, 0.0])
@@ -38,9 +38,9 @@ def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
         (d.depth_m for d in depths_behind(scan, Rigid3(np.eye(3), MIDDLE), 0.6, 0.6, kind) if d.source == "wall"), None
     )
     return [
-        depth_to_wall(front, scan.room, kind),
+        depth_behind_front(front, scan.room, kind).wall_m,
         None if generated is None else generated + 0.005,  # what stands against a wall leaves it a gap
-        distance_to_wall(scan, np.eye(3), low, high, kind.depth),
+        depth_behind_box(scan, np.eye(3), low, high, kind.depth).wall_m,
     ]
 
 
@@ -62,8 +62,14 @@ def test_no_stage_means_a_wall_beside_before_or_far_behind(wall: Wall) -> None:
 
 def test_the_nearest_wall_that_is_possible_is_meant() -> None:
     walls = (wall_at(0.7), wall_at(0.1), wall_at(0.55))
-    assert wall_behind(walls, MIDDLE, OUTWARD, category_of("cabinet").depth) == pytest.approx(0.55)
+    assert front_depth(walls, MIDDLE, OUTWARD, category_of("cabinet").depth).depth_m == pytest.approx(0.55)
     np.testing.assert_allclose(distances_behind(walls, MIDDLE, OUTWARD), [0.1, 0.55, 0.7])
+
+
+def test_without_a_wall_a_front_is_as_deep_as_its_category_usually_is() -> None:
+    depth = category_of("cabinet").depth
+    assert front_depth((), MIDDLE, OUTWARD, depth).wall_m is None
+    assert front_depth((wall_at(2.5),), MIDDLE, OUTWARD, depth).depth_m == depth.usual
 
 
 def test_a_lining_counts_for_what_stands_before_it_alone() -> None:
