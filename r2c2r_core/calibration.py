@@ -10,6 +10,11 @@ FITTED = "fitted over the sample kitchens of both generators: benchmarks/calibra
 """The source of a map's numbers."""
 
 
+def probability(log_odds: float, slope: float = 1.0, offset: float = 0.0) -> float:
+    """Of natural log-odds that are worth `slope` times as much and `offset` more."""
+    return 1.0 / (1.0 + exp(-(slope * log_odds + offset)))
+
+
 def calibrated(claim: float, slope: float, offset: float) -> float:
     """The share of claims like this one (0..1) that are right: log-odds taken `slope` times and `offset` further.
 
@@ -17,4 +22,4 @@ def calibrated(claim: float, slope: float, offset: float) -> float:
     """
     if not 0.0 < claim < 1.0:
         return min(max(claim, 0.0), 1.0)
-    return 1.0 / (1.0 + exp(-(slope * log(claim / (1.0 - claim)) + offset)))
+    return probability(log(claim / (1.0 - claim)), slope, offset)

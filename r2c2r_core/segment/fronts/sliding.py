@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2c2r_core.calibration import probability
 from r2c2r_core.segment.fronts.front import Front, front_middle
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.runs.edges import as_lab
@@ -39,7 +40,7 @@ class Params:
 def sliding_chance(front: Front, planes: Sequence[PlaneRegion]) -> float:
     """The probability that a front slides sideways over what is beside it; 0 where nothing is set back there."""
     odds = max((_odds(front, sign, plane) for plane in planes for sign in (-1, 1)), default=-np.inf)
-    return float(1 / (1 + np.exp(-odds)))
+    return probability(odds)
 
 
 def _odds(front: Front, sign: int, plane: PlaneRegion) -> float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2c2r_core.calibration import probability
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
@@ -63,11 +64,6 @@ def edge_odds(run: Run, cell: Cell) -> tuple[float, ...]:
     )
 
 
-def line_clarity(run: Run, cell: Cell) -> tuple[float, ...]:
-    """How likely each edge of a rectangle is a front's, 0..1: left, right, top, bottom."""
-    return tuple(float(1 / (1 + np.exp(-odds))) for odds in edge_odds(run, cell))
-
-
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
     """Log-likelihood of a rectangle as such a unit: of its edges, what is inside, its size, and its row."""
     params = tuned(Params)
@@ -82,7 +78,7 @@ def _seam_inside(run: Run, cell: Cell) -> float:
     slack = tuned(Params).row_m / run.grid.cell_m
     inside = {other.left for other in run.cells if cell.left + slack < other.left < cell.right - slack}
     odds = max((run.odds.along(0, at, cell.top, cell.bottom) for at in inside), default=-np.inf)
-    return float(1 / (1 + np.exp(-odds)))
+    return probability(odds)
 
 
 def _in_row(run: Run, cell: Cell) -> int:

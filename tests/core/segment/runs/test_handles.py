@@ -54,3 +54,10 @@ def test_a_handle_at_the_edge_of_its_panel_stays_as_large_as_it_is() -> None:
     handle = find_handle(*found((slice(20, 50), slice(12, 16), 2.0)), PANEL)
     assert handle is not None
     assert handle.left == 12 * STEP
+
+
+def test_a_handle_is_where_depth_has_it_not_where_the_flat_mosaic_shows_it() -> None:
+    seen, stands = (slice(20, 50), slice(60, 64)), (slice(22, 52), slice(57, 61))
+    handle = find_handle(*found((*seen, 3.0), raised=stands), PANEL)
+    assert handle is not None
+    assert (handle.left, handle.right, handle.top, handle.bottom) == (57 * STEP, 61 * STEP, 22 * STEP, 52 * STEP)
