@@ -15,6 +15,7 @@ from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
 
 _OF_ACCOUNTS = {"owner_id"}  # told by name: numbers of accounts mean others in another database
+_DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name"}  # of an object
 _DERIVED = {"certificate"}  # it is in the bundle itself
 
 
@@ -40,7 +41,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
         members=sorted(queries.who_sees(session, project) - {owner}),
         objects=[
             DescribedObject(
-                **item.model_dump(include={"id", "name", "category", "colour", "deleted", "front", "frames", "run_name"}),
+                **item.model_dump(include=_DESCRIBED),
                 points=points[item.id or 0],
                 override=relative(overrides.get(item.id, {}), files.root),
                 verdicts=verdicts[item.id or 0],

@@ -40,6 +40,8 @@ def _readable(drawn: Drawn) -> Drawn:
 
 def prompts_version(objects: list[dict[str, Any]]) -> int:
     """The version of prompts.json that these need: an older r2c2r reads what is only clicked."""
+    if any("crop" in entry for entry in objects):
+        return 3
     return 2 if any(entry.keys() & {"front", "frames"} for entry in objects) else 1
 
 

@@ -27,7 +27,7 @@ from app.errors import Conflict
 Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
-_FIELDS = ("name", "category", "colour", "deleted", "front")
+_FIELDS = ("name", "category", "colour", "deleted", "front", "crop")
 _POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then its id, number, name, candidate
 
 

@@ -17,14 +17,15 @@ from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.workspace import content_key
 
-Drawn = dict[str, Any]  # what an entry of prompts.json holds beside clicks: front, frames
+Drawn = dict[str, Any]  # what an entry of prompts.json holds beside clicks: front, frames, crop
 
 
 def drawn_of(item: SceneObject) -> Drawn:
     """What was drawn of an object, as in prompts.json; empty where nothing was."""
     frames = [{"frame": int(number), "mask": mask} for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))]
     front = {} if item.front is None else {"front": item.front}
-    return front | ({"frames": frames} if frames else {})
+    crop = {} if item.crop is None else {"crop": item.crop}
+    return front | ({"frames": frames} if frames else {}) | crop
 
 
 def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]], drawn: Drawn) -> str:
@@ -40,6 +41,8 @@ def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, 
         shown.append({key: value for key, value in drawn["front"].items() if key != "hinge"})
     if drawn.get("frames"):
         shown.append(drawn["frames"])
+    if drawn.get("crop"):
+        shown.append(drawn["crop"])
     return hashlib.sha256(json.dumps([segmenter, category, given, *shown]).encode()).hexdigest()[:20]
 
 

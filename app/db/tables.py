@@ -143,6 +143,7 @@ class SceneObject(SQLModel, table=True):
         default_factory=dict, sa_column=Column(JSON, nullable=False, server_default="{}")
     )
     front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
+    crop: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
     run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # in the last run; empty: as now

@@ -82,7 +82,7 @@ def told_objects(lines: Iterable[dict[str, Any]]) -> list[Told]:
 
 def read_prompt(document: dict[str, Any]) -> ObjectPrompt:
     """One object of prompts.json."""
-    return parse_prompts({"version": 2, "objects": [document]}).objects[0]
+    return parse_prompts({"version": 3, "objects": [document]}).objects[0]
 
 
 def others_line(others: Others) -> list[list[float]]:

@@ -140,7 +140,7 @@ def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: st
             colours += 1
         with history.change(session, item, "prompts", "import", f"imported {entry.name}", who=who):
             item.deleted, item.category = False, entry.category
-            item.front, item.frames = drawn_in(entry)
+            item.front, item.frames, item.crop = drawn_in(entry)
             session.add(item)
             for old in session.exec(select(Point).where(Point.object_id == item.id)):
                 session.delete(old)
@@ -150,10 +150,11 @@ def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: st
     return items
 
 
-def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str, Any]]:
-    """What a person drew of an object in a prompts.json, as it is stored: its front, and its masks by frame."""
+def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str, Any], dict[str, Any] | None]:
+    """What a person drew of an object in a prompts.json, as it is stored: its front, its masks by frame, its crop box."""
     frames = {str(said.frame): said.mask.model_dump() if said.mask is not None else None for said in entry.frames}
-    return entry.front.model_dump() if entry.front is not None else None, frames
+    front, crop = (drawn.model_dump() if drawn is not None else None for drawn in (entry.front, entry.crop))
+    return front, frames, crop
 
 
 def adopt_bundle(

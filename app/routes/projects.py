@@ -4,9 +4,9 @@ from fastapi import APIRouter, Request
 
 from app import schemas
 from app.deps import AdminCtx, Ctx
-from app.routes.numbers import STREAMED, Count, OptionalId
+from app.routes.numbers import STREAMED, Count, FrameNumber, OptionalId
 from app.schemas.text import FileName, Title
-from app.services import imports, projects, rereading, uploads
+from app.services import cameras, imports, projects, rereading, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
@@ -65,6 +65,12 @@ async def delete_project(context: AdminCtx, project: str) -> schemas.Deleted:
 def list_frames(context: Ctx, project: str) -> list[schemas.FrameInfo]:
     """The recording's frames, in order."""
     return projects.frames(context, project)
+
+
+@router.get("/{project}/frames/{frame}/camera", operation_id="getCamera")
+def get_camera(context: Ctx, project: str, frame: FrameNumber) -> schemas.FrameCamera:
+    """A frame's camera, for what is drawn in space over its photo."""
+    return cameras.camera(context, project, frame)
 
 
 @router.get("/{project}/history", operation_id="getHistory")

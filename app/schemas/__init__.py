@@ -2,7 +2,7 @@
 
 from app.schemas.base import ErrorBody
 from app.schemas.bundles import Bundle, BundleChange, BundleCheck, Certificate, Finding
-from app.schemas.captures import CaptureFacts, FrameInfo
+from app.schemas.captures import CaptureFacts, FrameCamera, FrameInfo
 from app.schemas.elevations import Elevation, ElevationLines, Elevations, FoundFront
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
 from app.schemas.live import ProjectId, Watch
@@ -54,7 +54,14 @@ from app.schemas.system import Backend, BundleFormat, Category, FolderEntry, Fol
 from app.schemas.unknown import UnknownFolder, UnknownKind
 from app.schemas.uploads import Upload, UploadIn
 from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
-from r2c2r_core.schema.prompts import PromptsFile, PromptsFileFront, PromptsFileHandle, PromptsFileObject, PromptsFilePoint
+from r2c2r_core.schema.prompts import (
+    PromptsFile,
+    PromptsFileCrop,
+    PromptsFileFront,
+    PromptsFileHandle,
+    PromptsFileObject,
+    PromptsFilePoint,
+)
 
 __all__ = [
     "AccountIn",
@@ -87,6 +94,7 @@ __all__ = [
     "FolderEntry",
     "FolderListing",
     "FoundFront",
+    "FrameCamera",
     "FrameIn",
     "FrameInfo",
     "FrameMask",
@@ -123,6 +131,7 @@ __all__ = [
     "ProjectPatch",
     "ProjectSummary",
     "PromptsFile",
+    "PromptsFileCrop",
     "PromptsFileFront",
     "PromptsFileHandle",
     "PromptsFileObject",

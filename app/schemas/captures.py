@@ -51,6 +51,18 @@ class CaptureFacts(Shape):
     moments: list[CaptureMoment] = Field(default_factory=list)
 
 
+class FrameCamera(Shape):
+    """The pinhole camera of a frame: pixels of the stored frame, OpenCV axes, in the recording's own world."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    camera_from_capture: list[list[float]]
+
+
 class FrameInfo(Shape):
     """One frame; `index` is its number in the recording. Image: /media/{project}/frames/{index}.jpg?w=960&v={media_version}."""
 

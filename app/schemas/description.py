@@ -29,6 +29,7 @@ class DescribedObject(Shape):
     deleted: bool = False
     points: list[DescribedPoint]
     front: dict[str, Any] | None = None
+    crop: dict[str, Any] | None = None
     run_name: str = ""  # what the last run called it, where that is another name
     frames: dict[str, Any] = Field(default_factory=dict)
     override: dict[str, Any] = Field(default_factory=dict)

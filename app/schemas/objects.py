@@ -6,7 +6,7 @@ from pydantic import Field
 
 from app.schemas.base import Shape
 from app.schemas.text import Word
-from r2c2r_core.schema.prompts import PromptsFileFront, PromptsFileMask
+from r2c2r_core.schema.prompts import PromptsFileCrop, PromptsFileFront, PromptsFileMask
 
 SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"]
 
@@ -67,12 +67,13 @@ class ObjectIn(Shape):
 
 
 class ObjectPatch(Shape):
-    """What changes, a drawn front also to none; with `version`, only if nobody changed it meanwhile."""
+    """What changes, a drawn front and a crop box also to none; with `version`, only if nobody changed it meanwhile."""
 
     name: Word | None = None
     category: Word | None = None
     colour: int | None = Field(default=None, ge=0, le=999)
     front: PromptsFileFront | None = None
+    crop: PromptsFileCrop | None = None
     version: int | None = None
 
 
@@ -89,6 +90,7 @@ class SceneObject(Shape):
     points: list[Point]
     front: PromptsFileFront | None  # drawn; None: what the clicks find
     frames: list[FrameSaid]  # set right by a person
+    crop: PromptsFileCrop | None  # a box that it lies in, drawn by a person
     can_undo: bool
     can_redo: bool
     segment: SegmentState
@@ -137,5 +139,6 @@ class ObjectPoints(Shape):
     frames: int  # that they come from
     centre_m: list[float]  # world
     size_m: list[float]  # of the box around most of them, along the world's axes
+    around: PromptsFileCrop | None  # that box, a little larger, as a crop box; None without points
     xyz_mm: str  # base64 of int16, little endian, three a point
     rgb: str  # base64 of bytes, three a point

@@ -119,7 +119,7 @@ def _adopt_objects(
 
 def _write_prompts(session: Session, item: SceneObject, entry: DescribedObject, _files: ProjectFiles) -> None:
     item.name, item.category, item.colour, item.deleted = entry.name, entry.category, entry.colour, False
-    item.front, item.frames, item.run_name = entry.front, entry.frames, entry.run_name
+    item.front, item.frames, item.crop, item.run_name = entry.front, entry.frames, entry.crop, entry.run_name
     session.add(item)
     session.exec(delete(Point).where(col(Point.object_id) == item.id))
     session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in entry.points)
@@ -216,7 +216,7 @@ def _of_an_older_version(files: ProjectFiles) -> Description:
 
 
 def _of_prompts(entry: PromptsFileObject, colour: int, override: dict[str, Any]) -> DescribedObject:
-    front, frames = drawn_in(entry)
+    front, frames, crop = drawn_in(entry)
     return DescribedObject(
         id=None,
         name=entry.name,
@@ -225,6 +225,7 @@ def _of_prompts(entry: PromptsFileObject, colour: int, override: dict[str, Any])
         points=[DescribedPoint(frame=p.frame, x=p.x, y=p.y, label=p.label) for p in entry.points],
         front=front,
         frames=frames,
+        crop=crop,
         override=stored_entry(override),
     )
 

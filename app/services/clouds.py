@@ -11,15 +11,17 @@ from app.db import queries
 from app.db.engine import reading
 from app.files import ProjectFiles
 from app.jobs.mask_wire import bits_mask
-from app.services import masks, views
+from app.services import cameras, masks, views
 from app.services.context import Context
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.geometry.transforms import rotation_about_z
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.ingest.store import depth_path, rgb_path
 
 VIEWS = 10
 POINTS_A_VIEW = 1200
+_ROOM_M = 0.02  # about the points, in the box they are offered
 _CORE_PERCENT = 2.0  # what lies outside, at either end, is depth noise along the outline
 
 
@@ -35,7 +37,7 @@ def object_points(context: Context, project_id: str, object_id: int) -> schemas.
     entries = [entry for frame in spread if found and (entry := found.masks.entry(frame)) is not None]
     parts = [part for entry in entries if len((part := _seen_in(files, entry))[0])]
     if not parts:
-        return schemas.ObjectPoints(count=0, frames=0, centre_m=[0, 0, 0], size_m=[0, 0, 0], xyz_mm="", rgb="")
+        return schemas.ObjectPoints(count=0, frames=0, centre_m=[0, 0, 0], size_m=[0, 0, 0], around=None, xyz_mm="", rgb="")
     points, colours = (np.concatenate(column) for column in zip(*parts, strict=True))
     low, high = np.percentile(points, (_CORE_PERCENT, 100 - _CORE_PERCENT), axis=0)
     kept = ((points >= low - 0.02) & (points <= high + 0.02)).all(axis=1)
@@ -46,9 +48,24 @@ def object_points(context: Context, project_id: str, object_id: int) -> schemas.
         frames=len(parts),
         centre_m=centre.tolist(),
         size_m=(high - low).tolist(),
+        around=_crop_around(files, points[kept]),
         xyz_mm=base64.b64encode(millimetres.tobytes()).decode(),
         rgb=base64.b64encode(colours[kept].tobytes()).decode(),
     )
+
+
+def _crop_around(files: ProjectFiles, points: Points) -> schemas.PromptsFileCrop | None:
+    """A box along the room's directions with some room around world points, in the recording's own world."""
+    level = cameras.levelled(files)
+    if level is None:
+        return None
+    room_axes = rotation_about_z(level.manhattan_yaw_rad)
+    local = points @ room_axes
+    low, high = local.min(axis=0) - _ROOM_M, local.max(axis=0) + _ROOM_M
+    capture_from_world = level.world_from_capture.inverse
+    corner = capture_from_world.apply((room_axes @ low)[None])[0]
+    edges = capture_from_world.turn(np.diag(high - low) @ room_axes.T)
+    return schemas.PromptsFileCrop(corner_m=corner.round(6).tolist(), edges_m=edges.round(6).tolist())
 
 
 def _seen_in(files: ProjectFiles, entry: dict[str, Any]) -> tuple[Points, np.ndarray]:

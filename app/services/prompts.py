@@ -87,7 +87,7 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
-        change = answered_change(context, session, project, item, infer=bool(wanted.keys() & {"category", "front"}))
+        change = answered_change(context, session, project, item, infer=bool(wanted.keys() & {"category", "front", "crop"}))
     return after_change(context, change)
 
 
@@ -310,6 +310,7 @@ def _shape(
             schemas.FrameSaid(frame=int(number), visible=mask is not None)
             for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))
         ],
+        crop=schemas.PromptsFileCrop.model_validate(item.crop) if item.crop is not None else None,
         segment="none",
         mask_frames=0,
         mask_backend="",
@@ -336,9 +337,10 @@ def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> d
         wanted["category"] = body.category
     if body.colour is not None and body.colour != item.colour:
         wanted["colour"] = body.colour
-    front = body.front.model_dump() if body.front is not None else None
-    if "front" in body.model_fields_set and front != item.front:
-        wanted["front"] = front
+    for key, drawn in (("front", body.front), ("crop", body.crop)):
+        value = drawn.model_dump() if drawn is not None else None
+        if key in body.model_fields_set and value != getattr(item, key):
+            wanted[key] = value
     return wanted
 
 
@@ -349,6 +351,8 @@ def _has_results(files: ProjectFiles, *names: str) -> bool:
 
 def _said_of(item: SceneObject, key: str, value: object) -> str:
     """A field's change in words."""
+    if key == "crop":
+        return f"crop box of {item.name} {'set' if value is not None else 'taken away'}"
     if key != "front":
         return f"{key} of {item.name} → {value}"
     return f"front of {item.name} {'drawn' if value is not None else 'as found'}"

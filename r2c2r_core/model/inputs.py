@@ -49,6 +49,14 @@ class FrameSaid:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CropBox:
+    """A box that a person drew around a thing: what is found outside is none of it."""
+
+    corner_capture: tuple[float, float, float]  # metres, capture frame
+    edges_capture: tuple[tuple[float, float, float], ...]  # three from that corner, at right angles to each other, metres
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectPrompt:
     """One object a person named, and clicked or drew."""
 
@@ -57,6 +65,7 @@ class ObjectPrompt:
     points: tuple[PromptPoint, ...]
     front: DrawnFront | None = None  # drawn: used as it is, whatever is clicked
     frames: tuple[FrameSaid, ...] = ()  # at most one a frame; they stand, whatever is found there
+    crop: CropBox | None = None  # of a thing
     others: tuple[PromptPoint, ...] = ()  # clicks on other objects that fall on it: never in a file, found by segment
 
 

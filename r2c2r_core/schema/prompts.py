@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
-from r2c2r_core.model.inputs import DrawnFront, DrawnHandle, FrameSaid, HingeSide, ObjectPrompt, PromptPoint, Prompts
+from r2c2r_core.model.inputs import CropBox, DrawnFront, DrawnHandle, FrameSaid, HingeSide, ObjectPrompt, PromptPoint, Prompts
 from r2c2r_core.schema.document import Document
 from r2c2r_core.texts import OBEYED
 
@@ -18,6 +18,8 @@ MOST_MASK_PX = 64_000_000  # no camera of a phone has more
 MOST_PAINTED_PX = 4_000_000_000  # of all masks of a file: some 6000 at the size the app paints them
 FARTHEST_M = 1000  # no scan reaches farther
 SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
+SMALLEST_CROP_M = 0.01
+_SQUARE_COS = 0.001  # by which a crop box's edges may miss a right angle
 _SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
 _OVER_M = 0.002  # by which a handle may reach over its front
 LONGEST = 60  # characters of a name: a mesh's file name holds it twice, and file systems end at 255 bytes
@@ -36,7 +38,7 @@ def _whole(value: Any) -> Any:
 
 
 Version = Annotated[Literal[1], BeforeValidator(_whole)]
-PromptsVersion = Annotated[Literal[1, 2], BeforeValidator(_whole)]
+PromptsVersion = Annotated[Literal[1, 2, 3], BeforeValidator(_whole)]
 Label = Annotated[Literal[0, 1], BeforeValidator(_whole)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$", max_length=LONGEST)]
 Category = Annotated[str, Field(max_length=LONGEST), AfterValidator(_shows)]
@@ -143,6 +145,35 @@ class PromptsFileFrame(Document):
     mask: PromptsFileMask | None = Field(description="its mask there, which stands; null: it is not visible there")
 
 
+class PromptsFileCrop(Document):
+    """A box around a thing: what is found outside is none of it."""
+
+    corner_m: list[Metres] = Field(
+        min_length=3, max_length=3, description="one corner [x, y, z] in metres, in the recording's own world"
+    )
+    edges_m: list[Annotated[list[Metres], Field(min_length=3, max_length=3)]] = Field(
+        min_length=3,
+        max_length=3,
+        description="three edges [x, y, z] in metres from that corner, at right angles to each other",
+    )
+
+    @model_validator(mode="after")
+    def _box(self) -> "PromptsFileCrop":
+        edges = np.array(self.edges_m)
+        lengths = np.linalg.norm(edges, axis=1)
+        if lengths.min() < SMALLEST_CROP_M:
+            raise ValueError(f"a crop box's edge of {lengths.min():.3f} m found, at least {SMALLEST_CROP_M} m expected")
+        units = edges / lengths[:, None]
+        if np.abs(units @ units.T - np.eye(3)).max() > _SQUARE_COS:
+            raise ValueError("edges of no box found, three at right angles to each other expected")
+        return self
+
+    def drawn(self) -> CropBox:
+        """The noun of the pipeline."""
+        x, y, z = self.corner_m
+        return CropBox(corner_capture=(x, y, z), edges_capture=tuple((x, y, z) for x, y, z in self.edges_m))
+
+
 class PromptsFileObject(Document):
     """One object of prompts.json."""
 
@@ -153,12 +184,15 @@ class PromptsFileObject(Document):
     frames: list[PromptsFileFrame] = Field(
         default_factory=list, max_length=MOST_POINTS, description="from version 2 on: a list of frames, each at most once"
     )
+    crop: PromptsFileCrop | None = Field(default=None, description="from version 3 on: of a thing, a box that it lies in")
 
 
 class PromptsFile(Document):
     """prompts.json."""
 
-    version: PromptsVersion = Field(description="1 or 2: 2 where a front is drawn or a frame is set right")
+    version: PromptsVersion = Field(
+        description="1, 2 where a front is drawn or a frame is set right, 3 where a thing has a crop box"
+    )
     objects: list[PromptsFileObject] = Field(
         max_length=MOST_OBJECTS, description="a list of objects, each with a name of its own"
     )
@@ -174,6 +208,8 @@ class PromptsFile(Document):
                 raise ValueError(f"a drawn front of '{item.name}' found in version 1, version 2 expected")
             if item.frames and self.version == 1:
                 raise ValueError(f"frames of '{item.name}' found in version 1, version 2 expected")
+            if item.crop is not None and self.version < 3:
+                raise ValueError(f"a crop box of '{item.name}' found in version {self.version}, version 3 expected")
             if len({said.frame for said in item.frames}) < len(item.frames):
                 raise ValueError(f"two of the frames of '{item.name}' have one number, each at most once expected")
         masks = [said.mask for item in self.objects for said in item.frames if said.mask is not None]
@@ -195,6 +231,7 @@ class PromptsFile(Document):
                         FrameSaid(frame=said.frame, mask=said.mask.packed() if said.mask is not None else None)
                         for said in item.frames
                     ),
+                    crop=item.crop.drawn() if item.crop is not None else None,
                 )
                 for item in self.objects
             )

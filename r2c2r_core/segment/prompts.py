@@ -52,6 +52,11 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
             f"{prompt.name}: a front drawn of a '{prompt.category}' found, a furniture front or an appliance expected",
             hint="correct its category",
         )
+    if prompt.crop is not None and category_of(prompt.category).kind != "thing":
+        raise PromptError(
+            f"{prompt.name}: a crop box of a '{prompt.category}' found, of a thing expected",
+            hint="correct its category, or take the box away",
+        )
     if prompt.front is None and not any(point.label == 1 for point in prompt.points):
         found = f"{len(prompt.points)} clicks off it" if prompt.points else "no clicks"
         raise PromptError(

@@ -312,6 +312,17 @@ export interface FoundFront {
   handle: PromptsFileHandle | null;
 }
 
+/** The pinhole camera of a frame: pixels of the stored frame, OpenCV axes, in the recording's own world. */
+export interface FrameCamera {
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+  camera_from_capture: number[][];
+}
+
 /** What an object is in one frame: a mask that stands, or None: not visible there. */
 export interface FrameIn {
   mask: PromptsFileMask | null;
@@ -459,12 +470,13 @@ export interface ObjectIn {
   front?: PromptsFileFrontInput | null;
 }
 
-/** What changes, a drawn front also to none; with `version`, only if nobody changed it meanwhile. */
+/** What changes, a drawn front and a crop box also to none; with `version`, only if nobody changed it meanwhile. */
 export interface ObjectPatch {
   name?: string | null;
   category?: string | null;
   colour?: number | null;
   front?: PromptsFileFrontInput | null;
+  crop?: PromptsFileCrop | null;
   version?: number | null;
 }
 
@@ -483,6 +495,7 @@ export interface ObjectPoints {
   frames: number;
   centre_m: number[];
   size_m: number[];
+  around: PromptsFileCrop | null;
   xyz_mm: string;
   rgb: string;
 }
@@ -665,14 +678,20 @@ export interface ProjectSummary {
 
 /** prompts.json. */
 export interface PromptsFileInput {
-  version: 1 | 2;
+  version: 1 | 2 | 3;
   objects: PromptsFileObjectInput[];
 }
 
 /** prompts.json. */
 export interface PromptsFileOutput {
-  version: 1 | 2;
+  version: 1 | 2 | 3;
   objects: PromptsFileObjectOutput[];
+}
+
+/** A box around a thing: what is found outside is none of it. */
+export interface PromptsFileCrop {
+  corner_m: number[];
+  edges_m: number[][];
 }
 
 /** What was said of an object in one frame. */
@@ -717,6 +736,7 @@ export interface PromptsFileObjectInput {
   points: PromptsFilePoint[];
   front?: PromptsFileFrontInput | null;
   frames?: PromptsFileFrame[];
+  crop?: PromptsFileCrop | null;
 }
 
 /** One object of prompts.json. */
@@ -726,6 +746,7 @@ export interface PromptsFileObjectOutput {
   points: PromptsFilePoint[];
   front: PromptsFileFrontOutput | null;
   frames: PromptsFileFrame[];
+  crop: PromptsFileCrop | null;
 }
 
 /** One click of prompts.json. */
@@ -856,6 +877,7 @@ export interface SceneObject {
   points: Point[];
   front: PromptsFileFrontOutput | null;
   frames: FrameSaid[];
+  crop: PromptsFileCrop | null;
   can_undo: boolean;
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
@@ -1098,6 +1120,8 @@ export interface Operations {
   getFigures: { parameters: { project: string }; body: undefined; answer: Figures };
   /** GET /api/projects/{project}/frames */
   listFrames: { parameters: { project: string }; body: undefined; answer: FrameInfo[] };
+  /** GET /api/projects/{project}/frames/{frame}/camera */
+  getCamera: { parameters: { project: string; frame: number }; body: undefined; answer: FrameCamera };
   /** GET /api/projects/{project}/history */
   getHistory: { parameters: { project: string; object?: number | null; before?: number | null; limit?: number }; body: undefined; answer: HistoryEntry[] };
   /** GET /api/projects/{project}/lanes */

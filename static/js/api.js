@@ -1,7 +1,7 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
+ *   SystemInfo, FolderListing, FrameCamera, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
  *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
  *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
@@ -211,6 +211,8 @@ export const listObjects = (id) => get(`${of(id)}/objects`);
 /** @param {string} id @param {number} object @param {AbortSignal} [signal] @returns {Promise<ObjectPoints>} */
 export const getObjectPoints = (id, object, signal) => get(`${of(id)}/objects/${object}/cloud`, signal);
 
+/** @param {string} id @param {number} frame @returns {Promise<FrameCamera>} */
+export const getCamera = (id, frame) => get(`${of(id)}/frames/${frame}/camera`);
 /** @param {string} id @returns {Promise<LiveStatus>} */
 export const openLive = (id) => send("POST", `${of(id)}/live/open`);
 /** @param {string} id @returns {Promise<Lane[]>} */

@@ -143,7 +143,9 @@ def whole(session: Session, scope: history.Scope) -> Any:
     flat = history.snapshot(session, session.get_one(SceneObject, 1), scope)
     if scope == "prompts":
         points = [{"id": int(key.split()[1]), **value} for key, value in flat.items() if key.startswith("point ")]
-        fields = {key: value for key, value in flat.items() if " " not in key and key != "front"}  # nobody drew then
+        fields = {
+            key: value for key, value in flat.items() if " " not in key and key not in ("front", "crop")
+        }  # nobody drew then
         return fields | {"points": points}
     corrected = {key.split()[1]: value for key, value in flat.items() if key.startswith("override ")}
     return {"override": corrected, "verdicts": [{"candidate": k.split()[1], **v} for k, v in flat.items() if k[0] == "v"]}

@@ -5,7 +5,7 @@ import hashlib
 import importlib
 import shutil
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
 from r2c2r_core.segment.appliances.found import FoundAppliance
+from r2c2r_core.segment.cropped import cropped, world_crop
 from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.fronts.found import FoundFront
@@ -81,7 +82,9 @@ class GeometricSession:
         """A first mask in the frame clicked last: what `stream` brings there; of things and appliances, nearly that."""
         if prompt.front is not None:
             return None
-        found = self._found.get(prompt) or glimpse_object(self, prompt, *self._clicked(prompt)) or self.find(prompt)
+        whole = replace(prompt, crop=None)
+        known = self._found.get(whole) or glimpse_object(self, whole, *self._clicked(prompt)) or self.find(whole)
+        found = self._within(known, prompt)
         frame = self.scene.frame(prompt.points[-1].frame)
         view = found.see(frame)
         return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None
@@ -148,8 +151,16 @@ class GeometricSession:
             check_prompt(self.scene.capture, prompt)
             return find_drawn(self, prompt, prompt.front, category_of(prompt.category))
         hint, positives, negatives = self._clicked(prompt)
+        if prompt.crop is not None:  # moved about, it finds nothing anew
+            return self._within(self.find(replace(prompt, crop=None)), prompt)
         others = np.array([point for click in prompt.others if (point := self._hit(click)) is not None]).reshape(-1, 3)
         return find_object(self, prompt, hint, positives, negatives, others)
+
+    def _within(self, found: Found, prompt: ObjectPrompt) -> Found:
+        """What of it lies in the prompt's crop box; all of it without one."""
+        if prompt.crop is None:
+            return found
+        return cropped(found, world_crop(prompt.crop, self.scene.capture.world_from_capture), self.scene, prompt.name)
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
         """Clicks on other fronts and machines that fall on the same front or machine, by its name; things lie on fronts."""

@@ -1,7 +1,7 @@
 """Learned segmenters: a video model draws masks, depth prunes them, furniture is measured as without weights."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.cropped import cropped_mask, world_crop
 from r2c2r_core.segment.geometric.session import GeometricSegmenter, GeometricSession
 from r2c2r_core.segment.learned.fuse import DepthPictures, Fused, both_masks, with_evidence
 from r2c2r_core.segment.learned.measure import Measured, measure
@@ -89,7 +90,7 @@ class LearnedSession:
                 f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
                 hint="choose another",
             )
-        found = next((packed for index, packed, _ in self._of(prompt).all() if index == frame_index), None)
+        found = next((packed for index, packed, _ in self._seen(prompt) if index == frame_index), None)
         assert found is not None
         return unpack_mask(found)
 
@@ -109,16 +110,16 @@ class LearnedSession:
         """As the model gives them: the frame clicked last, the other clicked ones, then outwards both ways."""
         if prompt.front is not None:
             return self.prepared.stream(prompt)
-        return (found for found in self._of(prompt).all() if found[1].area_px >= self.config.least_area_px)
+        return (found for found in self._seen(prompt) if found[1].area_px >= self.config.least_area_px)
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
         """The object in every frame that sees it, after all frames had their say; raises ObjectNotSeen."""
         if prompt.front is not None:  # as it was drawn: there is nothing to find
             return self.prepared.track(prompt, progress=progress)
-        total, followed = len(self.capture.frames), self._of(prompt)
+        total = len(self.capture.frames)
         masks: dict[int, PackedMask] = {}
         confidence: dict[int, float] = {}
-        for position, (index, packed, trust) in enumerate(followed.all()):
+        for position, (index, packed, trust) in enumerate(self._seen(prompt)):
             if packed.area_px >= self.config.least_area_px:
                 masks[index], confidence[index] = packed, trust
             progress.at(0.9 * (position + 1) / total, f"{prompt.name}: {self.name} at frame {position + 1}/{total}")
@@ -129,7 +130,7 @@ class LearnedSession:
             )
         progress.at(0.9, f"{prompt.name}: comparing frames")
         body = agreed_body(self.prepared.scene, masks)
-        fused = Fused(masks, confidence, followed.warnings())
+        fused = Fused(masks, confidence, self._of(prompt).warnings())
         if self.config.fusion == "evidence":
             fused = with_evidence(self.prepared.scene, fused, body, self.config.least_area_px)
         progress.at(0.95, f"{prompt.name}: measuring it")
@@ -166,8 +167,20 @@ class LearnedSession:
             motions=measured.motions,
         )
 
+    def _seen(self, prompt: ObjectPrompt) -> Iterator[Found]:
+        """The model's masks, and of a thing in a crop box what lies in it."""
+        if prompt.crop is None:
+            yield from self._of(prompt).all()
+            return
+        crop = world_crop(prompt.crop, self.capture.world_from_capture)
+        for index, packed, trust in self._of(prompt).all():
+            depth = self.prepared.scene.depth(index)
+            mask = cropped_mask(unpack_mask(packed), self.capture.frame(index), depth, crop)
+            yield index, pack_mask(mask), trust
+
     def _of(self, prompt: ObjectPrompt) -> "_Followed":
         """The object as far as it was followed: what was computed before is not computed again."""
+        prompt = replace(prompt, crop=None)  # the model is not asked anew for a box that is moved
         if prompt not in self._followed:
             check_prompt(self.capture, prompt)
             while len(self._followed) >= _KEPT_OBJECTS:

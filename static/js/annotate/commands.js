@@ -10,6 +10,7 @@ import { say } from "../elements/toasts.js";
  * @property {import("./player.js").Player} player
  * @property {import("./presses.js").Presses} presses
  * @property {import("./painter.js").Painter} painter
+ * @property {import("./cropper.js").Cropper} cropper
  * @property {import("./objects-pane.js").ObjectsPane} pane
  * @property {import("./evidence-pane.js").EvidencePane} evidence
  * @property {import("./stage-tools.js").StageTools} tools
@@ -28,6 +29,7 @@ export const ONE_A_PRESS = [
   "mosaic",
   "keep",
   "absent",
+  "crop",
 ];
 
 /**
@@ -72,7 +74,7 @@ function moves({ player, objects, masks }) {
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
-function changes({ objects, edits, player, pane: { proposals }, presses, painter }) {
+function changes({ objects, edits, player, pane: { proposals }, presses, painter, cropper }) {
   const deleteLast = () => {
     const last = objects.chosen?.points.findLast((point) => point.frame === player.frame?.index);
     if (last) edits.removePoint(last.id);
@@ -87,6 +89,8 @@ function changes({ objects, edits, player, pane: { proposals }, presses, painter
     polygon: () => painter.use("polygon"),
     "thinner-brush": () => painter.resize(0.75),
     "wider-brush": () => painter.resize(1.35),
+    crop: () => cropper.use(),
+    uncrop: () => cropper.remove(),
     keep: () => painter.keep(),
     absent: () => painter.absent(),
     segment: () => edits.segment(),

@@ -118,7 +118,7 @@ export class Edits extends EventTarget {
 
   /**
    * @param {number} id
-   * @param {{ name?: string, category?: string }} wanted
+   * @param {{ name?: string, category?: string, crop?: import("../api-types").PromptsFileCrop | null }} wanted
    */
   patch(id, wanted) {
     const seen = this.#objects.get(id);

@@ -1,6 +1,6 @@
 /**
  * The right of the page: depth of the frame, shape of the object so far, comments. On a narrow screen it comes and goes; a wide
- * one always has room for it. Says "mosaic" and "comment" when they are asked for, "open" when it came or went.
+ * one always has room for it. Says "mosaic", "comment", "crop" and "uncrop" when they are asked for, "open" when it came or went.
  */
 
 import { h } from "../dom.js";
@@ -10,6 +10,8 @@ import { ObjectCloud } from "../elements/object-cloud.js";
 export class EvidencePane extends EventTarget {
   comments = new CommentList();
   cloud = new ObjectCloud();
+  #crop = this.#button("crop", "Crop box");
+  #uncrop = this.#button("uncrop", "Take it away");
   #depth = h("img", { class: "depth", alt: "Depth of this frame: red is near, blue is far" });
   element = h(
     "aside",
@@ -19,6 +21,7 @@ export class EvidencePane extends EventTarget {
     this.#depth,
     h("h2", {}, "Shape so far"),
     this.cloud,
+    h("div", { class: "row" }, this.#crop, this.#uncrop),
     h("div", { class: "row" }, this.#button("mosaic", "On many frames"), this.#button("comment", "Pin a comment")),
     this.comments,
   );
@@ -35,6 +38,13 @@ export class EvidencePane extends EventTarget {
   set open(on) {
     this.element.classList.toggle("open", on);
     this.dispatchEvent(new Event("open"));
+  }
+
+  /** @param {boolean} used whether the crop box is being set @param {boolean} there whether the object has one */
+  showCrop(used, there) {
+    this.#crop.textContent = used ? "Done" : "Crop box";
+    this.#crop.setAttribute("aria-pressed", String(used));
+    this.#uncrop.hidden = !there;
   }
 
   /** @param {string} url */

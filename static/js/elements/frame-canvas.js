@@ -1,6 +1,6 @@
 /**
  * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
- * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id; while a brush is set "paint" path instead of boxes.
+ * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id, "view" when it is drawn otherwise; while a brush is set "paint" path instead of boxes.
  * Zoom with the wheel or two fingers, pan with the middle button, Space- or Alt-drag or two fingers; a crosshair moved by arrows
  * replaces the mouse. Each mask carries its object's number, the chosen one and the one under the pointer their names.
  */
@@ -143,6 +143,11 @@ export class FrameCanvas extends LiveElement {
     return this.#view.scale;
   }
 
+  /** Where the frame is on the screen. */
+  get view() {
+    return this.#view;
+  }
+
   /** Space is held, or was let go. @param {boolean} held @returns {boolean} whether a drag panned meanwhile */
   holdSpace(held) {
     const { panned } = this.#space;
@@ -199,6 +204,7 @@ export class FrameCanvas extends LiveElement {
     const { scale, x, y } = this.#view;
     if (this.#image) context.drawImage(this.#image, x, y, this.#size.width * scale, this.#size.height * scale);
     if (!this.#raw) this.#drawOver(context);
+    this.emit("view", null);
   }
 
   /** @param {CanvasRenderingContext2D} context */

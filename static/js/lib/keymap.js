@@ -32,6 +32,8 @@ export const KEYMAP = [
   { keys: ["u"], action: "wider-brush", text: "Wider brush", page: "annotate" },
   { keys: ["w"], action: "keep", text: "Its mask in this frame is right: it stands", page: "annotate" },
   { keys: ["a"], action: "absent", text: "It is not visible in this frame; again: as found", page: "annotate" },
+  { keys: ["s"], action: "crop", text: "Crop box of this thing: what lies outside is none of it", page: "annotate" },
+  { keys: ["Shift+s"], action: "uncrop", text: "Take its crop box away", page: "annotate" },
   { keys: ["h"], action: "hide", text: "Hide or show this object's mask", page: "annotate" },
   { keys: ["Shift+h"], action: "solo", text: "Show this object's mask alone", page: "annotate" },
   { keys: ["t"], action: "raw", text: "Hold: the frame without masks", page: "annotate" },

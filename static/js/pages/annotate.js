@@ -3,6 +3,7 @@
 import * as api from "../api.js";
 import { actionsOf, offers, ONE_A_PRESS } from "../annotate/commands.js";
 import { crosshairKey } from "../annotate/crosshair.js";
+import { Cropper } from "../annotate/cropper.js";
 import { Contradictions } from "../annotate/contradictions.js";
 import { Edits } from "../annotate/edits.js";
 import { EvidencePane } from "../annotate/evidence-pane.js";
@@ -28,6 +29,9 @@ import { remember } from "../router.js";
 
 /** @typedef {import("../api-types").Comment} Comment */
 /** @typedef {import("../api-types").SceneObject} SceneObject */
+
+const CROPPING =
+  "Drag a side of the box, or choose one and press arrow keys; Esc ends. What lies outside is none of the object.";
 
 export class AnnotatePage extends LiveElement {
   project = "";
@@ -69,7 +73,12 @@ export class AnnotatePage extends LiveElement {
     mosaic: this.#mosaic,
   };
   #painter = new Painter({ ...this.#parts });
-  #commands = new Commands("annotate", actionsOf({ ...this.#parts, painter: this.#painter }), ONE_A_PRESS);
+  #cropper = new Cropper(this.#parts);
+  #commands = new Commands(
+    "annotate",
+    actionsOf({ ...this.#parts, painter: this.#painter, cropper: this.#cropper }),
+    ONE_A_PRESS,
+  );
   #picture = new Picture(
     { ...this.#parts, proposals: this.#pane.proposals, comments: this.#evidence.comments },
     this.#canvas,
@@ -77,9 +86,24 @@ export class AnnotatePage extends LiveElement {
   );
 
   connected() {
-    for (const part of [this.#painter, this.#edits, this.#masks, this.#pane, this.#evidence, this.#mosaic])
+    for (const part of [
+      this.#painter,
+      this.#cropper,
+      this.#edits,
+      this.#masks,
+      this.#pane,
+      this.#evidence,
+      this.#mosaic,
+    ])
       part.project = this.project;
-    const stage = h("div", { class: "stage" }, this.#canvas, this.#tools.element, this.#tip.element);
+    const stage = h(
+      "div",
+      { class: "stage" },
+      this.#canvas,
+      this.#cropper.element,
+      this.#tools.element,
+      this.#tip.element,
+    );
     this.replaceChildren(
       h("div", { class: "annotate" }, this.#pane.element, stage, this.#evidence.element, this.#strip),
       this.#mosaic,
@@ -108,7 +132,7 @@ export class AnnotatePage extends LiveElement {
     document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
     document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
     signal.addEventListener("abort", () =>
-      [this.#player, this.#picture, this.#contradictions].forEach((part) => part.stop()),
+      [this.#player, this.#picture, this.#contradictions, this.#cropper].forEach((part) => part.stop()),
     );
   }
 
@@ -153,7 +177,9 @@ export class AnnotatePage extends LiveElement {
     this.#on(proposals, "objects-made", (objects) => this.#adopt(objects));
     this.#on(comments, "comments", () => this.#picture.drawPins());
     this.#on(comments, "show-comment", (comment) => this.#showComment(comment));
-    for (const action of ["mosaic", "comment"]) this.#on(this.#evidence, action, () => this.act(action));
+    for (const action of ["mosaic", "comment", "crop", "uncrop"])
+      this.#on(this.#evidence, action, () => this.act(action));
+    this.#on(this.#cropper, "use", () => this.#drawCrop());
     this.#on(this.#evidence, "open", () => this.#tools.showEvidence(this.#evidence.open));
   }
 
@@ -286,17 +312,23 @@ export class AnnotatePage extends LiveElement {
 
   #contradicted = (/** @type {number} */ object) => this.#contradictions.about(object);
 
+  #drawCrop() {
+    this.#evidence.showCrop(this.#cropper.on, Boolean(this.#objects.chosen?.crop));
+    this.#drawTip();
+  }
+
   #drawObjects() {
+    this.#drawCrop(); // and the tip
     this.#pane.draw(this.#objects, this.#contradicted);
     this.#picture.drawObjects();
     if (this.#player.frame) this.#contradictions.lookSoon(this.#player.frame);
-    this.#drawTip();
   }
 
   #drawTip() {
     const { pinning } = this.#presses;
     const { chosen, size } = this.#objects;
     const proposed = this.#pane.proposals.tip;
+    if (this.#cropper.on) return this.#tip.say(CROPPING);
     if (this.#player.frame) this.#tip.show({ pinning, proposed, name: chosen?.name, objects: size });
   }
 
@@ -304,6 +336,7 @@ export class AnnotatePage extends LiveElement {
   #onKey(event) {
     if (!isForPage(event)) return;
     if (event.key === "Escape" && this.#presses.pinning) return void (this.#presses.pinning = false);
+    if (event.key === "Escape" && this.#cropper.on) return void this.#cropper.use();
     if (event.key === "Escape" && this.#painter.tool) return this.#painter.use(null);
     if (event.key === "Enter" && this.#painter.close()) return event.preventDefault();
     if (event.key === " ") return (event.preventDefault(), void this.#canvas.holdSpace(true)); // a tap plays: #onKeyUp

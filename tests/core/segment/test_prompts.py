@@ -48,7 +48,7 @@ def test_a_drawn_front_needs_no_click(tmp_path: Path) -> None:
         ("{", "not usable JSON: line 1, column 2"),
         ([], "the document is []"),
         ({"objects": []}, "the document lacks 'version'; expected 1"),
-        ({"version": 3, "objects": []}, "version is 3; expected 1 or 2"),
+        ({"version": 4, "objects": []}, "version is 4; expected 1, 2 where"),
         (
             {"version": 1, "objects": [{**OBJECT, "front": FRONT}]},
             "a drawn front of 'drawer_1' found in version 1, version 2 expected",

@@ -1,0 +1,51 @@
+"""Frames' cameras in the recording's own world, in which people draw, and what relates that world to the levelled one."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app import schemas
+from app.db import queries
+from app.db.engine import reading
+from app.errors import NotFound
+from app.files import ProjectFiles
+from app.services import views
+from app.services.context import Context
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture
+
+
+class Levelled(NamedTuple):
+    """The world of a recording: where it lies, and which way its walls run."""
+
+    world_from_capture: Rigid3
+    manhattan_yaw_rad: float
+
+
+def camera(context: Context, project_id: str, index: int) -> schemas.FrameCamera:
+    """A frame's camera."""
+    with reading(context.engine) as session:
+        files = context.files(queries.project_row(session, project_id))
+    frame, level = views.frame_of(files, index), levelled(files)
+    if frame is None or level is None:
+        raise NotFound(f"the recording has no frame {index}", hint="its frames are listed under /frames")
+    seen = frame.rgb_camera
+    return schemas.FrameCamera(
+        width=seen.width,
+        height=seen.height,
+        fx=seen.fx,
+        fy=seen.fy,
+        cx=seen.cx,
+        cy=seen.cy,
+        camera_from_capture=(frame.world_from_camera.inverse @ level.world_from_capture).matrix.tolist(),
+    )
+
+
+def levelled(files: ProjectFiles) -> Levelled | None:
+    """How the recording was levelled; None while it is being read."""
+    told = views.facts(files, "ingest", "scene", _told_level)
+    return Levelled(Rigid3.from_matrix(np.array(told[0])), told[1]) if told is not None else None
+
+
+def _told_level(capture: Capture) -> tuple[list[list[float]], float]:
+    return capture.world_from_capture.matrix.tolist(), capture.room.manhattan_yaw_rad

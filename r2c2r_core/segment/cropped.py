@@ -1,0 +1,135 @@
+"""What lies outside a box that a person drew around a thing is none of it, whichever segmenter found it."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Mask, Matrix3, PointField, Points, Vector3
+from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.camera import pixel_rays
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.category import Kind
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import CropBox
+from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.segment.found import Found, View
+from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.found import FoundStanding, FoundThing
+from r2c2r_core.segment.things.thing import Thing
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as outside."""
+
+    slack_m: float = param(0.02, "m", "beyond the box, within which depth is still that of what is in it")
+    least_points: int = param(20, "count", "of a thing's points that must lie in its box", ge=4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crop:
+    """The box in the world; its own coordinates run from 0 to 1 along each edge."""
+
+    corner: Vector3
+    edges: Matrix3  # one a row
+
+    @property
+    def bottom_m(self) -> float:
+        """Height of its lowest corner."""
+        return float(self.corner[2] + np.minimum(self.edges[:, 2], 0.0).sum())
+
+    def holds(self, points: Points) -> np.ndarray:
+        """Which points (n, 3) lie in it."""
+        local = self._turned(points - self.corner)
+        return np.asarray(((local >= 0) & (local <= 1)).all(axis=-1))
+
+    def span(self, origin: Vector3, rays: PointField) -> tuple[np.ndarray, np.ndarray]:
+        """How far along each ray it begins and ends, in lengths of the ray; where it is missed it ends first."""
+        start, way = self._turned(origin - self.corner), self._turned(rays)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            low, high = -start / way, (1 - start) / way
+        return np.fmin(low, high).max(axis=-1), np.fmax(low, high).min(axis=-1)
+
+    def _turned(self, vectors: PointField) -> PointField:
+        return np.asarray(vectors @ (self.edges / (self.edges**2).sum(axis=1, keepdims=True)).T)
+
+
+def world_crop(crop: CropBox, world_from_capture: Rigid3) -> Crop:
+    """The box in the world."""
+    corner = world_from_capture.apply(np.array([crop.corner_capture]))[0]
+    return Crop(corner, world_from_capture.turn(np.array(crop.edges_capture)))
+
+
+def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
+    """The part of a thing that lies in the box; raises ObjectNotSeen where hardly any does."""
+    assert isinstance(found, FoundThing | FoundStanding), found  # check_prompt refuses others
+    thing = found.thing if isinstance(found, FoundThing) else found.standing.thing
+    within, least = crop.holds(thing.points), tuned(Params).least_points
+    if within.sum() < least:
+        raise ObjectNotSeen(
+            f"{name}: {within.sum()} of its {len(within)} points lie in its crop box, at least {least} expected",
+            hint="move the box over the thing, or take it away",
+        )
+    return FoundCropped(found, thing, crop, scene)
+
+
+def cropped_mask(mask: Mask, frame: Frame, depth: DepthMetres, crop: Crop) -> Mask:
+    """Of a mask, the pixels whose rays meet the box, and whose depth, where there is one, lies in it."""
+    rows, columns = np.nonzero(mask)
+    if not len(rows):
+        return mask
+    slack, camera = tuned(Params).slack_m, frame.rgb_camera
+    rays = pixel_rays(np.column_stack([columns, rows]) + 0.5, camera) @ frame.world_from_camera.rotation.T
+    begins, ends = crop.span(frame.world_from_camera.translation, rays)
+    seen = cv2.resize(depth, (camera.width, camera.height), interpolation=cv2.INTER_NEAREST)[rows, columns]
+    near = (seen > begins - slack) & (seen < ends + slack)
+    kept = np.zeros_like(mask)
+    kept[rows, columns] = (ends > np.maximum(begins, 0.0)) & (near | (seen <= 0))
+    return kept
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundCropped:
+    """A thing of which only what lies in a box counts."""
+
+    found: FoundThing | FoundStanding
+    thing: Thing  # all of it
+    crop: Crop
+    scene: Scene
+
+    @property
+    def kind(self) -> Kind:
+        """As it was found."""
+        return self.found.kind
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """As it was found."""
+        return self.found.warnings
+
+    def see(self, frame: Frame) -> View:
+        """Its pixels in the box."""
+        view = self.found.see(frame)
+        return replace(view, mask=cropped_mask(view.mask, frame, self.scene.depth(frame.index), self.crop))
+
+    def panel(self) -> FrontPanel | None:
+        """None: things have no front panel."""
+        return None
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """None: things are moved whole."""
+        return ()
+
+    def box(self) -> ThingBox | None:
+        """The box of its part; it stands where the crop box begins where that is above its support."""
+        support = self.thing.support_z_m
+        part = replace(
+            self.thing,
+            vertices=self.thing.points[self.crop.holds(self.thing.points)],
+            faces=np.zeros((0, 3), np.int64),
+            support_z_m=None if support is None else max(support, self.crop.bottom_m),
+        )
+        return FoundThing(part, self.scene, round=isinstance(self.found, FoundThing) and self.found.round).box()

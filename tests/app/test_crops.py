@@ -1,0 +1,70 @@
+"""A crop box around a thing is stored, undone, written to prompts.json and read from it; and what it is drawn with."""
+
+from typing import Any
+
+import pytest
+
+from tests.app.conftest import Running
+from tests.app.test_reviews import Reviewed, reviewed
+
+__all__ = ["reviewed"]
+
+CROP: dict[str, Any] = {"corner_m": [0.1, 0.2, 0.3], "edges_m": [[0.4, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.6]]}
+MUG = {"category": "mug", "points": [{"frame": 3, "x": 40, "y": 40}]}
+
+
+def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", MUG, 201)
+    here = f"{at}/objects/{made['id']}"
+    assert made["crop"] is None
+
+    def state() -> str:
+        (item,) = [one for one in web.get(f"{at}/objects") if one["id"] == made["id"]]
+        return str(item["segment"])
+
+    web.until(lambda: state() == "done")
+    cropped = web.patch(here, {"crop": CROP})
+    assert cropped["crop"] == CROP
+    assert cropped["segment"] == "waiting"
+    assert web.patch(here, {"name": "renamed"})["crop"] == CROP  # absent is not none
+    assert web.patch(here, {"crop": None})["crop"] is None
+    assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["crop"] == CROP
+
+
+def test_prompts_json_holds_the_box_from_version_3_and_is_read_again(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}"
+    made = web.post(f"{at}/objects", {**MUG, "name": "cup"}, 201)
+    assert web.get(f"{at}/prompts.json")["version"] == 1
+    web.patch(f"{at}/objects/{made['id']}", {"crop": CROP})
+    file = web.get(f"{at}/prompts.json")
+    assert file["version"] == 3
+    (entry,) = [entry for entry in file["objects"] if entry["name"] == "cup"]
+    assert entry["crop"] == CROP
+    other = web.sample()
+    web.post(f"/api/projects/{other}/prompts.json", file)
+    (taken,) = [one for one in web.get(f"/api/projects/{other}/objects") if one["name"] == "cup"]
+    assert taken["crop"] == CROP
+
+
+@pytest.mark.parametrize("edges", [CROP["edges_m"][:2], [[1, 0, 0], [1, 1, 0], [0, 0, 1]], [[0, 0, 0]] * 3])
+def test_what_is_no_box_is_refused(web: Running, edges: Any) -> None:
+    project = web.sample()
+    made = web.post(f"/api/projects/{project}/objects", MUG, 201)
+    web.client.patch(f"/api/projects/{project}/objects/{made['id']}", json={"crop": {**CROP, "edges_m": edges}})
+    (item,) = [one for one in web.get(f"/api/projects/{project}/objects") if one["id"] == made["id"]]
+    assert item["crop"] is None
+
+
+def test_a_box_is_offered_around_the_points_and_drawn_by_the_camera(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    found = web.get(f"/api/projects/{project}/objects/{number}/cloud")
+    around = found["around"]
+    for axis in range(3):
+        assert around["corner_m"][axis] < found["centre_m"][axis] < around["corner_m"][axis] + around["edges_m"][axis][axis]
+    camera = web.get(f"/api/projects/{project}/frames/3/camera")
+    assert (camera["width"], camera["fx"]) == (160, 150)
+    assert camera["camera_from_capture"][3] == [0, 0, 0, 1]
+    web.get(f"/api/projects/{project}/frames/999/camera", 404)
