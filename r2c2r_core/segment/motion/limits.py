@@ -19,6 +19,7 @@ class Params:
     )
     fps: float = param(15.0, "count", "frames of a second, where a recording has no times", gt=0)
     least_frames: int = param(3, "count", "that show it at its widest", ge=2)
+    arrives: float = param(4.0, "ratio", "of what is still, that it must be seen to open further before it stops", ge=2)
 
 
 def widest(fitted: np.ndarray, values: np.ndarray, *, turns: bool) -> float:
@@ -38,8 +39,9 @@ def stop_seen(values: np.ndarray, seconds: Sequence[float | None], largest: floa
     times = np.array([k / params.fps if t is None else t for k, t in enumerate(seconds)])
     for start, stop in _stretches(held):
         long = stop - start >= params.least_frames and times[stop - 1] - times[start] >= params.dwell_s
-        moving = start > 0 and 2 * still < values[start - 1] < largest - still  # before: what it closes from need be no stop
-        if long and moving:
+        before = values[:start]  # what stands open from the first frame on, or closes from here, need not have met a stop
+        arrived = start > 0 and 2 * still < before[-1] and before.min() < largest - params.arrives * still
+        if long and arrived:
             return True
     return False
 

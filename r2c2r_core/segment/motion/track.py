@@ -78,17 +78,14 @@ def find_motion(
         return None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
     through = counts[:, 1] >= params.least_closed
-    filled = (counts[:, 0] >= params.least_closed) & ~through
     tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
     courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
-        # A door leaves its place open to be seen into; where what shows of it is filled, another leaf stands before it.
-        opened = course.values > 0
-        hidden = (through & opened).sum() < params.least_frames and (filled & opened).sum() > opened.sum() / 2
-        hidden &= course.hypothesis.way != "out"
-        motion = _measured(leaf, course, scene, part) if not hidden and course.support > params.support else None
+        # Its place is seen into where it is seen elsewhere; a place that is only hidden tells of what stands before it.
+        empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
+        motion = _measured(leaf, course, scene, part) if empty and course.support > params.support else None
         if motion is not None:
             return None if only and course.hypothesis.way not in prior else motion
     return None

@@ -47,23 +47,28 @@ def filmed(
     hands: Sequence[int] = (),
     other: Sequence[int] = (),
     pivot_off: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    niche: bool = False,
     seed: int = 0,
 ) -> Film:
     """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`.
 
     In frames `other` it is closed, and a board like it stands before it where it would be, hung on its left and opened by 0.9.
+    With `niche` it is closed between two machines that reach into the room, and the cameras pass so far that they hide it.
     """
     rng = np.random.default_rng(seed)
     moving = joint(way)
     frames, depths = [], {}
     for number, state in enumerate(states):
         t = number / max(len(states) - 1, 1) - 0.5
-        eye = LEAF.world_from_front.apply(np.array([[1.4 * t, -1.7 + 0.2 * np.cos(9 * t), 0.45 + 0.15 * np.sin(7 * t)]]))[0]
+        eye = LEAF.world_from_front.apply(
+            np.array([[(3.2 if niche else 1.4) * t, -1.7 + 0.2 * np.cos(9 * t), 0.45 + 0.15 * np.sin(7 * t)]])
+        )[0]
         pose = look_at(eye, LEAF.world_from_front.apply(np.array([[0.2 * t, -0.15, -0.05]]))[0])
         turning = Rigid3(np.eye(3), np.array(pivot_off))
         leaf = LEAF.world_from_front @ turning @ moving.pose(state) @ turning.inverse
         before = [_arm()] if number in hands else []
         before += [_board(LEAF.world_from_front @ joint("left").pose(0.9))] if number in other else []
+        before += _niche() if niche else []
         seen = cast_rays([*_unit(), _board(leaf), *before], pose)
         frames.append(
             Frame(
@@ -112,6 +117,12 @@ def _unit() -> list[Solid]:
         (place, (-3.0, 0.5, -h - 0.5), (3.0, 0.6, 2.0)),
         (place, (-3.0, -3.0, -h - 0.3), (3.0, 0.5, -h - 0.2)),
     ]
+
+
+def _niche() -> list[Solid]:
+    w, h = LEAF.half_m
+    deep, shallow = (-w - 0.6, -0.9, -h), (w - 0.017, -0.5, -h)
+    return [(LEAF.world_from_front, deep, (-w, -0.02, h)), (LEAF.world_from_front, shallow, (w + 0.6, -0.02, h))]
 
 
 def _arm() -> Solid:

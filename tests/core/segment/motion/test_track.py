@@ -105,3 +105,16 @@ def test_half_a_front_is_a_leaf_only_where_it_opens_as_one_of_a_pair() -> None:
 def test_another_leaf_that_stands_where_this_one_would_is_not_this_one() -> None:
     """Its place is only hidden then: a door that is open leaves it to be seen into."""
     assert find_motion(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
+
+
+def test_machines_beside_a_leaf_are_not_that_leaf_opened() -> None:
+    """One stands where an open door would, the other hides the closed one; but they stand there in every frame."""
+    assert find_motion(LEAF, scene("left", np.zeros(36), niche=True)) is None
+
+
+def test_what_stands_open_when_the_film_begins_has_met_no_stop() -> None:
+    """Its first frames err by a little: nobody saw it arrive."""
+    states = np.concatenate([[1.15], np.full(14, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
+    motion = find_motion(LEAF, scene("left", states))
+    assert motion is not None
+    assert not motion.stop_seen
