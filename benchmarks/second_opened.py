@@ -125,6 +125,7 @@ def film(generator: ModuleType, out: Path, seed: int, frames: int, width: int, h
             _store(recording, number, drawn, depth, rng)
             poses.append(_arkit(world_from_camera))
             owners = np.array([part["obj"] for part in scene.parts] + [-1])[hit]
+            owners[_uncovered(leaves, hit, depth, camera, world_from_camera)] = -1
             for index in np.unique(owners[owners >= 0]):
                 cv2.imwrite(str(out / "truth_masks" / names[index] / f"{number:06d}.png"), np.uint8(255) * (owners == index))
                 _propose(clicks, int(index), number, hit, owners == index, leaves, rng)
@@ -501,6 +502,24 @@ def _move(scene: Any, turns: list[Turn], sleeves: dict[str, int], time: float, w
             arm[:3, :3] = Rotation.align_vectors([along], [[0, 0, 1]])[0].as_matrix()
             arm[:3, 3] = grip
         scene.parts[sleeves[turn.leaf.name]]["now"] = arm
+
+
+def _uncovered(
+    leaves: list[Leaf], hit: np.ndarray, depth: np.ndarray, camera: np.ndarray, world_from_camera: np.ndarray
+) -> np.ndarray:
+    """Pixels (h, w) of what stays behind a front's closed place: masks are of what moves, and nobody owns what it uncovers."""
+    v, u = np.indices(depth.shape)
+    local = np.stack([(u - camera[0, 2]) / camera[0, 0], (v - camera[1, 2]) / camera[1, 1], np.ones(depth.shape)], -1)
+    points = (np.nan_to_num(depth)[..., None] * local) @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
+    found = np.zeros(depth.shape, bool)
+    for leaf in leaves:
+        up = np.array([0.0, 0.0, 1.0])
+        axes = np.stack([np.cross(up, leaf.out), leaf.out, up], axis=1)
+        low, high = (leaf.corners @ axes).min(axis=0), (leaf.corners @ axes).max(axis=0)
+        place = points @ axes
+        behind = (place[..., 1] < high[1] - 1e-3) & ((place > low) & (place < high))[..., [0, 2]].all(axis=-1)
+        found |= behind & ~np.isin(hit, [*leaf.front_parts, *leaf.body_parts])
+    return found
 
 
 class _Moved:

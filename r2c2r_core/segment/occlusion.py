@@ -25,6 +25,7 @@ class Tolerance:
 
     front_m: float = 0.06  # handles stand out by up to 5 cm
     behind_m: float = 0.06
+    fused: bool = True  # whether the fused surface stands in where the sensor tells nothing: not for what moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +75,7 @@ def _shown(
         return inside & _smoothed(scene.noise.agrees(seen, model, 0.03), scene, frame)
     # Glass and gloss leave holes through which the fused surface shows what is behind: only the sensor may say "behind".
     behind = scene.noise.seen_through(sensor, model, tolerance.behind_m)
-    hidden = scene.noise.occluded(seen, model, tolerance.front_m) | behind
+    hidden = scene.noise.occluded(seen if tolerance.fused else sensor, model, tolerance.front_m) | behind
     hidden = _smoothed(hidden, scene, frame)
     if not (hidden & inside).any():
         return inside

@@ -22,16 +22,47 @@ class Params:
     before_m: float = param(0.025, "m", "before it, from where something hides it")
     in_plane_m: float = param(0.012, "m", "the same of one that slides past others", source="tracks lie 2-4 cm apart")
     behind_m: float = param(0.04, "m", "behind it, from where depth looks past it")
+    tray_m: float = param(
+        0.55, "m", "behind a drawer's front, within which what is seen is the drawer's", source="longest trays"
+    )
+    shade: float = param(2.2, "ratio", "darker or lighter than the leaf usually is, from where it is no shade on it", gt=1)
+    hue_lab: float = param(18.0, "grey", "off the leaf's hue in that shade, from where it is no part of it")
+    hand_m: float = param(0.03, "m", "width of what may be a hand or a sleeve: handles are narrower")
+    told_share: float = param(0.25, "share", "of a leaf's pixels that need depth, for its usual colour to be known")
 
 
 def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float]:
     """Its visible pixels in a frame, and the share of its projection that is visible."""
     params = tuned(Params)
     near = Tolerance(
-        front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m
+        front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m, fused=False
     )  # a leaf that slides passes others a track away
     mask, share = visible_mask(_faces(opened, frame), scene, frame, near)
+    mask = mask & ~_dark_before(mask, opened, scene, frame)
     return (mask | _drawn_out(opened, scene, frame) if opened.way == "out" else mask), share
+
+
+def _dark_before(mask: Mask, opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
+    """Pixels of the mask without depth, in a patch as wide as a hand that is coloured as the leaf is not.
+
+    Skin in shade, gloves and sleeves return no light to a phone's LiDAR: depth alone does not tell them from the leaf.
+    """
+    params = tuned(Params)
+    size = (mask.shape[1], mask.shape[0])
+    known = cv2.resize((scene.depth(frame.index) > 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    told = mask & known
+    if np.count_nonzero(told) < max(params.told_share * np.count_nonzero(mask), 1):
+        return np.zeros_like(mask)
+    lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB).astype(np.float32)
+    usual = np.median(lab[told], axis=0)
+    light = np.maximum(lab[..., 0], 1.0) / max(float(usual[0]), 1.0)
+    hue = np.abs((lab[..., 1:] - 128.0) - (usual[1:] - 128.0) * light[..., None]).max(axis=2)
+    unlike = (np.abs(np.log(light)) > np.log(params.shade)) | (hue > params.hue_lab)
+    away = float(frame.world_from_camera.inverse.apply(opened.world_from_leaf.translation[None])[0, 2])
+    width = max(int(params.hand_m * frame.rgb_camera.fx / max(away, 0.3)), 3)
+    element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
+    patch = cv2.morphologyEx((unlike & ~told).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    return cv2.morphologyEx(patch, cv2.MORPH_OPEN, element) > 0
 
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:
@@ -50,13 +81,12 @@ def _side(facet: Facet, point: np.ndarray) -> float:
 
 
 def _drawn_out(opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
-    """Pixels whose depth lies between a drawer's front and its closed place: its box, and what is in it."""
+    """Pixels whose depth lies behind a drawer's front as deep as drawers are: its box, and what is in it."""
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
     local = leaf_from_camera.apply(unproject(pixel_centres(camera), depth, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
-    out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
     half_w, half_h = opened.leaf.half_m
     inside = (depth > 0) & (np.abs(local[..., 0]) < half_w) & (np.abs(local[..., 2]) < half_h)
-    inside &= (local[..., 1] > 0) & (local[..., 1] < out)
+    inside &= (local[..., 1] > 0) & (local[..., 1] < tuned(Params).tray_m)
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
     return np.asarray(cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5)

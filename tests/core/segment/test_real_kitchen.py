@@ -104,3 +104,8 @@ def test_doors_have_catalogue_widths(session: GeometricSession, name: str, width
     assert panel.handle is not None
     assert not panel.handle.is_vertical
     assert panel.handle.centre[1] > 0.2
+
+
+def test_nothing_is_said_to_move_where_everything_is_closed(session: GeometricSession) -> None:
+    for prompt in read_prompts(PROMPTS).objects:
+        assert session.find(prompt).motions() == (), prompt.name
