@@ -39,7 +39,7 @@ class Params:
     leg_cell_m: float = param(0.02, "m", "side of the cells in which legs that masks left out are counted", gt=0)
     level_m: float = param(0.03, "m", "between heights at which such a leg has a middle", gt=0)
     slender_m: float = param(0.10, "m", "across, at every height, of such a leg")
-    tall: float = param(0.5, "share", "of the height below which a leg is, that one which masks left out has")
+    tall: float = param(0.5, "share", "of the height below which a leg is, that one has which masks or depth left out")
 
 
 class Bars(NamedTuple):
@@ -89,7 +89,7 @@ def _lost_legs(cells: Points, floor: float, top: float) -> Points:
         if share > best:
             best = share
             lost = twins[(away > params.apart_m) & (twins[:, 2] < floor + params.lower * (top - floor))]
-    return lost
+    return np.concatenate([cells[:0], *_tall(lost, params.cell_m, params.lower * (top - floor))])
 
 
 def _unmasked_legs(carving: Carving, views: Sequence[View], floor: float) -> Points:
@@ -101,21 +101,27 @@ def _unmasked_legs(carving: Carving, views: Sequence[View], floor: float) -> Poi
     def beside(view: View, points: Points) -> np.ndarray:
         return ~_in_mask(view, points) & (points[:, 2] > lowest) & (points[:, 2] < floor + tall_m)
 
-    cells = _seen_cells(carving, views, beside, params.leg_cell_m)
-    legs = [_middle_line(piece) for piece in _pieces(cells, params.leg_cell_m) if np.ptp(piece[:, 2]) > params.tall * tall_m]
-    return np.concatenate([cells[:0], *(leg for leg in legs if leg is not None)])
+    legs = [
+        _middle_line(piece)
+        for piece in _tall(_seen_cells(carving, views, beside, params.leg_cell_m), params.leg_cell_m, tall_m)
+    ]
+    return np.concatenate([np.zeros((0, 3)), *(leg for leg in legs if leg is not None)])
+
+
+def _tall(cells: Points, cell_m: float, tall_m: float) -> list[Points]:
+    """The pieces of the cells that reach over enough of a leg's height."""
+    return [piece for piece in _pieces(cells, cell_m) if np.ptp(piece[:, 2]) > tuned(Params).tall * tall_m]
 
 
 def _middle_line(piece: Points) -> Points | None:
-    """Points up the middle of a piece; None for one that is no leg: too wide at some height."""
+    """Points up the middle of a piece, which may bend; None for one that is no leg: too wide at some height."""
     params = tuned(Params)
-    level = np.floor(piece[:, 2] / params.level_m)
-    slices = [piece[level == z] for z in np.unique(level)]
-    if max(np.ptp(points[:, :2], axis=0).max() for points in slices) > params.slender_m:
+    z = piece[:, 2]
+    level = np.floor(z / params.level_m)
+    if max(np.ptp(piece[level == k, :2], axis=0).max() for k in np.unique(level)) > params.slender_m:
         return None
-    middles = np.array([np.median(points, axis=0) for points in slices])
-    heights = np.arange(middles[0, 2], middles[-1, 2], params.cell_m / 2)
-    return np.column_stack([*(np.interp(heights, middles[:, 2], middles[:, k]) for k in (0, 1)), heights])
+    heights = np.arange(z.min(), z.max(), params.cell_m / 2)
+    return np.column_stack([*(np.polynomial.Polynomial.fit(z, piece[:, k], 2)(heights) for k in (0, 1)), heights])
 
 
 def _in_mask(view: View, _: Points) -> np.ndarray:

@@ -76,7 +76,7 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
             raise GenerationFailed("depth saw too little of it", hint="scan it from nearer")
         seen = known.carving.seen
         surface = surface_at(known.carving.grid, found.field, 0.0, seen.floor)
-        said = (f"{found.mirrored:.0%} of it is a mirror image: depth lost those legs",) if found.mirrored > 0.005 else ()
+        said = ("legs that depth lost are the mirror image of those it saw",) if found.mirrored > 0 else ()
         return thing_model(surface, seen.world_from_local, {"bars": 1.0, "mirrored": found.mirrored}, said)
 
     family = [Hypothesis("carved from free space", hull)]
