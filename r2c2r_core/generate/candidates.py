@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
+import numpy as np
+
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.generate.consensus import Rule, choose_candidate, chosen_by_person
 from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates, marked, with_uploads
@@ -103,7 +105,8 @@ def weighed(
         with suppress(PlacementFailed):
             placed = place(capture, track, asset, progress=part)
             depth = {"depth_residual_m": placed.rms_m} if isfinite(placed.rms_m) else {}
-            fits[asset.candidate_id] = {"mask_iou": placed.mask_iou, **depth}
+            size_m = float(np.ptp(placed.world_from_mesh.apply(asset.mesh.vertices), axis=0).max())
+            fits[asset.candidate_id] = {"mask_iou": placed.mask_iou, "size_m": size_m, **depth}
     candidates = [replace(c, metrics={**c.metrics, **fits.get(c.candidate_id, {})}) for c in found.candidates]
     return choose_candidate(candidates, rule=rule)
 

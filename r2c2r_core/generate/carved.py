@@ -25,6 +25,12 @@ class Params:
     truncation_ratio: float = param(3.0, "ratio", "of the truncation distance to a voxel", gt=0)
     least_truncation_m: float = param(0.012, "m", "truncation distance, at least", source="LiDAR noise and pose error together")
     sure_frames: int = param(3, "count", "that see a surface, before something thinner than four voxels is believed")
+    down_rad: float = param(
+        float(np.deg2rad(15.0)), "rad", "that a camera looks down on a thing, from where it shows where its top ends"
+    )
+    aside_m: float = param(
+        0.03, "m", "beside nearly all depth points, that a thing may reach to where its masks end: a spout or a grip shows few"
+    )
     sheet_m: float = param(0.04, "m", "how thick a thing is behind what was seen of it, where that is all there is")
 
 
@@ -36,6 +42,7 @@ class Carving(NamedTuple):
     votes: Votes
     truncation_m: float
     beyond_m: np.ndarray  # distance outside the box that is carved
+    down_rad: float  # the steepest look down on it
 
 
 def carve(evidence: Evidence, variation: Variation) -> Carving:
@@ -43,12 +50,14 @@ def carve(evidence: Evidence, variation: Variation) -> Carving:
     params = tuned(Params)
     seen = observe_thing(evidence, variation)
     margin = max(0.006, 1.5 * variation.voxel_m)
-    low, high = seen.low - margin, seen.high + margin
-    grid = grid_round(seen.low, seen.high, variation.voxel_m, margin)
+    aside = np.array([0.0 if evidence.track.box is None else params.aside_m, 0.0, 0.0])
+    grid = grid_round(seen.low - aside, seen.high + aside, variation.voxel_m, margin)
+    low, high = seen.low - aside - margin, seen.high + aside + margin
     centres = grid.centres()
     truncation = max(params.truncation_ratio * grid.voxel_m, params.least_truncation_m)
     votes = grid_votes(centres, grid.shape, grid.voxel_m, variation, truncation, seen.world_from_local)
-    return Carving(seen, grid, votes, truncation, np.maximum(low - centres, centres - high).max(axis=1))
+    beyond = np.maximum(low - centres, centres - high).max(axis=1)
+    return Carving(seen, grid, votes, truncation, beyond, _look_down(seen, variation))
 
 
 def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool) -> tuple[np.ndarray, bool]:
@@ -69,13 +78,36 @@ def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool
     field = np.where(seen, votes.distance_m, np.maximum(prior, votes.outside_m))
     field = np.where(free, np.maximum(field, np.minimum(votes.free_m, truncation)), field)
     field = np.maximum(field, bounds).reshape(shape)
+    sure = (votes.surfaces >= tuned(Params).sure_frames).reshape(shape)
+    if carving.down_rad > tuned(Params).down_rad:
+        roof = sure & seen.reshape(shape)
+        empty = (free | (votes.distance_m > 0)).reshape(shape)
+        field[_shadow(field < 0, roof, empty)] = carving.grid.voxel_m
     hidden = (~seen & ~free & (votes.outside_m > 0)).reshape(shape)
     mirrored = mirror and _mirror_unseen(field, (seen | free).reshape(shape), free.reshape(shape), hidden)
     solid = field < 0
-    sure = (votes.surfaces >= tuned(Params).sure_frames).reshape(shape)
     slivers = solid & ~ndimage.binary_opening(solid, iterations=2) & ~sure
     field[slivers] = carving.grid.voxel_m  # what is left between two silhouettes and hardly seen as a surface
     return ndimage.gaussian_filter(field, 0.7), mirrored
+
+
+def _look_down(seen: Seen, variation: Variation) -> float:
+    """The steepest angle at which a view looks down on the top of a thing's middle."""
+    top = np.append((seen.low + seen.high)[:2] / 2, seen.high[2])
+    eyes = seen.world_from_local.inverse.apply(np.array([view.eye_world for view in variation.views])) - top
+    return float(np.arctan2(eyes[:, 2], np.linalg.norm(eyes[:, :2], axis=1)).max())
+
+
+def _shadow(solid: np.ndarray, roof: np.ndarray, empty: np.ndarray) -> np.ndarray:
+    """Solid voxels with empty space above them and no seen surface between: what hides behind the thing, seen from above.
+
+    A thing that reached there would show its top.
+    """
+    shadow, below = np.zeros_like(solid), np.zeros(solid.shape[:2], dtype=bool)
+    for level in range(solid.shape[2] - 1, -1, -1):
+        below = np.where(solid[..., level], below & ~roof[..., level], empty[..., level])
+        shadow[..., level] = solid[..., level] & below
+    return shadow
 
 
 def sheet_field(carving: Carving, solid: np.ndarray) -> np.ndarray:

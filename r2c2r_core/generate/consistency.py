@@ -26,6 +26,13 @@ class Params:
     occluder_gap_m: float = param(0.05, "m", "beyond the depth's noise, before the object, from where something hides it")
     worst_depth_m: float = param(0.2, "m", "to which the error of a depth pixel is cut", source="backends.md 2.7")
     depth_weight: float = param(2.0, "score", "per metre of depth error, against 1 per unit of IoU", source="backends.md 2.7")
+    whole_m: float = param(
+        0.9,
+        "m",
+        "longest side of what that weight is for; of a smaller thing, an error counts by its share of the size",
+        source="the chair of backends.md 2.7",
+        gt=0,
+    )
     judges: int = param(8, "count", "views of the pool, best first, that judge every shape of an object alike", ge=1)
     copied_cost: float = param(
         0.05, "score", "of carving, which copies the masks' errors: it has to agree with them better than a clean shape"
@@ -33,7 +40,7 @@ class Params:
 
 
 def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray, views: Sequence[View]) -> dict[str, float]:
-    """`mask_iou` of the visible silhouette and `depth_residual_m`, means over the views.
+    """`mask_iou` of the visible silhouette and `depth_residual_m`, means over the views, and the mesh's longest side, `size_m`.
 
     A front's mask leaves its carcass out, except where a bare side shows: the better of both silhouettes counts.
     """
@@ -51,13 +58,16 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
         both = (depth > 0) & (sensor > 0) & mask
         if both.sum() >= 20:
             residuals.append(float(np.minimum(np.abs(depth - sensor)[both], params.worst_depth_m).mean()))
-    metrics = {"mask_iou": float(np.mean(overlaps))} if overlaps else {}
+    size = {"size_m": float(np.ptp(vertices_world, axis=0).max())}
+    metrics = {"mask_iou": float(np.mean(overlaps)), **size} if overlaps else {}
     return {**metrics, "depth_residual_m": float(np.mean(residuals))} if residuals else metrics
 
 
 def disagreement(fit: Mapping[str, float]) -> float:
     """What `self_consistency` measured as one cost, 0 for a perfect fit, in units of IoU."""
-    return 1.0 - fit["mask_iou"] + tuned(Params).depth_weight * fit.get("depth_residual_m", 0.0)
+    params = tuned(Params)
+    smaller = max(params.whole_m / fit["size_m"], 1.0)
+    return 1.0 - fit["mask_iou"] + params.depth_weight * smaller * fit.get("depth_residual_m", 0.0)
 
 
 def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) -> float:

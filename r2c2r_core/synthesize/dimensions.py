@@ -64,7 +64,7 @@ class Params:
         source="sample kitchens of both generators: of 6 refrigerators 4 ended 18-22 mm off there, on either side of the truth",
     )
     trim: float = param(
-        0.004,
+        0.001,
         "share",
         "of the surface left out at either end of an axis: less than any real face, more than a spike",
         ge=0,

@@ -62,6 +62,18 @@ def test_a_thing_without_a_box_is_carved_from_its_points_alone(bottle_scene):
     assert is_watertight(shape.vertices_local, shape.faces)
 
 
+@pytest.mark.parametrize("elevation_deg", [25, 40])
+def test_what_hides_behind_a_thing_seen_from_above_is_not_the_thing(elevation_deg):
+    """A carton 12 cm deep, filmed from the front only, in a box 26 cm deep: a deeper one would show more of its top."""
+    size = np.array([0.2, 0.12, 0.18])
+    scene = carton_scene(size, arc_deg=40, elevation_deg=elevation_deg, yaw_rad=0.0, wall_gap_m=0.25)
+    evidence = gather_evidence(*scene, 10)
+    everything = whole_pool(evidence)
+    family = {guess.assumes: guess for guess in carved_family(evidence, everything, is_round=False)}
+    shape = family["carved from free space"].shape(everything)
+    assert np.ptp(shape.vertices_local, axis=0) == pytest.approx(size, abs=0.025)
+
+
 def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene):
     """The votes of a grid by blocks against those of every voxel, where they decide anything."""
     evidence = gather_evidence(*chair_scene, 10)

@@ -12,10 +12,10 @@ NOTHING = TexturedMesh(
 )
 
 
-def candidate(name, middle, short, filled, iou=0.9, residual=0.01, generator="completion"):
+def candidate(name, middle, short, filled, iou=0.9, residual=0.01, generator="completion", size=0.9):
     metrics = {"extent_middle": middle, "extent_short": short, "volume_ratio": filled}
     if iou is not None:
-        metrics |= {"mask_iou": iou, "depth_residual_m": residual}
+        metrics |= {"mask_iou": iou, "depth_residual_m": residual, "size_m": size}
     return MeshAsset(
         object_name="mug_1",
         candidate_id=name,
@@ -52,6 +52,12 @@ def test_the_order_of_the_candidates_does_not_matter():
 def test_the_papers_mean_follows_the_outliers_the_medoid_does_not():
     """Mean middle side 0.67, short 0.59, filled 0.65: c2 is nearest to it."""
     assert choose_candidate(FIVE, rule="mean").chosen_id == "c2"
+
+
+@pytest.mark.parametrize(("size", "taken"), [(0.18, "c1"), (1.8, "c0")])
+def test_three_centimetres_off_are_a_lot_for_a_kettle_and_little_for_a_wardrobe(size, taken):
+    pair = [candidate("c0", 0.9, 0.9, 0.5, 0.86, 0.027, size=size), candidate("c1", 0.9, 0.9, 0.5, 0.80, 0.004, size=size)]
+    assert choose_candidate(pair).chosen_id == taken
 
 
 def test_among_like_shapes_the_fit_to_masks_and_depth_decides():
