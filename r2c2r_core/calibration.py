@@ -10,9 +10,9 @@ FITTED = "fitted over the sample kitchens of both generators: benchmarks/calibra
 """The source of a map's numbers."""
 
 
-def probability(log_odds: float, slope: float = 1.0, offset: float = 0.0) -> float:
-    """Of natural log-odds that are worth `slope` times as much and `offset` more."""
-    return 1.0 / (1.0 + exp(-(slope * log_odds + offset)))
+def probability(log_odds: float) -> float:
+    """Of natural log-odds."""
+    return 1.0 / (1.0 + exp(-log_odds))
 
 
 def calibrated(claim: float, slope: float, offset: float) -> float:
@@ -22,4 +22,4 @@ def calibrated(claim: float, slope: float, offset: float) -> float:
     """
     if not 0.0 < claim < 1.0:
         return min(max(claim, 0.0), 1.0)
-    return probability(log(claim / (1.0 - claim)), slope, offset)
+    return probability(slope * log(claim / (1.0 - claim)) + offset)

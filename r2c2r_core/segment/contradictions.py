@@ -214,7 +214,7 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
         return
     sides = [side for side, sure in zip(_SIDES, front.edges, strict=True) if sure < params.unsure_edge]
     doubts = [f"its {' and '.join(sides)} edge{'s' * (len(sides) > 1)} hardly show{'s' * (len(sides) == 1)}"] if sides else []
-    if front.seam > params.unsure_seam and not _has_seams(category, front.width_m):
+    if front.seam > params.unsure_seam and not has_seams(category, front.width_m):
         doubts.append(f"there may be a seam inside it ({100 * front.seam:.0f} %)")
     if doubts:
         yield Contradiction(
@@ -225,7 +225,7 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
         )
 
 
-def _has_seams(category: Category, width_m: float) -> bool:
+def has_seams(category: Category, width_m: float) -> bool:
     """Whether lines across such a front are nothing to ask about: two doors, a machine, a stack."""
     pair = category.opens == "pair" or (category.wider is not None and width_m >= category.wider[0])
     return pair or category.one_front or category.several_fronts

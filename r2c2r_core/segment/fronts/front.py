@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points, Vector3
-from r2c2r_core.calibration import FITTED, probability
+from r2c2r_core.calibration import probability
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
@@ -52,11 +52,6 @@ class Params:
     hull_share: float = param(
         1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"
     )
-
-    edge_slope: float = param(1.0, "ratio", "of an edge's log-odds to what they are worth", source=FITTED, gt=0)
-    edge_offset: float = param(0.0, "log", "that an edge's log-odds are worth more", source=FITTED, ge=-10, le=10)
-    seam_slope: float = param(1.0, "ratio", "of an uncut seam's log-odds to what they are worth", source=FITTED, gt=0)
-    seam_offset: float = param(0.0, "log", "that an uncut seam's log-odds are worth more", source=FITTED, ge=-10, le=10)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -354,15 +349,12 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
 
 def edge_strengths(front: Front) -> tuple[float, ...]:
     """The probability that each edge is where it was found: left, right, top, bottom."""
-    params = tuned(Params)
-    return tuple(probability(odds, params.edge_slope, params.edge_offset) for odds in edge_odds(front.run, front.cell))
+    return tuple(probability(odds) for odds in edge_odds(front.run, front.cell))
 
 
 def seam_inside(front: Front) -> float:
     """The probability of the likeliest seam inside a panel, which was not cut."""
-    params = tuned(Params)
-    odds = LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, params.border_m)
-    return probability(odds, params.seam_slope, params.seam_offset)
+    return probability(LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, tuned(Params).border_m))
 
 
 def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:
