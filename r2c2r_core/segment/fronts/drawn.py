@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Points
@@ -14,12 +13,11 @@ from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, front_panel
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
-from r2c2r_core.segment.runs.edge_odds import edge_odds
-from r2c2r_core.segment.runs.handles import GridHandle, find_handle
+from r2c2r_core.segment.runs.handles import GridHandle
 from r2c2r_core.segment.runs.lines import gather, scored
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, PlaneGrid, blend, choose_frames, frame_quality, make_tile
+from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, choose_frames, frame_quality, make_tile
 from r2c2r_core.segment.runs.relief import measure_relief
-from r2c2r_core.segment.runs.run import STEADY_CELLS, Run
+from r2c2r_core.segment.runs.run import Run, run_on
 from r2c2r_core.segment.scene import Scene
 
 _AROUND_M = 0.08  # of the plane that is looked at beside it: its neighbours' lines tell the frames' pose errors
@@ -76,30 +74,9 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
         )
     relief = measure_relief(grid, scene, chosen)
     lines = [scored(tile, grid.cell_m) for tile in tiles]
-    vertical, horizontal = (gather(lines, axis, grid.cell_m) for axis in (0, 1))
-    spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
-    poses_agree = bool(spread <= STEADY_CELLS)
-    if poses_agree:
-        for tile in tiles:
-            tile.shift = (0.0, 0.0)
-    mosaic = blend(tiles, max(frame_count // 2, 8))
-    odds = edge_odds(mosaic, relief, vertical, horizontal)
-    seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
-    return Run(
-        region=region,
-        grid=grid,
-        roll_rad=float(np.arcsin(np.clip(grid.world_from_plane.rotation[2, 0], -1.0, 1.0))),
-        vertical=vertical,
-        horizontal=horizontal,
-        mosaic=mosaic,
-        relief=relief,
-        odds=odds,
-        seen=seen[: grid.rows, : grid.columns],
-        cells=(cell,),
-        handles=(find_handle(odds, relief, cell),),
-        poses_agree=poses_agree,
-        slides={tile.frame_index: tile.shift for tile in tiles},
-    )
+    evidence = gather(lines, 0, grid.cell_m), gather(lines, 1, grid.cell_m)
+    roll = float(np.arcsin(np.clip(grid.world_from_plane.rotation[2, 0], -1.0, 1.0)))
+    return run_on(region, grid, roll, tiles, relief, evidence, frame_count, (cell,))
 
 
 def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:

@@ -14,6 +14,7 @@ from r2c2r_core.segment.runs.orthomosaic import (
     STEP,
     Cell,
     PlaneGrid,
+    Tile,
     blend,
     choose_frames,
     frame_quality,
@@ -93,21 +94,37 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     if not tiles:
         return None
     relief = measure_relief(grid, scene, views.chosen(params.relief_frames))
-    vertical, horizontal = views.evidence(frame_count)
-    vertical, horizontal = _with_edges(vertical, relief, 0, grid), _with_edges(horizontal, relief, 1, grid)
-    spread = np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles])
-    poses_agree = bool(spread <= STEADY_CELLS)
+    lines = tuple(_with_edges(found, relief, axis, grid) for axis, found in enumerate(views.evidence(frame_count)))
+    return run_on(region, grid, roll, tiles, relief, lines, frame_count)
+
+
+def run_on(
+    region: PlaneRegion,
+    grid: PlaneGrid,
+    roll_rad: float,
+    tiles: list[Tile],
+    relief: Relief,
+    lines: tuple[Evidence, ...],
+    frame_count: int,
+    cells: tuple[Cell, ...] | None = None,
+) -> Run:
+    """What is known of a plane from its tiles, its relief and its vertical and horizontal lines; cut where no panels are given.
+
+    Where the poses agree, the tiles lie where they are.
+    """
+    vertical, horizontal = lines
+    poses_agree = bool(np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles]) <= STEADY_CELLS)
     if poses_agree:
         for tile in tiles:
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles, max(frame_count // 2, 8))
     odds = edge_odds(mosaic, relief, vertical, horizontal)
-    cells = tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), cell_m))
+    cells = cells or tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m))
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
-    seen = seen[: grid.rows, : grid.columns]
-    slides = {tile.frame_index: tile.shift for tile in tiles}
     handles = tuple(find_handle(odds, relief, cell) for cell in cells)
-    return Run(region, grid, roll, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
+    slides = {tile.frame_index: tile.shift for tile in tiles}
+    seen = seen[: grid.rows, : grid.columns]
+    return Run(region, grid, roll_rad, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
 
 
 class _Views:
