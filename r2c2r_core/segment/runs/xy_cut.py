@@ -32,6 +32,10 @@ class Params:
     no_handle: float = param(0.5, "share", "of fronts without a handle", gt=0, lt=1)
     two_handles: float = param(0.01, "share", "of fronts with two", gt=0, lt=1)
     more_handles: float = param(0.25, "ratio", "of the share of fronts with one handle more", gt=0, lt=1)
+    possible: float = param(-3.0, "log", "mean odds of a line, below which nothing beside it makes it an edge")
+    crossed: float = param(3.0, "log", "at most, that is added to a line beyond which both lines across it end")
+    crossed_m: float = param(0.02, "m", "of their absence, from where it counts in full", gt=0, source="rails are 2-5 cm wide")
+    blur_m: float = param(0.01, "m", "beside a line, where lines across it may seem to go on", source="two cells of the odds")
     handle_cells: int = param(4, "count", "of cells of the odds, that a handle has at least", gt=0)
 
 
@@ -155,7 +159,7 @@ class LineField:
         if paths is None:
             return None
         count = paths.beside.sum(axis=0)
-        prior = self._prior(cell, axis, start, stop)
+        prior = self._prior(cell, axis, start, stop) + self._crossed(cell, axis, start, stop, paths)
         ordered = np.sort(np.where(paths.beside, paths.odds, np.inf), axis=0)
         rank = np.minimum((params.hidden * count).astype(int), len(ordered) - 1)
         least = np.take_along_axis(ordered, rank[None], axis=0)[0] + prior
@@ -213,6 +217,35 @@ class LineField:
         count = len(handles)
         shares = self._log_share(first) + self._log_share(count - first) - self._log_share(np.array(count))
         return np.where(fronts, self.params.size_weight * sizes + self.params.handle_weight * shares, 0.0)
+
+    def _crossed(self, cell: Cell, axis: int, start: int, stop: int, paths: Paths) -> np.ndarray:
+        """Log-odds of a cut at each position by a cell's borders across it, which are edges of a front over all its length.
+
+        Where both are edges over most of a cell, but not in the lesser part that a cut would leave, the front ends at the cut:
+        a rail of a frame follows.
+        """
+        params, worth = self.params, np.zeros(stop - start)
+        borders = self._borders_across(cell, axis)
+        if borders is None or np.median(borders, axis=1).min() <= 0:
+            return worth
+        sums, blur = np.cumsum(np.pad(borders, ((0, 0), (1, 0))), axis=1), round(params.blur_m / self.cell_m)
+        at, length = np.arange(start, stop) - round(_across(cell, axis)[0] / STEP), borders.shape[1]
+        for first, last in ((np.zeros_like(at), at - blur), (at + 1 + blur, np.full_like(at, length))):
+            size = last - first
+            inside = (size > 0) & (size < length / 2)
+            first, last = first[inside], last[inside]
+            absent = -((sums[:, last] - sums[:, first]) / size[inside]).max(axis=0)
+            part = np.minimum(size[inside] * self.cell_m / params.crossed_m, 1)
+            worth[inside] = np.maximum(worth[inside], np.clip(absent * part, 0, params.crossed))
+        return np.where(paths.odds.mean(axis=0) > params.possible, worth, 0)
+
+    def _borders_across(self, cell: Cell, axis: int) -> np.ndarray | None:
+        """Odds (2, positions) of a cell's borders across the lines of an axis; None at the end of the grid."""
+        span, odds = self._span(cell, 1 - axis), self.odds[1 - axis]
+        at = [round(border / STEP - 0.5) for border in _across(cell, 1 - axis)]
+        if at[0] < 1 or at[1] > odds.shape[1] - 2 or span.stop > len(odds):
+            return None
+        return np.stack([odds[span, border - 1 : border + 2].max(axis=1) for border in at])
 
     def _handles_in(self, cell: Cell, axis: int) -> np.ndarray:
         """Positions of the middles of handles within a cell, ascending."""

@@ -126,3 +126,19 @@ def test_a_machine_is_parted_from_the_drawers_beside_it() -> None:
     lines = odds(332, 300, [(0, 0, 288), (160, 0, 288), (320, 0, 288)], [(0, 0, 320), (288, 0, 320)])
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=0.0028), odds=lines)
     assert unit_cell(run, 80.0, 150.0, category_of("oven")) == oven
+
+
+def door_under_a_rail(uprights_from: int) -> PanelOdds:
+    """A door from column 80 to 280, cut at its sides from a row on; at row 44 is a line as likely as not."""
+    field = odds(360, 320, [(80, uprights_from, 320), (280, uprights_from, 320)], [(20, 0, 360)])
+    field.level[22, 40:140] = 0.5
+    return field
+
+
+def test_a_front_ends_where_both_lines_at_its_sides_do() -> None:
+    def tops(uprights_from: int) -> set[int]:
+        cells = cut_panels(door_under_a_rail(uprights_from), Cell(0, 0, 360, 320), CELL_M)
+        return {round(cell.top / 2) for cell in cells if cell.contains(180, 200)}
+
+    assert tops(uprights_from=44) == {22}
+    assert tops(uprights_from=20) == {10}
