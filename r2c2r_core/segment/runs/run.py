@@ -23,8 +23,8 @@ from r2c2r_core.segment.runs.orthomosaic import (
     support_on,
 )
 from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.runs.panels import cut_panels
 from r2c2r_core.segment.runs.relief import Relief, measure_relief
-from r2c2r_core.segment.runs.xy_cut import cut_panels
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 

@@ -57,9 +57,17 @@ class Paths(NamedTuple):
     score: np.ndarray  # (positions,) sum of odds less what stepping aside costs
 
 
-def cut_panels(odds: PanelOdds, grid: Cell, cell_m: float) -> list[Cell]:
-    """Panels of a grid, as rectangles that tile it."""
-    field, found, waiting = LineField(odds, cell_m), [], [grid]
+class Evidence(NamedTuple):
+    """Of lines through a cell, at positions from `start` on."""
+
+    start: int
+    odds: np.ndarray  # what is seen
+    prior: np.ndarray  # what sizes and handles say
+
+
+def cut_alone(field: "LineField", grid: Cell) -> list[Cell]:
+    """Rectangles that tile a grid, each cut by what is seen within it alone."""
+    found, waiting = [], [grid]
     while waiting:
         cell = waiting.pop()
         line = field.best_cut(cell) or field.end_of_fronts(cell)
@@ -68,6 +76,11 @@ def cut_panels(odds: PanelOdds, grid: Cell, cell_m: float) -> list[Cell]:
         else:
             waiting += halves(cell, line)
     return found
+
+
+def across(cell: Cell, axis: int) -> tuple[float, float]:
+    """A cell's ends along the positions of an axis."""
+    return (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
 
 
 def halves(cell: Cell, line: Line) -> tuple[Cell, Cell]:
@@ -103,7 +116,7 @@ class LineField:
         margin, reach = max(2, round(self.params.apart_m / self.cell_m)), max(1, round(self.params.end_m / self.cell_m))
         found = []
         for axis in (0, 1):
-            low, high = _across(cell, axis)
+            low, high = across(cell, axis)
             start, stop = round(low / STEP), round(high / STEP)
             on = self.front[axis][self._span(cell, axis), start:stop].mean(axis=0) > 0.5 if stop > start else np.zeros(0)
             if on.sum() * self.cell_m < self.params.shortest_m:
@@ -138,11 +151,31 @@ class LineField:
         position = self._centre(cell, axis, first + paths.at[:, best], np.ones(len(paths.at), bool))
         return Line(mean * (span.stop - span.start), axis, position * STEP, mean)
 
+    def evidence(self, cell: Cell, axis: int) -> Evidence | None:
+        """What speaks for a line at each position within a cell; None where none fits."""
+        start, stop = self._within(cell, axis)
+        paths = self._paths(cell, axis, start, stop)
+        if paths is None:
+            return None
+        odds = paths.odds.mean(axis=0) + self._crossed(cell, axis, start, stop, paths)
+        return Evidence(start, odds, self._prior(cell, axis, start, stop))
+
+    def _within(self, cell: Cell, axis: int) -> tuple[int, int]:
+        """From which position up to which a line is far enough from a cell's ends."""
+        low, high = across(cell, axis)
+        margin = max(1, round(self.params.apart_m / self.cell_m))
+        return round(low / STEP) + margin, min(round(high / STEP), self.odds[axis].shape[1]) - margin
+
+    def is_front(self, cell: Cell) -> bool:
+        """Whether most of a cell is on fronts, and wide and high enough to be more than a rail."""
+        share = self.front[0][self._span(cell, 0), self._span(cell, 1)]
+        return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
+
     def best_uncut(self, cell: Cell, inset_m: float) -> float:
         """Log-odds, sizes and handles in mind, of the likeliest line this far within a cell; -inf where none fits."""
         inset, best = inset_m / self.cell_m, -np.inf
         for axis in (0, 1):
-            low, high = _across(cell, axis)
+            low, high = across(cell, axis)
             start, stop = round(low / STEP + inset), min(round(high / STEP - inset), self.odds[axis].shape[1])
             paths = self._paths(cell, axis, start, stop)
             if paths is not None:
@@ -151,9 +184,7 @@ class LineField:
 
     def _best(self, cell: Cell, axis: int) -> Line | None:
         params = self.params
-        low, high = _across(cell, axis)
-        margin = max(1, round(params.apart_m / self.cell_m))
-        start, stop = round(low / STEP) + margin, min(round(high / STEP), self.odds[axis].shape[1]) - margin
+        (low, high), (start, stop) = across(cell, axis), self._within(cell, axis)
         span = self._span(cell, axis)
         paths = self._paths(cell, axis, start, stop)
         if paths is None:
@@ -206,7 +237,7 @@ class LineField:
 
     def _prior(self, cell: Cell, axis: int, start: int, stop: int) -> np.ndarray:
         """Log-odds of a cut at each position by the sizes of both parts and their handles, where both are of fronts."""
-        low, high = (round(value / STEP) for value in _across(cell, axis))
+        low, high = (round(value / STEP) for value in across(cell, axis))
         on = np.cumsum(np.pad(self.front[axis][self._span(cell, axis), low:high].mean(axis=0), (1, 0)))
         at = np.arange(start, stop) - low
         before, after = at + 0.5, high - low - at - 0.5
@@ -225,11 +256,11 @@ class LineField:
         a rail of a frame follows.
         """
         params, worth = self.params, np.zeros(stop - start)
-        borders = self._borders_across(cell, axis)
+        borders = self._bordersacross(cell, axis)
         if borders is None or np.median(borders, axis=1).min() <= 0:
             return worth
         sums, blur = np.cumsum(np.pad(borders, ((0, 0), (1, 0))), axis=1), round(params.blur_m / self.cell_m)
-        at, length = np.arange(start, stop) - round(_across(cell, axis)[0] / STEP), borders.shape[1]
+        at, length = np.arange(start, stop) - round(across(cell, axis)[0] / STEP), borders.shape[1]
         for first, last in ((np.zeros_like(at), at - blur), (at + 1 + blur, np.full_like(at, length))):
             size = last - first
             inside = (size > 0) & (size < length / 2)
@@ -239,19 +270,19 @@ class LineField:
             worth[inside] = np.maximum(worth[inside], np.clip(absent * part, 0, params.crossed))
         return np.where(paths.odds.mean(axis=0) > params.possible, worth, 0)
 
-    def _borders_across(self, cell: Cell, axis: int) -> np.ndarray | None:
+    def _bordersacross(self, cell: Cell, axis: int) -> np.ndarray | None:
         """Odds (2, positions) of a cell's borders across the lines of an axis; None at the end of the grid."""
         span, odds = self._span(cell, 1 - axis), self.odds[1 - axis]
-        at = [round(border / STEP - 0.5) for border in _across(cell, 1 - axis)]
+        at = [round(border / STEP - 0.5) for border in across(cell, 1 - axis)]
         if at[0] < 1 or at[1] > odds.shape[1] - 2 or span.stop > len(odds):
             return None
         return np.stack([odds[span, border - 1 : border + 2].max(axis=1) for border in at])
 
     def _handles_in(self, cell: Cell, axis: int) -> np.ndarray:
         """Positions of the middles of handles within a cell, ascending."""
-        (low, high), span, along = _across(cell, axis), self._span(cell, axis), self.handles[:, axis]
-        across = self.handles[:, 1 - axis]
-        inside = (along * STEP >= low) & (along * STEP < high) & (across >= span.start) & (across < span.stop)
+        (low, high), span, along = across(cell, axis), self._span(cell, axis), self.handles[:, axis]
+        beside = self.handles[:, 1 - axis]
+        inside = (along * STEP >= low) & (along * STEP < high) & (beside >= span.start) & (beside < span.stop)
         return np.sort(along[inside])
 
     def _log_share(self, count: np.ndarray) -> np.ndarray:
@@ -272,7 +303,7 @@ class LineField:
         return np.asarray(np.log((1 - params.odd_share) * normal + params.odd_share * _ODD_DENSITY))
 
     def _span(self, cell: Cell, axis: int) -> slice:
-        low, high = _across(cell, 1 - axis)
+        low, high = across(cell, 1 - axis)
         return slice(round(low / STEP), round(high / STEP))
 
     def _centre(self, cell: Cell, axis: int, at: np.ndarray, beside: np.ndarray) -> float:
@@ -285,11 +316,6 @@ class LineField:
 
 
 _ODD_DENSITY = 1 / np.log(4.0 / 0.01)  # of the logarithm of a size between 1 cm and 4 m
-
-
-def _across(cell: Cell, axis: int) -> tuple[float, float]:
-    """A cell's ends along the positions of an axis."""
-    return (cell.left, cell.right) if axis == 0 else (cell.top, cell.bottom)
 
 
 def _centres(mask: np.ndarray, least: int) -> np.ndarray:

@@ -10,7 +10,8 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.panel_net import PanelOdds
-from r2c2r_core.segment.runs.xy_cut import LineField, cut_panels
+from r2c2r_core.segment.runs.panels import cut_panels
+from r2c2r_core.segment.runs.xy_cut import LineField
 
 CELL_M = 0.0025
 Line = tuple[int, int, int]  # position, and from where to where it runs, in cells
@@ -142,3 +143,15 @@ def test_a_front_ends_where_both_lines_at_its_sides_do() -> None:
 
     assert tops(uprights_from=44) == {22}
     assert tops(uprights_from=20) == {10}
+
+
+def test_a_line_too_faint_for_one_front_cuts_a_row_of_them() -> None:
+    seams = [(160 * k, 0, 320) for k in range(1, 4)]
+    row = odds(640, 320, [(2, 0, 320), *seams], [])
+    row.level[22] = 0.8  # below what one drawer as low as this needs
+    one = odds(160, 320, [], [])
+    one.level[22] = 0.8
+    assert len(cut_panels(one, Cell(0, 0, 160, 320), CELL_M)) == 1
+    assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 8
+    row.level[22, 80:] = -4.0  # only one of four has it
+    assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 4
