@@ -24,6 +24,8 @@ from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.tuning import param, tuned
 
+ON_LEGS = "a slab on four legs"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -91,7 +93,7 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
     if np.ptp(known.carving.seen.points, axis=0).min() > tuned(Params).least_sheets * tuned(CarvedParams).sheet_m:
         family.append(Hypothesis("as thin as a board where nobody saw its back", sheet))
     if support is not None:
-        family.insert(0, Hypothesis("a slab on four legs", lambda variation: _on_legs(carved(variation), support)))
+        family.insert(0, Hypothesis(ON_LEGS, lambda variation: _on_legs(carved(variation), support)))
     return tuple(family)
 
 

@@ -28,13 +28,14 @@ class Params:
 
     cell_m: float = param(0.02, "m", "side of the cells in plan", gt=0)
     level_m: float = param(0.015, "m", "half the height within which a sheet is level")
+    tilted: float = param(2.0, "ratio", "to that: how far off a slab's ends may be, which poses tilt by half a degree", ge=1)
     least_area: float = param(0.3, "share", "of the thing's plan that its slab covers")
     lowest: float = param(0.3, "share", "of the thing's height, above which the slab is")
     highest_m: float = param(1.15, "m", "height of a slab, at most")
     slab_m: float = param(0.05, "m", "thickness of a slab, where nobody sees it")
     slab_range_m: tuple[float, float] = param((0.02, 0.12), "m", "least and most thickness of a slab")
     post_m: float = param(0.045, "m", "width of a post, where nobody sees it")
-    post_range_m: tuple[float, float] = param((0.025, 0.08), "m", "least and most width of a post")
+    post_range_m: tuple[float, float] = param((0.025, 0.11), "m", "least and most width of a post")
     rim_m: float = param(0.03, "m", "how far in a slab's edge reaches")
     least_rim: int = param(20, "count", "points of an edge in a centimetre of height")
     corner_m: float = param(0.10, "m", "from a corner to its post, at most")
@@ -44,6 +45,9 @@ class Params:
     least_points: int = param(8, "count", "of a post at each of them")
     to_edge_m: float = param(0.06, "m", "from the thing's end, within which a slab reaches it")
     closed: float = param(0.5, "share", "of the height below a slab filled wider than a post: a side")
+    inwards: tuple[float, float, float] = param(
+        (0.0, 0.25, 0.5), "share", "of the way to a slab's middle, where a leg may stand"
+    )
     empty: float = param(0.7, "share", "of a corner's height that is seen free: nothing stands there")
 
 
@@ -80,7 +84,7 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     level = _slab_level(points, seen.floor, float(seen.high[2]), np.ptp(points[:, :2], axis=0))
     if level is None:
         return None
-    on_slab = points[np.abs(points[:, 2] - level) < params.level_m, :2]
+    on_slab = points[np.abs(points[:, 2] - level) < params.tilted * params.level_m, :2]
     low, high = np.percentile(on_slab, 1, axis=0), np.percentile(on_slab, 99, axis=0)
     low = np.where(low - seen.low[:2] < params.to_edge_m, seen.low[:2], low)
     high = np.where(seen.high[:2] - high < params.to_edge_m, seen.high[:2], high)
@@ -93,9 +97,9 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     posts = tuple(seen_posts[corner] or _likely_post(seen_posts, slab, corner, seen.floor) for corner in corners)
     width = float(np.mean([post.width_m for post in posts]))  # each was seen from one side, and what was before it hides some
     posts = tuple(post._replace(width_m=width) for post in posts)
-    if any(not post.is_seen and _is_empty(carving, post) for post in posts):
-        return None
-    return Support(slab, posts)
+    standing = [post if post.is_seen else _where_not_empty(carving, slab, post) for post in posts]
+    found = tuple(post for post in standing if post is not None)
+    return Support(slab, found) if len(found) == len(posts) else None
 
 
 def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> float | None:
@@ -181,7 +185,7 @@ def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: t
             level = np.abs(near[:, 2] - z) < params.step_m / 2
             if np.count_nonzero(level) < params.least_points:
                 continue
-            width = float(np.ptp(np.percentile(across[level], [5, 95])))
+            width = float(np.ptp(np.percentile(across[level], [5, 95]))) / float(np.abs(away).sum())  # a square one, seen askew
             if width < params.post_range_m[1]:
                 middles.append(np.append(np.median(near[level, :2], axis=0) + width / 2 * away, z))
                 widths.append(width)
@@ -224,6 +228,16 @@ def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner
     inset = params.post_m / 2
     at = [slab.high[k] - inset if corner[k] else slab.low[k] + inset for k in (0, 1)]
     return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), params.post_m, floor, False)
+
+
+def _where_not_empty(carving: Carving, slab: BoxPart, post: Post) -> Post | None:
+    """A post that nobody saw, further in where its corner was seen to be empty; None where all places were."""
+    middle = (slab.low + slab.high)[:2] / 2
+    for inwards in tuned(Params).inwards:
+        moved = post._replace(top=np.append(post.top[:2] + inwards * (middle - post.top[:2]), post.top[2]))
+        if not _is_empty(carving, moved):
+            return moved
+    return None
 
 
 def _is_empty(carving: Carving, post: Post) -> bool:

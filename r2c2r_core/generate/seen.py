@@ -10,6 +10,7 @@ from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, masked_points
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.tuning import param, tuned
 
 
@@ -94,7 +95,8 @@ def _prior_box(
         if not (eyes[:, axis] < -half[axis]).any():
             low[axis] = min(low[axis], -half[axis] * variation.depth_scale)
     floor = box.support_z_m - float(world_from_local.translation[2])
-    if low[2] - floor > 0.5 * (high[2] - low[2]):  # hangs or stands on something else
+    is_legged = category_of(evidence.track.category).on_legs  # of a table, often nothing but its top is seen
+    if low[2] - floor > 0.5 * (high[2] - low[2]) and not is_legged:  # hangs or stands on something else
         return low, high, None
     low[2] = floor
     return low, high, floor

@@ -11,7 +11,7 @@ from r2c2r_core.generate.cartons import carton_family
 from r2c2r_core.generate.consistency import Params as ConsistencyParams
 from r2c2r_core.generate.consistency import disagreement, self_consistency
 from r2c2r_core.generate.evidence import Evidence
-from r2c2r_core.generate.hulls import carved_family
+from r2c2r_core.generate.hulls import ON_LEGS, carved_family
 from r2c2r_core.generate.hypothesis import Hypothesis
 from r2c2r_core.generate.rounded import round_family
 from r2c2r_core.generate.seen import observe_thing
@@ -38,6 +38,8 @@ def thing_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothe
     lathe, is_certain = round_family(evidence, everything) if revolution is not None else ((), False)
     cuboid = carton_family(evidence, seen)
     carved = carved_family(evidence, everything, is_round=is_rounder and not lathe)
+    if carved[0].assumes == ON_LEGS:  # its top alone would be a fine box
+        return carved
     first = _likeliest(lathe, is_certain, cuboid, carved, partial(_fit, evidence, everything))
     if first is cuboid or not is_certain:
         others = [family for family in (lathe, carved, cuboid) if family and family is not first]

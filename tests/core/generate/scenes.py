@@ -155,6 +155,16 @@ def desk_scene(seed=0):
     return _on_floor(parts, "desk", np.array([1.2, 0.6, 0.74]), seed)
 
 
+def table_scene(seed=0):
+    """A table 1.2 x 0.7 x 0.74 m on four legs 9 cm square."""
+    legs = [(x, y) for x in (-0.58, 0.49) for y in (0.02, 0.59)]
+    parts = [
+        box((-0.6, 0, 0.7), (0.6, 0.7, 0.74), (160, 60, 50), 1),
+        *(box((x, y, 0), (x + 0.09, y + 0.09, 0.7), (90, 60, 40), 1) for x, y in legs),
+    ]
+    return _on_floor(parts, "table", np.array([1.2, 0.7, 0.74]), seed)
+
+
 def _on_floor(parts, category, size, seed):
     """A thing whose front is at y = 0, filmed from before it at some two metres."""
     centre = np.array([0.0, size[1] / 2, size[2] / 2])

@@ -9,11 +9,13 @@ import pytest
 from r2c2r_core.generate.bars import find_bars
 from r2c2r_core.generate.carved import carve
 from r2c2r_core.generate.evidence import gather_evidence
-from r2c2r_core.generate.hulls import carved_family
+from r2c2r_core.generate.hulls import ON_LEGS, carved_family
 from r2c2r_core.generate.legs import find_support
 from r2c2r_core.generate.standing import stands
+from r2c2r_core.generate.things import thing_hypotheses
 from r2c2r_core.generate.variation import whole_pool
 from r2c2r_core.geometry.meshes import box_mesh, is_manifold, is_watertight, unite, volume
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from tests.core.generate import scenes
 
@@ -106,6 +108,30 @@ def test_legs_that_every_mask_left_out_are_there_where_depth_shows_them(carving,
         assert np.min(away, axis=0).max() < 0.06  # and nothing between them
 
 
+def test_a_table_whose_top_alone_is_in_the_masks_stands_on_the_legs_that_depth_shows():
+    """Thick square legs, some seen over a corner; the top alone would be a box in mid-air."""
+    evidence = gather_evidence(*scenes.table_scene(), 10)
+    views = tuple(legless(view, 0.67) for view in evidence.pool)
+    evidence, everything = replace(evidence, pool=views), replace(whole_pool(evidence), views=views)
+    found = find_support(carve(evidence, everything), views)
+    assert sum(post.is_seen for post in found.posts) >= 2
+    assert found.posts[0].width_m == pytest.approx(0.09, abs=0.015)
+    likeliest = thing_hypotheses(evidence, everything)[0]
+    assert likeliest.assumes == ON_LEGS
+    world = likeliest.shape(everything).vertices_world
+    assert np.ptp(world, axis=0) == pytest.approx([1.2, 0.7, 0.74], abs=0.03)
+    assert world[:, 2].min() == pytest.approx(0.0, abs=5e-3)
+
+
+def test_a_leg_that_nobody_saw_is_not_where_its_corner_was_seen_to_be_empty(carving, half_seen):
+    """Free space at both right corners; further in nobody looked."""
+    free = np.where(carving.grid.centres()[:, 0] > 0.15, np.float32(0.05), np.float32(-np.inf))
+    found = find_support(carving._replace(votes=carving.votes._replace(free_m=free)), half_seen.views)
+    unseen = [post for post in found.posts if not post.is_seen]
+    assert len(unseen) == 2
+    assert all(0.05 < post.top[0] < 0.16 for post in unseen)
+
+
 def test_where_a_corner_is_seen_to_be_empty_there_are_no_four_legs(carving, everything):
     """No view shows any post, and free space was seen through all four corners."""
     empty = carving._replace(votes=carving.votes._replace(free_m=np.full_like(carving.votes.free_m, 0.05)))
@@ -170,6 +196,13 @@ def test_a_slab_on_one_leg_at_its_corner_falls_over():
     legs = [box_mesh(np.array([x, x, 0.0]), np.array([x + 0.05, x + 0.05, 0.41])) for x in (0.0, 0.35)]
     assert not stands(*unite([slab, legs[0]]))
     assert stands(*unite([slab, *legs]))
+
+
+def legless(view, below_m):
+    """The view, its mask ending at a height (world)."""
+    kept = without(view, Rigid3(), lambda points: points[:, 2] < below_m) > 0
+    at_mask = cv2.resize(kept.astype(np.uint8), view.mask.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+    return replace(view, mask=view.mask & at_mask.astype(bool))
 
 
 def without(view, local_from_world, chosen):
