@@ -1,12 +1,12 @@
-"""What is doubtful about a front as soon as its masks are there, before a run would say so."""
+"""What is doubtful about a front or a thing as soon as its masks are there, before a run would say so."""
 
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
-from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.segment.contradictions import find_implausible
 
 
-def doubts_about(prompt: ObjectPrompt, panel: FrontPanel, capture: Capture) -> list[str]:
+def doubts_about(prompt: ObjectPrompt, panel: FrontPanel | None, box: ThingBox | None, capture: Capture) -> list[str]:
     """A line each, with what would mend it; without the object's name, which may change."""
     track = MaskTrack(
         name=prompt.name,
@@ -14,8 +14,8 @@ def doubts_about(prompt: ObjectPrompt, panel: FrontPanel, capture: Capture) -> l
         masks={},
         confidence={},
         front=panel,
-        box=None,
-        kind="front",
+        box=box,
+        kind="thing" if panel is None else "front",
         backend="",
         prompt_count=len(prompt.points),
         warnings=(),

@@ -1,4 +1,4 @@
-"""A front that was found, as it goes over the wire: its corners in the capture frame and its handle."""
+"""A front that was found, as it goes over the wire: its corners in the capture frame, how sure its edges are and its handle."""
 
 from typing import Any
 
@@ -15,6 +15,7 @@ def front_line(panel: FrontPanel, world_from_capture: Rigid3) -> dict[str, Any]:
     corners = panel.world_from_front.apply(np.stack([up - right, up + right, right - up, -up - right]))
     handle = panel.handle
     return {
+        "edges": [round(sure, 3) for sure in panel.edges],
         "corners_m": world_from_capture.inverse.apply(corners).round(6).tolist(),
         "handle": None
         if handle is None

@@ -258,7 +258,8 @@ class Desk:
 
     def _done(self, prompt: ObjectPrompt) -> dict[str, Any]:
         panel = self.session.panel(prompt)
-        doubts = doubts_about(prompt, panel, self.capture) if panel is not None else []
+        box = self.session.thing_box(prompt) if panel is None else None
+        doubts = doubts_about(prompt, panel, box, self.capture)
         return {"end": "done", "front": self._line(panel), "others": others_line(prompt.others), "doubts": doubts}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:

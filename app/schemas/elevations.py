@@ -1,5 +1,7 @@
 """Planes of the scan seen from the front, on which fronts are drawn."""
 
+from pydantic import Field
+
 from app.schemas.base import Shape
 from r2c2r_core.schema.prompts import PromptsFileHandle
 
@@ -43,3 +45,6 @@ class FoundFront(Shape):
     object: int
     corners_m: list[list[float]]  # as in prompts.json
     handle: PromptsFileHandle | None
+    edges: list[float] = Field(
+        default_factory=list
+    )  # probability of a seam at each: left, right, top, bottom; none where a person drew it

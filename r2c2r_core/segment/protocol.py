@@ -12,7 +12,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.tuning import Changes
@@ -71,6 +71,9 @@ class SegmentSession(Protocol):
 
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
         """The flat front of an object that was streamed; None where it has none, or it is not measured yet."""
+
+    def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
+        """The box of a free-standing thing that was streamed; None for what is none, or is not measured yet."""
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Objects to confirm, surest first, found so far with the share of the work done; the last step has them all."""

@@ -310,6 +310,7 @@ export interface FoundFront {
   object: number;
   corners_m: number[][];
   handle: PromptsFileHandle | null;
+  edges: number[];
 }
 
 /** The pinhole camera of a frame: pixels of the stored frame, OpenCV axes, in the recording's own world. */

@@ -48,6 +48,9 @@ class Session:
     def panel(self, prompt: ObjectPrompt) -> None:
         return None
 
+    def thing_box(self, prompt: ObjectPrompt) -> None:
+        return None
+
     def propose(self) -> Iterator[Any]:
         return iter([(1.0, ())])
 

@@ -36,7 +36,29 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(browser: 
     picture(page, f"contradiction-{theme}")
     page.get_by_role("button", name="Delete drawer_3").click()
     expect(said).to_have_count(0)
+    page.keyboard.press("Control+z")
+    expect(said).to_have_count(2)
+    page.get_by_role("button", name="Merge with drawer_2: drawer_3").click()
+    expect(rows(page)).to_have_count(3)
+    expect(said).to_have_count(0)
+    expect(rows(page).last).to_contain_text("2 clicks")
+    expect(page.get_by_role("button", name="drawer_2", exact=True)).to_have_attribute("aria-pressed", "true")
     context.close()
+
+
+def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(browser: Browser, tmp_path: Path) -> None:
+    with Server(tmp_path, live="panels") as server:  # 0.8 m wide and 1.2 m high
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        page = signed_in(context, server, "ann")
+        sample(page)
+        page.get_by_role("link", name="Annotate").click()
+        page.get_by_label("Category of the next object").fill("bottle")
+        page.get_by_role("button", name="New object").click()
+        click_frame(page, 20, 60)
+        said = page.locator(".contradicted")
+        expect(said.first).to_contain_text("0.80 m wide")
+        expect(said.first).to_contain_text("click off it where its mask goes too far")
+        context.close()
 
 
 def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_mends_it(

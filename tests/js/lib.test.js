@@ -373,7 +373,14 @@ test("masks that share much of the smaller are said of both objects, with what m
     ],
   );
   const most = contradictionsOn([columns(1, 0, 50), columns(2, 20, 50)]);
-  assert.match(most[0].text, /^On the same thing as door_2 \(100 % shared\): delete one/);
+  assert.match(most[0].text, /^On the same thing as door_2 \(100 % shared\): merge or delete one/);
+  assert.deepEqual(
+    most.map(({ mergesWith }) => mergesWith),
+    [
+      { object: 2, name: "door_2" },
+      { object: 1, name: "door_1" },
+    ],
+  );
 });
 
 test("a mask that leaves out a click on it or takes in one off it says so", () => {

@@ -19,7 +19,7 @@ from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
 from r2c2r_core.segment.appliances.found import FoundAppliance
@@ -134,6 +134,11 @@ class GeometricSession:
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
         """The object's flat front."""
         return self.find(prompt).panel()
+
+    def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
+        """The box of its points on its support."""
+        found = self.find(prompt)
+        return found.box() if found.kind == "thing" else None
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Proposals so far, surest first, with the share of the work done; the last step has them all."""

@@ -13,7 +13,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
-from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.cropped import cropped_mask, world_crop
 from r2c2r_core.segment.geometric.session import GeometricSegmenter, GeometricSession
@@ -143,6 +143,10 @@ class LearnedSession:
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
         """What was drawn; what is found is measured when all frames had their say."""
         return self.prepared.panel(prompt) if prompt.front is not None else None
+
+    def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
+        """None: it is measured when all frames had their say."""
+        return None
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
         """None: the model follows each object's own clicks."""

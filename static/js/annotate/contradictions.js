@@ -36,7 +36,7 @@ export class Contradictions extends EventTarget {
    * @param {number} object
    */
   about(object) {
-    return this.#said.filter((said) => said.object === object).map(({ text }) => text);
+    return this.#said.filter((said) => said.object === object);
   }
 
   /** In a moment, at this frame with what changes until then. @param {FrameInfo} frame */

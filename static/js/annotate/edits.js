@@ -125,6 +125,21 @@ export class Edits extends EventTarget {
     if (seen) this.#tell(changes.changeObject(this.project, seen, wanted));
   }
 
+  /**
+   * Two objects that are one: the older one keeps its name and gets the clicks on the other, which goes.
+   * @param {number} id
+   * @param {number} other
+   */
+  async merge(id, other) {
+    const [kept, gone] = [this.#objects.get(Math.min(id, other)), this.#objects.get(Math.max(id, other))];
+    if (!kept || !gone) return;
+    const points = gone.points.flatMap(({ frame, x, y, label }) => (label === 1 ? [{ frame, x, y, label }] : []));
+    this.#objects.choose(kept.id);
+    const merged = !points.length || (await this.#tell(changes.addPoints(this.project, kept.id, points)));
+    if (merged && (await this.#tell(changes.deleteObject(this.project, gone.id))))
+      say(`${gone.name} is merged into ${kept.name}`, { hint: "undo twice brings it back" });
+  }
+
   /** @param {number} id */
   async remove(id) {
     const name = this.#objects.get(id)?.name ?? "object";

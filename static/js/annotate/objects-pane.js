@@ -43,7 +43,7 @@ export class ObjectsPane extends EventTarget {
 
   /**
    * @param {SceneObjects} objects
-   * @param {(object: number) => string[]} contradicted what its masks contradict
+   * @param {(object: number) => import("../lib/contradictions.js").Said[]} contradicted what its masks contradict
    */
   draw(objects, contradicted) {
     this.list.setObjects(objects.sorted, {

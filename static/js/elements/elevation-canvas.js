@@ -26,7 +26,7 @@ import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 /**
  * @typedef {{
  *   key: string, rect: Rect, name: string, paint: string, chosen: boolean, drawn: boolean,
- *   handle: Box | null, hinge: Side | null, slides: boolean, overlaps: boolean,
+ *   handle: Box | null, hinge: Side | null, slides: boolean, overlaps: boolean, asked: Side[],
  * }} Shown
  */
 /** @typedef {{ key: string, side: Side | null }} Held an edge, or all of a front */
@@ -36,6 +36,7 @@ const STILL_PX = 3;
 const STILL_TOUCH_PX = 10;
 const EDGE_PX = 7; // from an edge that is still on it
 const SNAP_PX = 9;
+const ASKED_PX = 9;
 
 export class ElevationCanvas extends LiveElement {
   #canvas = h("canvas", { tabIndex: 0, role: "img", "aria-label": "Elevation" });
@@ -167,7 +168,28 @@ export class ElevationCanvas extends LiveElement {
     if (front.hinge && front.slides) this.#drawSlide(context, rect, front.hinge, front.paint);
     else if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
     if (front.chosen && this.edge) this.#drawEdge(context, rect, this.edge);
+    for (const side of front.asked) this.#drawAsked(context, rect, side);
     this.#drawLabel(context, rect, front.name);
+  }
+
+  /** An edge that is asked about. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
+  #drawAsked(context, rect, side) {
+    const { left, top, right, bottom } = this.#onScreen(rect);
+    const x = side === "left" ? left : side === "right" ? right : (left + right) / 2;
+    const y = side === "top" ? top : side === "bottom" ? bottom : (top + bottom) / 2;
+    context.beginPath();
+    context.arc(x, y, ASKED_PX, 0, 2 * Math.PI);
+    context.fillStyle = "#ffd166";
+    context.fill();
+    context.lineWidth = 1.5;
+    context.strokeStyle = context.fillStyle = "#0d0f12";
+    context.stroke();
+    context.font = "bold 13px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillText("?", x, y + 0.5);
+    context.textAlign = "start";
+    context.textBaseline = "alphabetic";
   }
 
   /**

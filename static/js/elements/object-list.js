@@ -1,6 +1,7 @@
 /**
  * The objects of a project. Emits "pick-object" id|null (not "select": fields fire that themselves, and it bubbles),
- * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id, "stop" id.
+ * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id, "stop" id,
+ * "merge" {id, other}.
  */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
@@ -8,7 +9,8 @@ import { inkOn } from "../lib/colour.js";
 import { counted, usableName } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
-/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => string[] }} View */
+/** @typedef {import("../lib/contradictions.js").Said} Said */
+/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => Said[] }} View */
 
 export class ObjectList extends LiveElement {
   #list = h("ul", { class: "object-list" });
@@ -92,13 +94,24 @@ export class ObjectList extends LiveElement {
       h("div", { class: "head" }, badge, pick, eye, remove),
       h("div", { class: "row muted state" }, state(object, current), this.#stop(object)),
       current ? this.#fields(object) : null,
-      ...[...contradicted(object), ...object.doubts].map((line) =>
-        h("div", { class: "contradicted", role: "status" }, line),
+      ...[...contradicted(object), ...object.doubts.map((text) => ({ object: id, text }))].map((said) =>
+        h("div", { class: "contradicted", role: "status" }, said.text, this.#merge(said, name)),
       ),
       ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colourOf(object));
     return item;
+  }
+
+  /** @param {Said} said @param {string} name */
+  #merge({ object, mergesWith }, name) {
+    if (!mergesWith) return null;
+    const other = mergesWith.object;
+    const text = `Merge with ${mergesWith.name}`;
+    const merge = h("button", { type: "button", class: "merge", "aria-label": `${text}: ${name}` }, text);
+    merge.dataset.at = `merge:${object}:${other}`;
+    merge.addEventListener("click", () => this.emit("merge", { id: object, other }));
+    return merge;
   }
 
   /** @param {SceneObject} object */

@@ -15,10 +15,11 @@ import { saving } from "../saving.js";
 /** @typedef {{ name?: string, category?: string, front?: Drawn }} Wanted */
 /** @typedef {{ category: string, corners: number[][], handle?: "none" | null, hinge?: Drawn["hinge"] }} Making */
 /**
- * `seen` is the handle that was found; `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
+ * `seen` is the handle that was found, `edges` how sure its edges are (left, right, top, bottom); `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
  * @typedef {{
  *   key: string, id: number | null, name: string, category: string, colour: number, version: number, corners: number[][],
  *   handle: Drawn["handle"], seen: FoundFront["handle"], hinge: Drawn["hinge"], drawn: boolean, pending: number,
+ *   edges: number[],
  * }} Front
  */
 
@@ -96,6 +97,7 @@ export class Fronts extends EventTarget {
       hinge: object.front?.hinge ?? null,
       drawn: object.front !== null,
       pending: 0,
+      edges: found?.edges ?? known?.edges ?? [],
     });
   }
 
@@ -193,6 +195,7 @@ export class Fronts extends EventTarget {
       hinge,
       drawn: true,
       pending: 1,
+      edges: [],
     };
     this.#all.set(key, front);
     this.#refs.set(key, `{${sent}}`);

@@ -128,6 +128,21 @@ function likeliestLine(at, reach, { positions, cell }) {
 }
 
 /**
+ * The first line beyond a position that is clearer than those beside it and as clear as half of the clearest; null without one.
+ * @param {number} at metres
+ * @param {1 | -1} way
+ * @param {Profile} profile
+ */
+export function nextLine(at, way, { positions, cell }) {
+  const clear = Math.max(CLEAR, Math.max(...positions) / 2);
+  for (let i = Math.floor(at / cell) + way; i > 0 && i < positions.length - 1; i += way) {
+    const here = positions[i] ?? 0;
+    if (here >= clear && here >= (positions[i - 1] ?? 0) && here >= (positions[i + 1] ?? 0)) return (i + 0.5) * cell;
+  }
+  return null;
+}
+
+/**
  * @param {Rect} rect
  * @param {Side} side
  * @param {number} at

@@ -169,6 +169,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(list, "pick-object", (id) => (id === null ? this.#presses.startNew() : this.#objects.choose(id)));
     this.#on(list, "toggle", (id) => this.#objects.toggle(id));
     this.#on(list, "delete", (id) => this.#edits.remove(id));
+    this.#on(list, "merge", ({ id, other }) => this.#edits.merge(id, other));
     this.#on(list, "stop", (id) => this.#edits.stopSegmenting(id));
     this.#on(list, "rename", ({ id, name }) => this.#edits.patch(id, { name }));
     this.#on(list, "categorise", ({ id, category }) => this.#categorise(category, id));

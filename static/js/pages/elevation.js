@@ -7,9 +7,11 @@ import { ElevationCanvas } from "../elements/elevation-canvas.js";
 import { say, sayError } from "../elements/toasts.js";
 import { FrontPane } from "../elevation/front-pane.js";
 import { drawnOf, Fronts } from "../elevation/fronts.js";
+import { Questions, swallowed, without } from "../elevation/questions.js";
 import { PlaneList } from "../elevation/plane-list.js";
 import { Commands, isForPage } from "../keyboard.js";
 import * as plane from "../lib/elevation.js";
+import { counted } from "../lib/format.js";
 import * as rows from "../lib/front-rows.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -39,6 +41,9 @@ export class ElevationPage extends LiveElement {
   project = "";
   query = new URLSearchParams();
   #fronts = new Fronts();
+  #questions = new Questions();
+  /** The one that Y and X answer. @type {import("../elevation/questions.js").Question | null} */
+  #asked = null;
   #planes = new PlaneList();
   #pane = new FrontPane();
   #canvas = new ElevationCanvas();
@@ -54,7 +59,14 @@ export class ElevationPage extends LiveElement {
   #palette = ["#e69f00"];
   /** @type {Tool | null} */
   #tool = null;
-  #commands = new Commands("elevation", this.#actions(), ["front-here", "seam", "level-seam", "merge"]);
+  #commands = new Commands("elevation", this.#actions(), [
+    "front-here",
+    "seam",
+    "level-seam",
+    "merge",
+    "is-seam",
+    "no-seam",
+  ]);
 
   connected() {
     this.#fronts.project = this.project;
@@ -223,6 +235,7 @@ export class ElevationPage extends LiveElement {
     const here = this.#here;
     const chosen = new Set(this.#fronts.chosen.map(({ key }) => key));
     const cut = this.#cut(here);
+    const open = this.#questions.open(here);
     const shown = here.map((front) => ({
       ...front,
       paint: this.#paint(front),
@@ -230,6 +243,7 @@ export class ElevationPage extends LiveElement {
       handle: front.handle === "none" ? null : (front.handle ?? front.seen),
       hinge: front.hinge ?? null,
       slides: this.#pane.slides(front.category),
+      asked: open.filter(({ key }) => key === front.key).map(({ side }) => side),
       overlaps: here.some((other) => other.key !== front.key && plane.overlap(other.rect, front.rect)),
     }));
     this.#canvas.setFronts(shown, cut);
@@ -240,7 +254,72 @@ export class ElevationPage extends LiveElement {
       paint: (front) => this.#paint(front),
     });
     this.#planes.count(this.#fronts.all.map(({ corners }) => corners));
-    if (this.#elevation) this.#tell(here.length ? "" : EMPTY);
+    if (this.#elevation) this.#tell(here.length ? this.#questionText(open) : EMPTY);
+  }
+
+  /** @param {import("../elevation/questions.js").Question[]} open */
+  #questionText(open) {
+    const asked = open.find(({ key, side }) => key === this.#asked?.key && side === this.#asked.side);
+    if (asked) {
+      const name = this.#fronts.get(asked.key)?.name ?? "";
+      const sure = `${Math.round(100 * asked.sure)} % sure`;
+      return `Is there a seam at the ${asked.side} edge of ${name} (${sure})? Y: yes · X: no, the front goes on · Q: the next one`;
+    }
+    this.#asked = null;
+    if (!open.length) return "";
+    return `${counted(open.length, "edge")} hardly ${open.length > 1 ? "show" : "shows"}: Q asks whether there is a seam`;
+  }
+
+  /** The next edge to be asked about. */
+  #ask() {
+    const open = this.#questions.open(rows.inOrder(this.#here));
+    const at = open.findIndex(({ key, side }) => key === this.#asked?.key && side === this.#asked.side);
+    const next = open[(at + 1) % open.length];
+    if (!next) return say("No edge here is unsure.");
+    this.#asked = next;
+    return this.#pick(next.key, next.side, false);
+  }
+
+  /** @param {boolean} isSeam whether there is one at the edge asked about */
+  #answer(isSeam) {
+    const front = this.#here.find(({ key }) => key === this.#asked?.key);
+    const kept = front && this.#fronts.get(front.key);
+    if (!front || !kept || !this.#asked) return say("Q asks about an edge first.");
+    const answers = this.#questions.answer(kept, this.#asked.side, isSeam);
+    if (answers) this.#settle(front, kept, answers);
+    if (this.#questions.open(this.#here).length) return this.#ask();
+    this.#asked = null;
+    return this.#draw();
+  }
+
+  /** The front as it was answered, drawn from now on. @param {Placed} front @param {Front} kept @param {Map<Side, boolean>} answers */
+  #settle(front, kept, answers) {
+    const elevation = this.#elevation;
+    if (!elevation) return;
+    const others = this.#here.filter(({ key }) => key !== front.key);
+    const goesOn = [...answers].filter(([, isSeam]) => !isSeam).map(([side]) => side);
+    const rect = goesOn.reduce((grown, side) => {
+      const found = without(
+        grown,
+        side,
+        others.map((other) => other.rect),
+        this.#profile(side, grown),
+      );
+      if (!found) say(`No other line beyond the ${side} edge: drag it to where the front ends.`);
+      return found ?? grown;
+    }, front.rect);
+    const remove = goesOn.length ? swallowed(others, rect) : [];
+    const handle = plane.handleAfter(kept.handle ?? null, front.rect, rect);
+    const wanted = { front: { ...drawnOf(kept), corners_m: plane.cornersOf(elevation, rect), handle } };
+    this.#fronts.do({ change: [{ front: kept, wanted }], remove });
+  }
+
+  /** How clearly lines along one side's direction show beside a front. @param {Side} side @param {Rect} rect */
+  #profile(side, rect) {
+    const upright = side === "left" || side === "right";
+    const [from, to] = upright ? [rect.top, rect.bottom] : [rect.left, rect.right];
+    const lines = upright ? this.#lines?.upright : this.#lines?.level;
+    return lines ? plane.profileOf(lines, this.#elevation?.cell_m ?? 1, from, to) : null;
   }
 
   /** @param {Front} front */
@@ -528,18 +607,11 @@ export class ElevationPage extends LiveElement {
    */
   #snap(side, at, rect, key, reach) {
     const upright = side === "left" || side === "right";
-    const [from, to] = upright ? [rect.top, rect.bottom] : [rect.left, rect.right];
-    const lines = upright ? this.#lines?.upright : this.#lines?.level;
     const others = this.#here.filter((front) => front.key !== key);
     const edges = others.flatMap((front) =>
       upright ? [front.rect.left, front.rect.right] : [front.rect.top, front.rect.bottom],
     );
-    return plane.snapped(
-      at,
-      reach,
-      edges,
-      lines ? plane.profileOf(lines, this.#elevation?.cell_m ?? 1, from, to) : null,
-    );
+    return plane.snapped(at, reach, edges, this.#profile(side, rect));
   }
 
   /** @returns {import("../keyboard.js").Actions} */
@@ -547,6 +619,9 @@ export class ElevationPage extends LiveElement {
     return {
       undo: () => this.#fronts.step("undo"),
       redo: () => this.#fronts.step("redo"),
+      "ask-seam": () => this.#ask(),
+      "is-seam": () => this.#answer(true),
+      "no-seam": () => this.#answer(false),
       "front-here": () => this.#addByKey(),
       seam: () => this.#split("upright"),
       "level-seam": () => this.#split("level"),

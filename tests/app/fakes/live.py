@@ -19,6 +19,7 @@ from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.model.elevation import Elevation, Lines
 
 FRAMES = (3, 0, 7)
+FOUND = [[0.6, 2.0, 0.8], [1.2, 2.0, 0.8], [1.2, 2.0, 0.2], [0.6, 2.0, 0.2]]  # of a clicked cabinet: two edges hardly show
 PROPOSED = (("front", "drawer", 0.95, 30.5), ("front", "drawer", 0.9, 60.5), ("thing", "bottle", 0.4, 100.5))
 
 
@@ -110,6 +111,8 @@ def main() -> None:
         number, key, prompt = command["object"], command["key"], command["prompt"]
         point = (prompt["points"] or [{"x": 80.5, "y": 60.5, "label": 1}])[0]
         front = {"corners_m": prompt["front"]["corners_m"], "handle": None} if "front" in prompt else None
+        if front is None and prompt["category"] == "cabinet":
+            front = {"corners_m": FOUND, "handle": None, "edges": [0.9, 0.1, 0.9, 0.2]}
         if point["label"] == 0:
             say(
                 object=number,

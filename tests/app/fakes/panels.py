@@ -18,7 +18,7 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.model.track import FrontPanel, ThingBox
 
 CAMERA = Intrinsics(fx=100.0, fy=100.0, cx=80.0, cy=60.0, width=160, height=120)
 CAPTURE: Any = SimpleNamespace(
@@ -38,10 +38,15 @@ class Panels:
         for index in (0, 3, 7):
             yield index, _mask(prompt), 0.9
 
-    def panel(self, prompt: ObjectPrompt) -> FrontPanel:
+    def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
+        if category_of(prompt.category).kind == "thing":
+            return None
         left, right = _span(prompt)
         at = Rigid3(np.eye(3), np.array([(left + right) / 200, 0.0, 0.6]))
         return FrontPanel(world_from_front=at, width_m=(right - left) / 100, height_m=1.2, handle=None, confidence=0.9)
+
+    def thing_box(self, prompt: ObjectPrompt) -> ThingBox:
+        return ThingBox(world_from_object=Rigid3(), dimensions_m=np.array([0.8, 0.4, 1.2]), support_z_m=0.9)
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
         found = {}

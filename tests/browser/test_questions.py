@@ -1,0 +1,58 @@
+"""Edges that hardly show are asked about in the elevation, and one key answers each."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_elevation import fronts, stored
+from tests.browser.test_journey import picture
+from tests.browser.test_together import click_frame, sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path) as running:
+        yield running
+
+
+def clicked_cabinet(page: Page) -> None:
+    """A front whose right and lower edges hardly show, as tests/app/fakes/live.py finds it, in the elevation."""
+    sample(page)
+    page.get_by_role("link", name="Annotate").click()
+    page.get_by_label("Category of the next object").fill("cabinet")
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 100, 40)
+    expect(page.get_by_role("button", name="cabinet_1", exact=True)).to_be_visible()
+    page.get_by_role("link", name="Elevation").click()
+    expect(fronts(page)).to_have_count(1)
+
+
+def corners(page: Page) -> Any:
+    (front,) = stored(page)
+    return front["front"]["corners_m"]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    clicked_cabinet(page)
+    tip = page.locator(".elevation .tip")
+    expect(tip).to_contain_text("2 edges hardly show: Q asks")
+    page.keyboard.press("q")
+    expect(tip).to_contain_text("Is there a seam at the right edge of cabinet_1 (10 % sure)?")
+    picture(page, f"question-{theme}")
+    page.keyboard.press("x")  # the front goes on to the next line of the plane
+    expect(tip).to_contain_text("Is there a seam at the bottom edge of cabinet_1 (20 % sure)?")
+    page.keyboard.press("y")
+    expect(tip).to_be_hidden()
+    expect(fronts(page).first).to_contain_text("1205 × 600")
+    assert corners(page)[1][0] == pytest.approx(1.805, abs=0.001)
+    page.keyboard.press("Control+z")
+    expect(tip).to_contain_text("2 edges hardly show")
+    expect(fronts(page).first).to_contain_text("600 × 600")
+    context.close()
