@@ -6,7 +6,7 @@ Reads JSON lines: {"cmd": "segment", "object", "key", "prompt", "objects"} · {"
 with a segment they are left out where more is asked at once.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
 {"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
-differs) and {"object", "key", "end", "front", "others"}. The newest click goes first; the objects it interrupted go on
+differs) and {"object", "key", "end", "front", "others", "doubts", "motions"}. The newest click goes first; those it interrupted go on
 afterwards. {"object", "key", "again": [...]} asks for a segment of an object whose masks are others since these objects are
 clicked where they are; of none, since none is any more.
 Proposals, {"proposals": [...], "fraction"}, wait until no click does.
@@ -30,6 +30,7 @@ from app.jobs.doubts import doubts_about
 from app.jobs.elevation_files import write_elevations
 from app.jobs.front_wire import front_line
 from app.jobs.mask_wire import mask_bits
+from app.jobs.motion_wire import motion_lines
 from app.jobs.proposal_wire import proposal_line
 from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.limits import limit_this_process, memory_met
@@ -259,8 +260,10 @@ class Desk:
     def _done(self, prompt: ObjectPrompt) -> dict[str, Any]:
         panel = self.session.panel(prompt)
         box = self.session.thing_box(prompt) if panel is None else None
-        doubts = doubts_about(prompt, panel, box, self.capture)
-        return {"end": "done", "front": self._line(panel), "others": others_line(prompt.others), "doubts": doubts}
+        measured = panel is not None or box is not None
+        doubts = doubts_about(prompt, panel, box, self.capture) if measured else []
+        said = {"end": "done", "front": self._line(panel), "others": others_line(prompt.others), "doubts": doubts}
+        return said | {"motions": motion_lines(self.session.motions(prompt))}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
         return self._line(self.session.panel(prompt))

@@ -186,7 +186,7 @@ class LiveSession:
             if "end" in line:
                 error = told_body(line["error"]) if line.get("error") else None
                 task.masks.front, task.masks.others = line.get("front"), line.get("others", [])
-                task.masks.doubts = line.get("doubts", [])
+                task.masks.doubts, task.masks.motions = line.get("doubts", []), line.get("motions", [])
                 self._end_task(number, task, line["end"], error)
                 return
             first = task.state == "waiting"

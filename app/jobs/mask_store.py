@@ -34,6 +34,7 @@ class Masks(Protocol):
     front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
     others: Others  # drawn with these
     doubts: list[str]  # about its front, with what would mend them
+    motions: list[dict[str, Any]]  # of its leaves, as app.jobs.motion_wire says them
 
     def __len__(self) -> int:
         """On how many frames there is one."""
@@ -55,6 +56,7 @@ class MaskFile:
     front: dict[str, Any] | None = None
     others: Others = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
+    motions: list[dict[str, Any]] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -81,6 +83,7 @@ class StoredMasks:
     front: dict[str, Any] | None = None
     others: Others = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
+    motions: list[dict[str, Any]] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.index)
@@ -133,13 +136,19 @@ def append(path: Path, line: dict[str, Any]) -> None:
 def finish(path: Path, end: str, error: dict[str, Any] | None, masks: Masks | None = None) -> None:
     """Say how it came to its end, what flat front it has, what it was drawn with, and where each mask is."""
     about = masks or MaskFile()
-    said = {"end": end, "error": error, "front": about.front, "others": about.others, "doubts": about.doubts}
+    said = {"end": end, "error": error, "front": about.front, "others": about.others}
+    said |= {"doubts": about.doubts, "motions": about.motions}
     found = _scanned(path, path.read_bytes() if path.exists() else b"")
     append(path, said | {"index": _packed(found.index)})
 
 
 def write(
-    path: Path, entries: list[Entry], backend: str, front: dict[str, Any] | None = None, others: Others | None = None
+    path: Path,
+    entries: list[Entry],
+    backend: str,
+    front: dict[str, Any] | None = None,
+    others: Others | None = None,
+    motions: list[dict[str, Any]] | None = None,
 ) -> None:
     """A whole file at once, of what the backend drew."""
     lines, index, at = [], [], 0
@@ -149,6 +158,7 @@ def write(
         lines.append(line)
         at += len(line)
     end = {"end": "done", "error": None, "backend": backend, "front": front, "others": others or []}
+    end |= {"motions": motions or []}
     end |= {"index": _packed(np.array(index, float))}
     write_atomically(path, b"".join(lines) + json.dumps(end).encode() + b"\n")
 
@@ -202,7 +212,7 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
     found.front, found.others = line.get("front"), line.get("others", [])  # older files: every object was drawn alone
-    found.doubts = line.get("doubts", [])
+    found.doubts, found.motions = line.get("doubts", []), line.get("motions", [])
     if found.end == "done" and "front" not in line:
         found.end = OUTDATED
     index = line.get("index", [])  # numbers, in files of before they were packed

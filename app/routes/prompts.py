@@ -134,6 +134,12 @@ def get_lanes(context: Ctx, project: str) -> list[schemas.Lane]:
     return masks.lanes(context, project)
 
 
+@router.get("/openings", operation_id="getOpenings")
+def get_openings(context: Ctx, project: str) -> list[schemas.Opening]:
+    """How fronts were filmed to move: their states by frame."""
+    return masks.openings(context, project)
+
+
 @router.get("/masks/{frame}", operation_id="getMasks", response_model=list[schemas.FrameMask])
 def get_masks(context: Ctx, project: str, frame: FrameNumber) -> Response:
     """All objects' masks on one frame."""

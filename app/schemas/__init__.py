@@ -6,7 +6,7 @@ from app.schemas.captures import CaptureFacts, FrameCamera, FrameInfo
 from app.schemas.elevations import Elevation, ElevationLines, Elevations, FoundFront
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
 from app.schemas.live import ProjectId, Watch
-from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits
+from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits, Opening, OpenState
 from app.schemas.objects import (
     FrameIn,
     FrameSaid,
@@ -113,6 +113,8 @@ __all__ = [
     "ObjectPatch",
     "ObjectPhotos",
     "ObjectPoints",
+    "OpenState",
+    "Opening",
     "OverlayLook",
     "OverlayOf",
     "OverrideData",

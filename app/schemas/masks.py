@@ -4,6 +4,7 @@ from typing import Literal
 
 from app.schemas.base import ErrorBody, Shape
 from app.schemas.objects import SegmentState
+from r2c2r_core.model.motion import Source
 
 LiveState = Literal["off", "starting", "preparing", "ready", "failed"]
 
@@ -39,6 +40,26 @@ class Lane(Shape):
     complete: bool
     frames: list[int]
     confidences: list[float]
+
+
+class OpenState(Shape):
+    """Where a leaf stood in a frame that shows it: rad or m from closed; null where that is not known."""
+
+    frame: int
+    value: float | None
+    sigma: float | None  # its standard deviation
+
+
+class Opening(Shape):
+    """How a leaf of an object was filmed to move."""
+
+    object: int
+    part: str  # of an object of several; else empty
+    kind: Literal["revolute", "prismatic"]
+    largest: float  # the widest state seen, rad or m
+    limit_source: Source  # of that as the joint's limit: measured where it was seen to stop, else at_least
+    source: Source  # of axis and pivot
+    states: list[OpenState]
 
 
 class LiveStatus(Shape):

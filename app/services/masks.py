@@ -23,6 +23,7 @@ from app.jobs.disputes import others_line
 from app.jobs.front_wire import front_line
 from app.jobs.mask_store import Entry, Masks, StoredMasks, mask_file, mask_path
 from app.jobs.mask_wire import mask_bits
+from app.jobs.motion_wire import motion_lines
 from app.services.context import Context
 from r2c2r_core.errors import PromptError
 from r2c2r_core.geometry.transforms import Rigid3
@@ -244,6 +245,21 @@ def front_of(context: Context, project: Project, item: SceneObject, places: Plac
     return run.front if run is not None else None
 
 
+def openings(context: Context, project_id: str) -> list[schemas.Opening]:
+    """How the objects' leaves were filmed to move, as far as their masks are done."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        items = queries.live_objects(session, project_id)
+    places = Places.of(context.files(project))
+    known = [(item.id or 0, found_of(context, project, item, places)) for item in items]
+    return [
+        schemas.Opening(object=number, **motion)
+        for number, found in known
+        if found is not None and found.state == "done"
+        for motion in found.masks.motions
+    ]
+
+
 def _outdated(found: Found | None) -> bool:
     return found is not None and found.masks.end == mask_store.OUTDATED
 
@@ -325,7 +341,8 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
         for older in kept.parent.glob(f"{item.result_name}-*.jsonl"):
             older.unlink(missing_ok=True)
         front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
-        mask_store.write(kept, _entries(track, width), track.backend, front, _run_others(files, item.result_name))
+        others, motions = _run_others(files, item.result_name), motion_lines(track.motions)
+        mask_store.write(kept, _entries(track, width), track.backend, front, others, motions)
         found = _stored(kept)
     return found if found is not None and found.backend == segmenter else None
 

@@ -11,6 +11,7 @@ from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
@@ -74,6 +75,9 @@ class SegmentSession(Protocol):
 
     def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
         """The box of a free-standing thing that was streamed; None for what is none, or is not measured yet."""
+
+    def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
+        """How the leaves of an object that was streamed were filmed to move; none where that is not measured yet."""
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Objects to confirm, surest first, found so far with the share of the work done; the last step has them all."""

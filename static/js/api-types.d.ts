@@ -501,6 +501,24 @@ export interface ObjectPoints {
   rgb: string;
 }
 
+/** Where a leaf stood in a frame that shows it: rad or m from closed; null where that is not known. */
+export interface OpenState {
+  frame: number;
+  value: number | null;
+  sigma: number | null;
+}
+
+/** How a leaf of an object was filmed to move. */
+export interface Opening {
+  object: number;
+  part: string;
+  kind: "revolute" | "prismatic";
+  largest: number;
+  limit_source: "measured" | "at_least" | "inferred" | "default" | "person";
+  source: "measured" | "at_least" | "inferred" | "default" | "person";
+  states: OpenState[];
+}
+
 /** What a person corrected about one object; None is computed. */
 export interface OverrideData {
   candidate: string | null;
@@ -1175,6 +1193,8 @@ export interface Operations {
   cancelSegment: { parameters: { project: string; object: number }; body: undefined; answer: SceneObject };
   /** POST /api/projects/{project}/objects/{object}/verdicts */
   giveVerdict: { parameters: { project: string; object: number }; body: VerdictIn; answer: Reviewed };
+  /** GET /api/projects/{project}/openings */
+  getOpenings: { parameters: { project: string }; body: undefined; answer: Opening[] };
   /** GET /api/projects/{project}/prompts.json */
   exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFileOutput };
   /** POST /api/projects/{project}/prompts.json */

@@ -1,7 +1,7 @@
 /** One function per endpoint. Failures are ApiError(status, {kind, message, hint}). */
 
 /** @import {
- *   SystemInfo, FolderListing, FrameCamera, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
+ *   SystemInfo, FolderListing, FrameCamera, Opening, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
  *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
  *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
@@ -217,6 +217,8 @@ export const getCamera = (id, frame) => get(`${of(id)}/frames/${frame}/camera`);
 export const openLive = (id) => send("POST", `${of(id)}/live/open`);
 /** @param {string} id @returns {Promise<Lane[]>} */
 export const getLanes = (id) => get(`${of(id)}/lanes`);
+/** @param {string} id @returns {Promise<Opening[]>} */
+export const getOpenings = (id) => get(`${of(id)}/openings`);
 /** @param {string} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<FrameMask[]>} */
 export const getMasks = (id, frame, signal) => get(`${of(id)}/masks/${frame}`, signal);
 

@@ -51,6 +51,9 @@ class Session:
     def thing_box(self, prompt: ObjectPrompt) -> None:
         return None
 
+    def motions(self, prompt: ObjectPrompt) -> tuple[()]:
+        return ()
+
     def propose(self) -> Iterator[Any]:
         return iter([(1.0, ())])
 

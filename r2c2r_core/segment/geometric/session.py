@@ -18,6 +18,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
@@ -139,6 +140,10 @@ class GeometricSession:
         """The box of its points on its support."""
         found = self.find(prompt)
         return found.box() if found.kind == "thing" else None
+
+    def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
+        """How its leaves were filmed to move."""
+        return self.find(prompt).motions()
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
         """Proposals so far, surest first, with the share of the work done; the last step has them all."""

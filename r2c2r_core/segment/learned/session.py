@@ -12,6 +12,7 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
@@ -147,6 +148,10 @@ class LearnedSession:
     def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
         """None: it is measured when all frames had their say."""
         return None
+
+    def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
+        """What was drawn; what is found is measured when all frames had their say."""
+        return self.prepared.motions(prompt) if prompt.front is not None else ()
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
         """None: the model follows each object's own clicks."""

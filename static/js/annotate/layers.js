@@ -50,14 +50,16 @@ export function masksOn(objects, masks, frame) {
 /**
  * @param {SceneObjects} objects
  * @param {Masks} masks
+ * @param {import("../api-types").Opening[]} openings
  */
-export function lanesOf(objects, masks) {
+export function lanesOf(objects, masks, openings) {
   return objects.sorted.map((object, k) => ({
     id: object.id,
     number: k + 1,
     colour: objects.colour(object),
     name: object.name,
     frames: masks.lane(object.id),
+    openings: openings.filter((opening) => opening.object === object.id),
     prompts: new Set(object.points.map((point) => point.frame)),
     current: object.id === objects.current,
   }));

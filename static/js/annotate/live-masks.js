@@ -1,20 +1,23 @@
 /**
  * The masks of a project as they come: a frame's when it is asked for, an object's while it is being found.
- * Says "masks" {frame} when those of a frame changed (null: of many), "grown" {object} when one is seen on other frames than before.
+ * Says "masks" {frame} when those of a frame changed (null: of many), "grown" {object} when one is seen on other frames than before,
+ * "openings" when fronts were filmed to move otherwise than was known.
  */
 
-import { getLanes, getMasks } from "../api.js";
+import { getLanes, getMasks, getOpenings } from "../api.js";
 import { detailOf } from "../dom.js";
 import { say, sayError } from "../elements/toasts.js";
 import { live } from "../live.js";
 import { Masks } from "./masks.js";
 
 /** @typedef {import("../api-types").FrameMask} FrameMask */
-/** @typedef {{ object: number, restart: boolean, error: { message: string, hint: string } | null }} Told about an object being found */
+/** @typedef {{ object: number, restart: boolean, state: string, error: { message: string, hint: string } | null }} Told about an object being found */
 
 export class LiveMasks extends EventTarget {
   project = "";
   stored = new Masks();
+  /** @type {import("../api-types").Opening[]} how fronts were filmed to move */
+  openings = [];
 
   /** @param {AbortSignal} signal */
   listen(signal) {
@@ -24,7 +27,9 @@ export class LiveMasks extends EventTarget {
 
   /** On which frames each object is seen; masks themselves are asked for frame by frame. */
   async load() {
-    this.stored.fill(await getLanes(this.project));
+    const [lanes, openings] = await Promise.all([getLanes(this.project), getOpenings(this.project)]);
+    this.stored.fill(lanes);
+    this.#open(openings);
   }
 
   /**
@@ -53,8 +58,16 @@ export class LiveMasks extends EventTarget {
     this.#say("grown", { object: mask.object });
   }
 
+  /** @param {import("../api-types").Opening[]} openings */
+  #open(openings) {
+    if (!openings.length && !this.openings.length) return;
+    this.openings = openings;
+    this.#say("openings");
+  }
+
   /** @param {Told} told */
-  #told({ object, restart, error }) {
+  #told({ object, restart, state, error }) {
+    if (state === "done") getOpenings(this.project).then((openings) => this.#open(openings), sayError);
     if (restart) {
       this.stored.restart(object);
       this.#say("masks", { frame: null });

@@ -6,6 +6,7 @@ import { lanesOf, markersOn, masksOn } from "./layers.js";
  * @typedef {object} Known
  * @property {import("./scene-objects.js").SceneObjects} objects
  * @property {import("./masks.js").Masks} masks
+ * @property {() => import("../api-types").Opening[]} openings
  * @property {import("./edits.js").Edits} edits
  * @property {import("./player.js").Player} player
  * @property {import("../elements/proposal-list.js").ProposalList} proposals
@@ -70,7 +71,7 @@ export class Picture {
 
   drawLanes() {
     this.stop();
-    this.#strip.setLanes(lanesOf(this.#known.objects, this.#known.masks));
+    this.#strip.setLanes(lanesOf(this.#known.objects, this.#known.masks, this.#known.openings()));
   }
 
   /** In a moment, with what changes until then. */

@@ -1,10 +1,16 @@
-/** Frames to scrub, with a lane per object. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
+/** Frames to scrub, with a lane per object, and above it one for each of its fronts that was filmed open. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
+import { jointValue } from "../lib/format.js";
 import { drawLane } from "../lib/lane-view.js";
+import { drawOpening } from "../lib/opening-view.js";
+import { stateIn } from "../lib/openings.js";
+import { sourceChip, sourceWord } from "../source-chip.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
-/** @typedef {import("../lib/lane-view.js").LaneView & { id: number, name: string }} LaneView */
+/** @typedef {import("../lib/lane-view.js").LaneView & { id: number, name: string, openings: Opening[] }} LaneView */
+/** @typedef {import("../api-types").Opening} Opening */
+/** @typedef {{ opening: Opening, colour: string, state: HTMLElement }} OpeningView */
 
 const THUMBS = 18;
 
@@ -14,7 +20,10 @@ export class FilmStrip extends LiveElement {
   #position = 0;
   /** @type {Map<HTMLCanvasElement, LaneView>} */
   #drawn = new Map();
+  /** @type {Map<HTMLCanvasElement, OpeningView>} */
+  #opened = new Map();
   #size = { width: 0, height: 0 };
+  #openedSize = { width: 0, height: 0 };
   #thumbs = h("div", { class: "thumbs" });
   #lanes = h("div", { class: "lanes" });
   #slider = h("input", { type: "range", min: "0", max: "0", value: "0", "aria-label": "Frame" });
@@ -99,6 +108,8 @@ export class FilmStrip extends LiveElement {
   #measure() {
     const { clientWidth: width = 0, clientHeight: height = 0 } = this.#drawn.keys().next().value ?? {};
     this.#size = { width, height };
+    const opened = this.#opened.keys().next().value;
+    this.#openedSize = { width: opened?.clientWidth ?? 0, height: opened?.clientHeight ?? 0 };
     this.#drawLanes();
   }
 
@@ -106,12 +117,37 @@ export class FilmStrip extends LiveElement {
     const indices = this.#frames.map((frame) => frame.index);
     const ink = getComputedStyle(this).color;
     for (const [canvas, lane] of this.#drawn) drawLane(canvas, this.#size, lane, indices, this.#position, ink);
+    const frame = indices[this.#position] ?? -1;
+    for (const [canvas, lane] of this.#opened) {
+      drawOpening(canvas, this.#openedSize, lane, indices, this.#position, ink);
+      lane.state.textContent = stateIn(lane.opening, frame);
+    }
+  }
+
+  /**
+   * @param {Opening} opening
+   * @param {LaneView} lane of its object
+   * @param {Map<HTMLCanvasElement, OpeningView>} opened
+   */
+  #openingLane(opening, { name, colour }, opened) {
+    const what = opening.part ? `${name}, ${opening.part}` : name;
+    const widest = jointValue(opening.kind, opening.largest);
+    const label = `Opening of ${what}: seen up to ${widest}, ${sourceWord(opening.limit_source)}`;
+    const canvas = h("canvas", { role: "img", "aria-label": label, title: label });
+    for (const type of ["pointerdown", "pointermove"])
+      canvas.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), canvas));
+    const state = h("output", { class: "state" });
+    opened.set(canvas, { opening, colour, state });
+    const limit = sourceChip(opening.limit_source, { of: widest });
+    return h("div", { class: "lane opening" }, h("span", { class: "muted" }, state, limit), canvas);
   }
 
   /** @param {LaneView[]} lanes */
   setLanes(lanes) {
     /** @type {Map<HTMLCanvasElement, LaneView>} */
     const drawn = new Map();
+    /** @type {Map<HTMLCanvasElement, OpeningView>} */
+    const opened = new Map();
     renew(
       this.#lanes,
       ...lanes.map((lane) => {
@@ -132,10 +168,17 @@ export class FilmStrip extends LiveElement {
         );
         name.dataset.at = `lane:${lane.id}`;
         name.addEventListener("click", () => this.emit("pick-object", lane.id));
-        return h("div", { class: lane.current ? "lane current" : "lane" }, name, canvas);
+        const above = lane.openings.map((opening) => this.#openingLane(opening, lane, opened));
+        return h(
+          "div",
+          { class: lane.current ? "lane-group current" : "lane-group" },
+          ...above,
+          h("div", { class: "lane" }, name, canvas),
+        );
       }),
     );
     this.#drawn = drawn;
+    this.#opened = opened;
     this.#measure();
     const current = /** @type {HTMLElement | null} */ (this.#lanes.querySelector(".current"));
     if (current) this.#lanes.scrollTop = current.offsetTop - this.#lanes.offsetTop - this.#lanes.clientHeight / 2;

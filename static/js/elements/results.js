@@ -3,6 +3,7 @@
 import { h } from "../dom.js";
 import { centimetres, counted, jointValue } from "../lib/format.js";
 import { motionOf } from "../lib/joints.js";
+import { sourceChip, sourceWord } from "../source-chip.js";
 
 /** @typedef {import("../api-types").SceneSummary} SceneSummary */
 /** @typedef {import("../api-types").Certificate} Certificate */
@@ -43,7 +44,7 @@ function row(item) {
       "div",
       {},
       `${motionOf(joint)}, opens ${jointValue(joint.type, joint.upper)} `,
-      source ? h("span", { class: `chip ${source === "default" ? "warn" : ""}`, title: said(joint) }, source) : "",
+      source ? sourceChip(source, { title: said(joint) }) : "",
     );
   });
   const rms = item.placement_rms_m === null ? "–" : `${(1000 * item.placement_rms_m).toFixed(1)} mm`;
@@ -68,7 +69,7 @@ function row(item) {
 /** Where each of its numbers comes from. @param {import("../api-types").SceneItem["joints"][number]} joint */
 function said(joint) {
   return Object.entries(joint.sources)
-    .map(([what, source]) => `${what}: ${source}`)
+    .map(([what, source]) => `${what}: ${sourceWord(source)}`)
     .join(", ");
 }
 

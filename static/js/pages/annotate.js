@@ -80,7 +80,12 @@ export class AnnotatePage extends LiveElement {
     ONE_A_PRESS,
   );
   #picture = new Picture(
-    { ...this.#parts, proposals: this.#pane.proposals, comments: this.#evidence.comments },
+    {
+      ...this.#parts,
+      openings: () => this.#masks.openings,
+      proposals: this.#pane.proposals,
+      comments: this.#evidence.comments,
+    },
     this.#canvas,
     this.#strip,
   );
@@ -152,6 +157,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#player, "frame", () => (this.#picture.drawFrame(), this.#drawTip()));
     this.#on(this.#player, "settled", () => this.#settled());
     this.#on(this.#masks, "masks", ({ frame }) => !signal.aborted && this.#drawMasks(frame));
+    this.#on(this.#masks, "openings", () => this.#picture.drawLanesSoon());
     this.#on(this.#masks, "grown", ({ object }) => this.#grown(object));
     this.#on(this.#strip, "seek", (position) => this.#player.seek(position));
     this.#on(this.#strip, "play", () => this.#player.play());

@@ -4,6 +4,7 @@ import { h } from "../dom.js";
 import { findingList } from "../elements/results.js";
 import { centimetres } from "../lib/format.js";
 import { motionOf } from "../lib/joints.js";
+import { sourceChip } from "../source-chip.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Certificate} Certificate */
@@ -54,13 +55,7 @@ function runnerUp({ runner_up, runner_up_turn_deg }) {
 /** Each number of a joint with where it comes from. @param {SceneItem | undefined} item */
 function joints(item) {
   return (item?.joints ?? []).map((joint) => {
-    const chips = Object.entries(joint.sources).map(([what, source]) =>
-      h(
-        "span",
-        { class: `chip ${source === "default" ? "warn" : source === "inferred" ? "" : "good"}` },
-        `${what}: ${source}`,
-      ),
-    );
+    const chips = Object.entries(joint.sources).map(([what, source]) => sourceChip(source, { of: what }));
     return h("div", { class: "chips" }, h("span", {}, motionOf(joint)), ...chips);
   });
 }

@@ -3,6 +3,7 @@
 import { h } from "../dom.js";
 import { counted, jointValue } from "../lib/format.js";
 import { motionOf } from "../lib/joints.js";
+import { sourceChip, sourceWord } from "../source-chip.js";
 
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 /** @typedef {import("../api-types").ViewerJoint} ViewerJoint */
@@ -111,11 +112,7 @@ export class JointPanel {
       value.textContent = jointValue(type, at);
     };
     const worst = check ? "default" : (sources.find(([, s]) => s === "inferred")?.[1] ?? sources[0]?.[1] ?? "");
-    const badge = h(
-      "span",
-      { class: `chip ${check ? "warn" : ""}`, title: sources.map(([what, s]) => `${what} ${s}`).join(", ") },
-      worst,
-    );
+    const badge = sourceChip(worst, { title: sources.map(([what, s]) => `${what} ${sourceWord(s)}`).join(", ") });
     const alone = known?.item.joints.length === 1; // then the object's name says enough
     const title = known ? `${joint.name}: ${motionOf(known.joint).toLowerCase()}` : joint.name;
     const name = h("span", { class: "name", title }, alone ? known.item.name : joint.name);

@@ -19,6 +19,18 @@ from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.model.elevation import Elevation, Lines
 
 FRAMES = (3, 0, 7)
+OPENED = {
+    "part": "",
+    "kind": "revolute",
+    "largest": 1.5,
+    "limit_source": "at_least",
+    "source": "measured",
+    "states": [
+        {"frame": 0, "value": 0.01, "sigma": 0.01},
+        {"frame": 3, "value": 0.7, "sigma": 0.05},
+        {"frame": 7, "value": 1.5, "sigma": 0.02},
+    ],
+}
 FOUND = [[0.6, 2.0, 0.8], [1.2, 2.0, 0.8], [1.2, 2.0, 0.2], [0.6, 2.0, 0.2]]  # of a clicked cabinet: two edges hardly show
 PROPOSED = (("front", "drawer", 0.95, 30.5), ("front", "drawer", 0.9, 60.5), ("thing", "bottle", 0.4, 100.5))
 
@@ -127,7 +139,7 @@ def main() -> None:
             if superseded(commands, number, wait=point["x"] >= 156):
                 break
         else:
-            say(object=number, key=key, end="done", front=front)
+            say(object=number, key=key, end="done", front=front, motions=[OPENED] if prompt["category"] == "cabinet" else [])
 
 
 main()

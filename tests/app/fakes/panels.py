@@ -64,6 +64,9 @@ class Panels:
     def elevations(self) -> Iterator[Any]:
         return iter(())
 
+    def motions(self, prompt: ObjectPrompt) -> tuple[()]:
+        return ()
+
     def propose(self) -> Iterator[Any]:
         return iter([(1.0, ())])
 

@@ -1,0 +1,25 @@
+/** Where a number comes from: a word and a sign that differ for each, so that none is taken for another without its colour. */
+
+import { h } from "./dom.js";
+
+/** @type {Record<string, { word: string, sign: string, title: string }>} */
+const KINDS = {
+  measured: { word: "measured", sign: "●", title: "seen in the recording" },
+  at_least: { word: "at least", sign: "≥", title: "the largest opening that was seen; it was not seen to stop there" },
+  inferred: { word: "inferred", sign: "◐", title: "concluded from something else that was seen" },
+  default: { word: "default", sign: "○", title: "not seen: the usual value of its category" },
+  person: { word: "set by a person", sign: "✎", title: "set by a person" },
+};
+
+/**
+ * @param {string} source
+ * @param {{ of?: string, title?: string }} [about] what it is the source of, said before it
+ */
+export function sourceChip(source, { of = "", title = "" } = {}) {
+  const { word, sign, title: meaning } = KINDS[source] ?? { word: source.replaceAll("_", " "), sign: "", title: "" };
+  const text = [of && `${of}:`, sign, word].filter(Boolean).join(" ");
+  return h("span", { class: `chip source ${source}`, title: title || meaning }, text);
+}
+
+/** In words. @param {string} source */
+export const sourceWord = (source) => KINDS[source]?.word ?? source.replaceAll("_", " ");

@@ -1,0 +1,45 @@
+"""A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed together."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.test_together import click_frame, sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path) as running:
+        yield running
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
+    browser: Browser, server: Server, theme: str
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Annotate").click()
+    page.get_by_label("Category of the next object").fill("cabinet")
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 100, 40)  # tests/app/fakes/live.py says that it is closed, opened and open
+    lane = page.get_by_role("img", name="Opening of cabinet_1: seen up to 86°, at least")
+    expect(lane).to_have_count(1)
+    state = page.locator(".opening .state")
+    page.keyboard.press("Home")
+    expect(state).to_have_text("closed")
+    page.keyboard.press("ArrowRight")
+    expect(state).to_have_text("opening, 40° ± 6°")
+    expect(page.locator(".opening .chip.at_least")).to_have_text("86°: ≥ at least")
+    picture(page, f"opening-{theme}")
+    box = lane.bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2)  # its last third is the last frame
+    expect(state).to_have_text("open, 86° ± 2°")
+    expect(page.locator("r2c2r-film-strip .transport output")).to_contain_text("frame 7")
+    context.close()
