@@ -6,7 +6,7 @@ Reads JSON lines: {"cmd": "segment", "object", "key", "prompt", "objects"} · {"
 with a segment they are left out where more is asked at once.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
 {"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
-differs) and {"object", "key", "end", "front", "others", "doubts", "motions"}. The newest click goes first; those it interrupted go on
+differs) and {"object", "key", "end", "front", "others", "doubts", "motions"}. The newest click goes first; others go on
 afterwards. {"object", "key", "again": [...]} asks for a segment of an object whose masks are others since these objects are
 clicked where they are; of none, since none is any more.
 Proposals, {"proposals": [...], "fraction"}, wait until no click does.

@@ -1,4 +1,4 @@
-"""A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed together."""
+"""A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed too."""
 
 from collections.abc import Iterator
 from pathlib import Path
