@@ -136,7 +136,7 @@ def append(path: Path, line: dict[str, Any]) -> None:
 def finish(path: Path, end: str, error: dict[str, Any] | None, masks: Masks | None = None) -> None:
     """Say how it came to its end, what flat front it has, what it was drawn with, and where each mask is."""
     about = masks or MaskFile()
-    said = {"end": end, "error": error, "front": about.front, "others": about.others}
+    said: dict[str, Any] = {"end": end, "error": error, "front": about.front, "others": about.others}
     said |= {"doubts": about.doubts, "motions": about.motions}
     found = _scanned(path, path.read_bytes() if path.exists() else b"")
     append(path, said | {"index": _packed(found.index)})
@@ -157,7 +157,7 @@ def write(
         index.append([entry["frame"], entry["confidence"], entry["area"], at, len(line)])
         lines.append(line)
         at += len(line)
-    end = {"end": "done", "error": None, "backend": backend, "front": front, "others": others or []}
+    end: dict[str, Any] = {"end": "done", "error": None, "backend": backend, "front": front, "others": others or []}
     end |= {"motions": motions or []}
     end |= {"index": _packed(np.array(index, float))}
     write_atomically(path, b"".join(lines) + json.dumps(end).encode() + b"\n")
