@@ -1,6 +1,6 @@
 """The panel under the clicks as a metric rectangle on its run's plane, and its mask in every frame by reprojection."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ class Params:
     usual_protrusion_m: float = param(
         0.035, "m", "of a handle whose relief tells nothing", source="bar handles stand out 25-40 mm"
     )
+    handle_share: float = param(0.35, "share", "of a panel that its handle may cover: more is its frame")
     pair_width_share: float = param(
         0.08, "share", "by which the two doors of a pair may differ in width: they are equally wide"
     )
@@ -95,7 +96,19 @@ def find_front(
             cell = _parted(cell, float(column), float(row), run, on)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
     surface = surface_of(run.mosaic, run.relief, run.seen)
-    return Front(run, panel_edges(_supported(cell, run), surface, run.grid.cell_m), handle, 0.0)
+    panel = panel_edges(_supported(cell, run), surface, run.grid.cell_m)
+    return Front(run, panel, own_handle(handle, panel), 0.0)
+
+
+def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
+    """As much of a handle as lies on a panel; None for a neighbour's, and for what covers it: a raised frame."""
+    if handle is None or not panel.contains((handle.left + handle.right) / 2, (handle.top + handle.bottom) / 2):
+        return None
+    left, right = max(handle.left, panel.left), min(handle.right, panel.right)
+    top, bottom = max(handle.top, panel.top), min(handle.bottom, panel.bottom)
+    if (right - left) * (bottom - top) > tuned(Params).handle_share * panel.width * panel.height:
+        return None
+    return replace(handle, left=left, right=right, top=top, bottom=bottom)
 
 
 def front_panel(front: Front) -> FrontPanel:

@@ -8,8 +8,10 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.fronts.front import own_handle
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.runs.orthomosaic import joined
+from r2c2r_core.segment.runs.handles import GridHandle
+from r2c2r_core.segment.runs.orthomosaic import Cell, joined
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
@@ -160,3 +162,19 @@ def test_a_click_just_past_a_fronts_edge_means_the_front(session: GeometricSessi
     assert panel is not None
     assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M, abs=3e-3)
     assert panel.width_m == pytest.approx(width, abs=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("left", "top", "right", "bottom", "kept"),
+    [
+        (40, 20, 60, 24, (40, 20, 60, 24)),
+        (80, 20, 110, 24, (80, 20, 100, 24)),  # a bar that parallax shows across the edge
+        (104, 20, 112, 28, None),  # the neighbour's knob
+        (2, 2, 98, 48, None),  # the raised frame of a framed front
+    ],
+)
+def test_a_panels_handle_lies_on_it_and_is_not_its_frame(
+    left: float, top: float, right: float, bottom: float, kept: tuple[float, ...] | None
+) -> None:
+    found = own_handle(GridHandle(left=left, top=top, right=right, bottom=bottom, confidence=0.9), Cell(0, 0, 100, 50))
+    assert (found and (found.left, found.top, found.right, found.bottom)) == kept
