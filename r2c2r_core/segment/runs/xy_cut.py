@@ -171,6 +171,16 @@ class LineField:
         share = self.front[0][self._span(cell, 0), self._span(cell, 1)]
         return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
 
+    def likeliest(self, cell: Cell, axis: int, start: float, stop: float) -> tuple[float, float] | None:
+        """Position and mean log-odds of the likeliest straight line over the span of a cell, whatever is beside it."""
+        first, last = max(int(start // STEP), 0), round(stop / STEP)
+        near = self.odds[axis][self._span(cell, axis), first:last]
+        if not near.size:
+            return None
+        odds = cv2.dilate(near, np.ones((1, 3), np.uint8)).mean(axis=0)
+        best = int(np.argmax(odds))
+        return (first + best + 0.5) * STEP, float(odds[best])
+
     def best_uncut(self, cell: Cell, inset_m: float) -> float:
         """Log-odds, sizes and handles in mind, of the likeliest line this far within a cell; -inf where none fits."""
         inset, best = inset_m / self.cell_m, -np.inf

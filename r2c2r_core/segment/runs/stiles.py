@@ -1,0 +1,113 @@
+"""Frame-and-panel fronts made whole: a strip beside a panel that is a stile or rail of its frame belongs to it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, joined
+from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.runs.xy_cut import LineField, across
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """When a strip is part of a frame. Scores are z-scores of a line over the blocks along it."""
+
+    narrowest_m: float = param(0.03, "m", "of stiles and rails", gt=0, source="frames of doors sold are 50-90 mm wide")
+    widest_m: float = param(0.12, "m", "of stiles and rails", gt=0, source="likewise")
+    alike_m: float = param(0.025, "m", "by which two stiles of one front may differ: sunk panels shift as they are looked at")
+    in_line_m: float = param(0.015, "m", "by which a strip may be longer or shorter than its front")
+    panel_line: float = param(0.7, "σ", "of a line around a panel, from where it shows", source="lines of development kitchens")
+    none_share: float = param(0.5, "share", "of that, of what shows where there is no line")
+    edge: float = param(-1.0, "log", "odds of a frame's outer edge, at least")
+    middle: float = param(0.6, "share", "of a side, over whose middle lines count: corners have others")
+
+
+def whole_frames(odds: PanelOdds, cells: Sequence[Cell], cell_m: float, lines: tuple[Evidence, Evidence]) -> list[Cell]:
+    """The cells, strips of frames joined to their panels; `lines` are evidence of upright and of level ones."""
+    field, found = LineField(odds, cell_m), list(cells)
+    for front in filter(field.is_front, cells):
+        grown = front
+        for axis, end in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            strip = _strip_beside(field, found, grown, axis, end)
+            if grown in found and strip is not None and _is_stile(field, grown, strip, lines, axis, end):
+                found.remove(grown)
+                found = [part for other in found for part in _without(other, strip)]
+                grown = joined([grown, strip])
+                found.append(grown)
+    return found
+
+
+def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: int, end: int) -> Cell | None:
+    """What beside one end of a front may be a part of its frame, from the front on to the next line; None where nothing is."""
+    params = tuned(Params)
+    (low, high), beside = across(front, axis), across(front, 1 - axis)
+    near, away = (high, 1) if end else (low, -1)
+    narrowest, widest, slack = (size * STEP / field.cell_m for size in (params.narrowest_m, params.widest_m, params.in_line_m))
+    for other in cells:
+        reaches, spans = across(other, axis), across(other, 1 - axis)
+        in_line = max(abs(spans[0] - beside[0]), abs(spans[1] - beside[1])) < slack
+        if not in_line or abs(reaches[1 - end] - near) > 1 or abs(reaches[end] - near) < narrowest:
+            continue
+        far = reaches[end]
+        if abs(far - near) > widest:
+            start, stop = sorted((near + away * narrowest, near + away * widest))
+            edge = None if field.is_front(other) else field.likeliest(other, axis, start, stop)
+            if edge is None or edge[1] < params.edge:
+                continue
+            far = edge[0]
+        first, last = sorted((near, far))
+        return Cell(first, beside[0], last, beside[1]) if axis == 0 else Cell(beside[0], first, beside[1], last)
+    return None
+
+
+def _is_stile(field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence, Evidence], axis: int, end: int) -> bool:
+    """Whether lines at a front's other three sides stand as far in as the strip is wide, and none inside its own side."""
+    params, cells_m = tuned(Params), field.cell_m / STEP
+    (low, high), beside = across(front, axis), across(front, 1 - axis)
+    near, away = (high, -1) if end else (low, 1)  # inwards
+    opposite = low if end else high
+    width = across(strip, axis)[1] - across(strip, axis)[0]
+    alike, narrowest, widest = (size / cells_m for size in (params.alike_m, params.narrowest_m, params.widest_m))
+    if high - low < 2 * width or beside[1] - beside[0] < 2 * narrowest:
+        return False
+
+    def clearest(of: int, span: tuple[float, float], *positions: float) -> float:
+        return _clearest(lines[of], span, min(positions), max(positions))
+
+    least = max(width - alike, narrowest), min(width + alike, widest)
+    shown = min(
+        clearest(axis, beside, *(opposite - away * offset for offset in least)),
+        clearest(1 - axis, (low, high), beside[0] + narrowest, beside[0] + widest),
+        clearest(1 - axis, (low, high), beside[1] - widest, beside[1] - narrowest),
+    )
+    inside = clearest(axis, beside, near + away * narrowest, near + away * widest)
+    return shown > params.panel_line and inside < params.none_share * shown
+
+
+def _clearest(lines: Evidence, span: tuple[float, float], start: float, stop: float) -> float:
+    """The highest median score over the middle of a span of the lines from `start` to `stop`."""
+    margin = (span[1] - span[0]) * (1 - tuned(Params).middle) / 2
+    first = int((span[0] + margin) / lines.block)
+    blocks = slice(first, max(int((span[1] - margin) / lines.block), first + 1))
+    positions = slice(max(int(start), 0), int(stop) + 1)
+    score = np.where(lines.known[blocks, positions], lines.score[blocks, positions], 0.0)
+    return float(np.median(score, axis=0).max(initial=0.0)) if len(score) else 0.0
+
+
+def _without(cell: Cell, strip: Cell) -> list[Cell]:
+    """What a strip that crosses a cell leaves of it."""
+    left, right = max(cell.left, strip.left), min(cell.right, strip.right)
+    top, bottom = max(cell.top, strip.top), min(cell.bottom, strip.bottom)
+    if right - left < 1 or bottom - top < 1:
+        return [cell]
+    parts = (
+        Cell(cell.left, cell.top, left, cell.bottom),
+        Cell(right, cell.top, cell.right, cell.bottom),
+        Cell(left, cell.top, right, top),
+        Cell(left, bottom, right, cell.bottom),
+    )
+    return [part for part in parts if part.width > 0 and part.height > 0]
