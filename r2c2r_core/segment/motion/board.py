@@ -81,12 +81,18 @@ def _side(facet: Facet, point: np.ndarray) -> float:
 
 
 def _drawn_out(opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
-    """Pixels whose depth lies behind a drawer's front as deep as drawers are: its box, and what is in it."""
+    """Pixels whose depth lies behind a drawer's front: its box, and what is in it.
+
+    Of a box whose rear was not seen, what has come out of the unit.
+    """
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
     local = leaf_from_camera.apply(unproject(pixel_centres(camera), depth, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
+    out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
+    if opened.rear_m is not None:
+        out = max(out, opened.rear_m + tuned(Params).rear_m)
     half_w, half_h = opened.leaf.half_m
     inside = (depth > 0) & (np.abs(local[..., 0]) < half_w) & (np.abs(local[..., 2]) < half_h)
-    inside &= (local[..., 1] > 0) & (local[..., 1] < tuned(Params).tray_m)
+    inside &= (local[..., 1] > 0) & (local[..., 1] < out)
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
     return np.asarray(cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5)

@@ -1,16 +1,19 @@
 """The leaves of one object as they were filmed: the motions they were seen to make, found once, and where they stand open."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category, Opening
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.segment.motion.hypotheses import Way, moved
+from r2c2r_core.segment.motion.inside import measure_inside
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
+from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.motion.track import find_motion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -26,6 +29,8 @@ class Params:
         "by which a category's own way of opening is likelier",
         source="few frames overrule it: each is worth up to 80",
     )
+    ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "that a door stands open, from where one sees behind it")
+    ajar_m: float = param(0.08, "m", "that what slides stands open, from where one sees behind it")
 
 
 _USUAL: Mapping[Opening, tuple[Way, ...]] = {
@@ -65,10 +70,11 @@ class FilmedLeaves:
     def _all(self) -> tuple[tuple[Leaf, JointMotion | None], ...]:
         if self._filmed is None:
             usual = tuned(Params).usual
-            self._filmed = tuple(
+            found = [
                 (leaf, find_motion(leaf, self.scene, dict.fromkeys(ways, usual), part, only=bool(part)))
                 for part, leaf, ways in _leaves(self.whole, self.category)
-            )
+            ]
+            self._filmed = tuple((leaf, motion and _with_inside(leaf, motion, self.scene)) for leaf, motion in found)
         return self._filmed
 
 
@@ -77,13 +83,35 @@ def _state(motion: JointMotion, frame_index: int) -> float:
     return 0.0 if state is None or state.value is None else state.value
 
 
+def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene) -> JointMotion:
+    """The motion with what the frames show behind the leaf, where it stands open far enough to be looked behind."""
+    params = tuned(Params)
+    ajar = params.ajar_rad if motion.kind == "revolute" else params.ajar_m
+    drawn_out = _way(motion, leaf) == "out"
+
+    def place(frame: Frame) -> Rigid3 | None:
+        state = _state(motion, frame.index)
+        if state < ajar:
+            return None
+        return _opened(leaf, motion, state).world_from_leaf if drawn_out else leaf.world_from_front
+
+    return replace(motion, inside=measure_inside(leaf, place, scene, drawn_out=drawn_out))
+
+
+def _way(motion: JointMotion, leaf: Leaf) -> Literal["hinge", "out", "along"]:
+    assert motion.axis_world is not None  # what is fixed is never open
+    if motion.kind == "revolute":
+        return "hinge"
+    return "out" if abs(float(motion.axis_world @ leaf.outward)) > np.sqrt(0.5) else "along"
+
+
 def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     assert motion.axis_world is not None  # what is fixed is never open
     assert motion.pivot_world is not None
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
-    outward = abs(float(motion.axis_world @ leaf.outward)) > np.sqrt(0.5)
-    way: Literal["hinge", "out", "along"] = "hinge" if motion.kind == "revolute" else "out" if outward else "along"
-    return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=way)
+    depth_m = None if motion.inside is None else motion.inside.depth_m
+    rear_m = None if depth_m is None else depth_m + tuned(LeafParams).thickness_m
+    return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=_way(motion, leaf), rear_m=rear_m)
 
 
 def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:

@@ -1,6 +1,6 @@
 """A leaf that may move: the rectangle of a closed front, and points on it and around it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,6 +33,10 @@ class Leaf:
         """Unit normal of its closed outer face, towards the room."""
         return -self.world_from_front.rotation[:, 1]
 
+    def at(self, front_from_leaf: Rigid3) -> "Leaf":
+        """The same board where it stands open."""
+        return replace(self, world_from_front=self.world_from_front @ front_from_leaf)
+
     @property
     def half_m(self) -> tuple[float, float]:
         """Half its width and height."""
@@ -46,6 +50,7 @@ class OpenLeaf:
     leaf: Leaf
     world_from_leaf: Rigid3  # of its outer face, as `front`
     way: Literal["hinge", "out", "along"]  # how it was moved there
+    rear_m: float | None = None  # from its outer face to the rear board of what it brings along, where that was seen
 
 
 def behind() -> Vector3:

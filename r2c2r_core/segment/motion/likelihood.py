@@ -3,6 +3,7 @@
 A beam model (Thrun et al. 2005, 6.3): depth is measured on the leaf, on something before it, or anywhere by mistake.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -93,10 +94,10 @@ def _moved(leaf: Leaf, hypothesis: Hypothesis, points: Points, outward: Vector3,
     )
 
 
-def closed_counts(leaf: Leaf, scene: Scene) -> np.ndarray:
+def closed_counts(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> np.ndarray:
     """Of the closed leaf's points, how many (frames, 3) depth agrees with, sees through, and sees something before."""
     points = leaf.world_from_front.apply(face_points(leaf))
-    looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in scene.frames]
+    looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in frames]
     z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
     margin = 2 * tuned(Params).floor_m
     agrees = scene.noise.agrees(seen, z, margin)

@@ -33,6 +33,7 @@ class Params:
     least_known: int = param(20, "count", "readings towards it that a frame must have", ge=1)
     least_closed: int = param(5, "count", "of them that tell whether it is filled, where few are in view", ge=1)
     least_frames: int = param(3, "count", "frames that must show it so, and that must show the leaf elsewhere", ge=1)
+    free_share: float = param(0.5, "share", "of the readings towards where it stands open, that must lie behind there before")
     closed_cost: float = param(60.0, "log", "against every other state where it is closed")
     gain: float = param(40.0, "log", "by which a course must explain the depth better than a leaf that never moved")
     support: float = param(40.0, "log", "of the readings on the leaf where it stands open: what hides it is none")
@@ -71,7 +72,7 @@ def find_motion(
     leaf that turns out to move in no way that it names is none: half a front is a leaf only where it opens as one of a pair.
     """
     params = tuned(Params)
-    counts = closed_counts(leaf, scene)
+    counts = closed_counts(leaf, scene.frames, scene)
     known = counts.sum(axis=1)
     agrees = counts[:, 0] / np.maximum(known, 1)
     if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
@@ -85,6 +86,8 @@ def find_motion(
             break
         # Its place is seen into where it is seen elsewhere; a place that is only hidden tells of what stands before it.
         empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
+        if course.hypothesis.way == "out":  # a drawer hides its own place: it stands where one looked through before
+            empty |= _was_free(leaf, course, scene, closed)
         motion = _measured(leaf, course, scene, part) if empty and course.support > params.support else None
         if motion is not None:
             return None if only and course.hypothesis.way not in prior else motion
@@ -100,6 +103,17 @@ def _course(states: States, scene: Scene, closed: np.ndarray, prior: float) -> C
     own = log[np.arange(len(path)), path]
     gain = total - float(log[:, 0].sum()) + prior
     return Course(hypothesis=states.hypothesis, values=values[path], log=own, gain=gain, support=float(own[path > 0].sum()))
+
+
+def _was_free(leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray) -> bool:
+    """Whether most frames that show a leaf closed look past where it stands open."""
+    params = tuned(Params)
+    frames = [frame for frame, is_closed in zip(scene.frames, closed, strict=True) if is_closed]
+    opened = course.values[course.values > 0]
+    if len(frames) < params.least_frames or len(opened) == 0:
+        return False
+    counts = closed_counts(leaf.at(course.hypothesis.pose(float(np.median(opened)))), frames, scene)
+    return bool((counts[:, 1] > params.free_share * counts.sum(axis=1)).sum() > len(frames) / 2)
 
 
 def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotion | None:
