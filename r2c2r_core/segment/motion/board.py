@@ -22,9 +22,7 @@ class Params:
     before_m: float = param(0.025, "m", "before it, from where something hides it")
     in_plane_m: float = param(0.012, "m", "the same of one that slides past others", source="tracks lie 2-4 cm apart")
     behind_m: float = param(0.04, "m", "behind it, from where depth looks past it")
-    tray_m: float = param(
-        0.55, "m", "behind a drawer's front, within which what is seen is the drawer's", source="longest trays"
-    )
+    rear_m: float = param(0.03, "m", "behind the face of a drawer's rear board, within which it ends")
     shade: float = param(2.2, "ratio", "darker or lighter than the leaf usually is, from where it is no shade on it", gt=1)
     hue_lab: float = param(18.0, "grey", "off the leaf's hue in that shade, from where it is no part of it")
     hand_m: float = param(0.03, "m", "width of what may be a hand or a sleeve: handles are narrower")
