@@ -95,7 +95,7 @@ def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene) -> JointMotion:
             return None
         return _opened(leaf, motion, state).world_from_leaf if drawn_out else leaf.world_from_front
 
-    return replace(motion, inside=measure_inside(leaf, place, scene, drawn_out=drawn_out))
+    return replace(motion, inside=measure_inside(leaf, place, scene, drawn_out_m=motion.largest if drawn_out else 0.0))
 
 
 def _way(motion: JointMotion, leaf: Leaf) -> Literal["hinge", "out", "along"]:

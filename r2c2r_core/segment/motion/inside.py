@@ -46,21 +46,24 @@ class _Cloud:
         return _Cloud(self.points[keep], self.frame[keep])
 
 
-def measure_inside(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, *, drawn_out: bool) -> Inside | None:
+def measure_inside(
+    leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, *, drawn_out_m: float = 0.0
+) -> Inside | None:
     """The compartment that a front closes, or the drawer that it pulls out; None where none of its boards were seen.
 
     `place` is world_from_front of what is measured in the frames that show its inside, None in others: a drawer's box moves
-    with its front, a carcass stays.
+    with its front, a carcass stays. `drawn_out_m` is how far a drawer came out at most: its rear board stays in the unit,
+    whose own face would else look like one.
     """
     params, half = tuned(Params), np.array(leaf.half_m)
     cloud = _behind(leaf, place, scene)
     within = (np.abs(cloud.points[:, 0]) < half[0] - params.rim_m) & (np.abs(cloud.points[:, 2]) < half[1] - params.rim_m)
-    rear = _rear(cloud.where(within), leaf)
+    rear = _rear(cloud.where(within), leaf, max(params.shallowest_m, drawn_out_m + params.rim_m))
     if rear is None:
         return None
     front = tuned(LeafParams).thickness_m
     before = cloud.where((cloud.points[:, 1] > front + params.rim_m) & (cloud.points[:, 1] < rear - params.rim_m))
-    if drawn_out:
+    if drawn_out_m > 0:
         return Inside(depth_m=rear - front)
     sides = _ends([at for at, _ in _faces(before, 0, across=1, least_span_m=params.rim_m)], leaf.half_m[0])
     levels = _faces(before, 2, across=0, least_span_m=params.spans * leaf.width_m)
@@ -94,11 +97,10 @@ def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -
     return _Cloud(np.concatenate(found), np.concatenate(numbers))
 
 
-def _rear(cloud: _Cloud, leaf: Leaf) -> float | None:
+def _rear(cloud: _Cloud, leaf: Leaf, least_m: float) -> float | None:
     """Where the rear board's face stands: the furthest face square to the depth, behind what stands on the shelves."""
-    params = tuned(Params)
-    faces = _faces(cloud, 1, across=0, least_span_m=params.spans * leaf.width_m)
-    return max((at for at, _ in faces if at > params.shallowest_m), default=None)
+    faces = _faces(cloud, 1, across=0, least_span_m=tuned(Params).spans * leaf.width_m)
+    return max((at for at, _ in faces if at > least_m), default=None)
 
 
 def _ends(faces: list[float], half_m: float) -> tuple[float | None, float | None]:
