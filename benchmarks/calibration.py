@@ -1,15 +1,16 @@
 """Whether a confidence of 0.9 is right nine times in ten, over the sample kitchens of two generators.
 
-    python benchmarks/calibration.py [RECORDING...] [--frames 40] [--workdir DIR] [--claims FILE]
+    python benchmarks/calibration.py [RECORDING...] [--check RECORDING...] [--until segment] [--claims FILE]
 
 A RECORDING is a folder with scan.r3d or capture.r3d, prompts.json, truth.json and true masks (`r2c2r sample` writes one). Each
-is reconstructed as far as joints from one click an object; what the product claims, before any calibration, is written down
-with what is true (--claims; recordings in it are not computed again). Without a RECORDING the maps are only fitted and drawn
-again: benchmarks/calibration.json, docs/calibration.md, docs/calibration.svg.
+is reconstructed from one click an object as far as joints, or as far as masks alone; what the product claims, before any
+calibration, is written down with what is true (--claims; recordings in it are not computed again). The maps are fitted on all
+of them but those to --check: benchmarks/calibration.json, docs/calibration.md, docs/calibration.svg.
 
-mask: the expected IoU of a mask with the truth, in every frame that shows 400 px of the object. hinge: that a door is hinged on
-the side told. pose: that an object that is not called unsure stands within 1.5 degrees and 15 mm along the axes that were seen.
-dimension: that a size is within 15 mm, by where it is said to come from.
+mask: the expected IoU of a mask with the truth, in every frame that shows 400 px of the object. edge: that an edge of a front
+of furniture is within 10 mm of the truth. seam: that a front reaches over a seam, by 35 mm or more, onto another one. hinge:
+that a door is hinged on the side told. pose: that an object that is not called unsure stands within 1.5 degrees and 15 mm along
+the axes that were seen. dimension: that a size is within 15 mm, by where it is said to come from.
 """
 
 import argparse
@@ -17,11 +18,13 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
+from calibration_page import generator_of, page, picture
 from recordings import clicked, record_of, recording_in, true_masks
 from scipy.optimize import minimize
 
@@ -31,23 +34,22 @@ from r2c2r_core.evaluate.iou import MIN_TRUTH_PX
 from r2c2r_core.evaluate.joints import joint_errors
 from r2c2r_core.evaluate.records import ObjectRecord, read_truth
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.ledger import Stage
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import Prompts
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.pipeline import Request, reconstruct
+from r2c2r_core.segment.contradictions import has_seams
+from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.joints import handle_hinge
+from r2c2r_core.tuning import changed, tuning
 from r2c2r_core.workspace import Workspace
 
 HERE = Path(__file__).resolve().parent
 RESULTS, PAGE, PICTURE = HERE / "calibration.json", *(HERE.parent / "docs" / f"calibration.{end}" for end in ("md", "svg"))
-MAPS = {  # what is fitted as one: the confidence, and of which kinds
-    "mask": ("mask", ("front", "appliance", "thing")),
-    "hinge": ("hinge", ("inferred", "measured", "default")),
-}
-RIGHT = {
-    "mask": "its IoU with the truth",
-    "hinge": "the door is hinged there",
-}
+MAPS = ("mask", "hinge")
+AS_CLAIMED = ("edge", "seam")  # network odds: measured, without a map
 SLOPE_SPREAD = 0.5  # standard deviation of a slope about 1 before any claim is known: few claims keep their order of sureness
 MOST_FRAMES = 45  # of a recording, spread over it
 LOOSE = (1.5, 0.015)  # degrees, metres: the accuracy that a placement is asked for
@@ -71,7 +73,7 @@ def claims_of(folder: Path, work: Workspace, config: ReconstructConfig, until: S
     return [
         *_masks(folder, work, capture),
         *_edges(truth, work),
-        *_hinges(truth, built),
+        *(_hinges(truth, built) if built else _handled(truth, work)),
         *_poses(truth, work, built),
         *_dimensions(truth, built),
     ]
@@ -102,8 +104,9 @@ def _edges(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim
         beyond = np.array([across.min() + width, width - across.max(), height - up.max(), up.min() + height])
         for side, sure, off in zip(("left", "right", "top", "bottom"), track.front.edges, beyond, strict=True):
             yield {"of": "edge", "kind": side, "object": name, "claim": sure, "right": float(abs(off) <= EDGE_M), "off_m": off}
-        over = float(beyond.max() > SEAM_M)
-        yield {"of": "seam", "kind": track.category, "object": name, "claim": track.front.seam, "right": over}
+        if not has_seams(category_of(track.category), track.front.width_m):
+            over = float(beyond.max() > SEAM_M)
+            yield {"of": "seam", "kind": track.category, "object": name, "claim": track.front.seam, "right": over}
 
 
 def _hinges(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObject]) -> Iterator[Claim]:
@@ -114,6 +117,23 @@ def _hinges(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObject])
         right = next(m.value for m in joint_errors(truth[name], record_of(item)) if m.name == "hinge_side")
         told = hinged[0]
         yield {"of": "hinge", "kind": told.sources["axis"], "object": name, "claim": told.confidence, "right": right}
+
+
+def _handled(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim]:
+    """Before anything is built: the sides that handles on fronts of furniture tell."""
+    for name in work.names("segment"):
+        track, true = work.load_latest("segment", name), truth[name]
+        turning = [joint for joint in true.joints if joint.type == "revolute"]
+        if track.kind != "front" or track.front is None or len(turning) != 1:
+            continue
+        size = np.array([track.front.width_m, 0.0, track.front.height_m])
+        item = SimpleNamespace(handle=track.front.handle, dimensions_m=size, spec=category_of(track.category))
+        with tuning(changed({"synthesize.joints": _AS_IT_IS})):
+            hinge = handle_hinge(cast(MeasuredObject, item))
+        x, _, z = true.world_from_object.inverse.apply(turning[0].origin[None])[0] / true.dimensions_m
+        if hinge is not None and abs(x) > abs(z):
+            right = float(hinge.side == ("left" if x < 0 else "right"))
+            yield {"of": "hinge", "kind": hinge.source, "object": name, "claim": hinge.confidence, "right": right}
 
 
 def _poses(truth: Mapping[str, ObjectRecord], work: Workspace, built: Mapping[str, SceneObject]) -> Iterator[Claim]:
@@ -144,32 +164,68 @@ def _dimensions(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObje
             yield {"of": "dimension", "kind": source, "object": name, "right": float(off <= LOOSE[1]), "off_m": off}
 
 
-def figures(claims: Mapping[str, Sequence[Claim]]) -> dict[str, Any]:
-    """Of each confidence its map, and how right it is before and after; no kitchen is judged by a map fitted on it."""
-    found = {name: _figures_of(*chosen, claims) for name, chosen in MAPS.items()}
-    return {"recordings": sorted(claims), "maps": found, "words": _by_word(claims)}
+def figures(claims: Mapping[str, Sequence[Claim]], checked: Set[str]) -> dict[str, Any]:
+    """Of each confidence its map, and how right it is before and after; no kitchen is judged by a map fitted on it.
+
+    The maps are fitted on all but the recordings to be `checked`.
+    """
+    fitted = {name: said for name, said in claims.items() if name not in checked}
+    others = {name: claims[name] for name in checked}
+    return {
+        "recordings": sorted(fitted),
+        "checked": sorted(others),
+        "maps": {of: _figures_of(_only(of, fitted), _only(of, others)) for of in MAPS},
+        "as_claimed": {
+            of: {"fitted": _measured(_all(_only(of, fitted))), "checked": _measured(_all(_only(of, others)))}
+            for of in AS_CLAIMED
+        },
+        "words": _by_word(claims),
+    }
 
 
-def _figures_of(of: str, kinds: tuple[str, ...], claims: Mapping[str, Sequence[Claim]]) -> dict[str, Any]:
-    own = {name: [c for c in said if c["of"] == of and c["kind"] in kinds] for name, said in claims.items()}
-    own = {name: said for name, said in own.items() if said}
+def _only(of: str, claims: Mapping[str, Sequence[Claim]]) -> dict[str, list[Claim]]:
+    own = {name: [claim for claim in said if claim["of"] == of] for name, said in claims.items()}
+    return {name: said for name, said in own.items() if said}
+
+
+def _all(claims: Mapping[str, Sequence[Claim]]) -> list[Claim]:
+    return [claim for said in claims.values() for claim in said]
+
+
+def _measured(claims: Sequence[Claim]) -> dict[str, float]:
+    """How many claims, how sure and how right they are on average, and how far off."""
+    if not claims:
+        return {"claims": 0}
+    return {
+        "claims": len(claims),
+        "claimed": _mean(claims, "claim"),
+        "right": _mean(claims, "right"),
+        "off": _off(claims),
+    }
+
+
+def _figures_of(own: Mapping[str, Sequence[Claim]], checked: Mapping[str, Sequence[Claim]]) -> dict[str, Any]:
     slope, offset = fit(own)
     held_out = []
     for name, said in own.items():
         others = {other: said for other, said in own.items() if other != name}
         numbers = fit(others) if others else (slope, offset)
         held_out += [{**claim, "claim": calibrated(claim["claim"], *numbers)} for claim in said]
-    as_claimed = [claim for said in own.values() for claim in said]
+    as_claimed, unfitted = _all(own), _all(checked)
     return {
         "slope": slope,
         "offset": offset,
         "claims": len(as_claimed),
         "before": {"off": _off(as_claimed), "bins": _bins(as_claimed)},
         "after": {"off": _off(held_out), "bins": _bins(held_out)},
+        "checked": {
+            "before": _measured(unfitted),
+            "after": _measured([{**claim, "claim": calibrated(claim["claim"], slope, offset)} for claim in unfitted]),
+        },
         "by_generator": {
             generator: {"claims": len(said), "claimed": _mean(said, "claim"), "right": _mean(said, "right")}
             for generator in ("own", "second")
-            if (said := [c for name, each in own.items() if _generator(name) == generator for c in each])
+            if (said := [c for name, each in own.items() if generator_of(name) == generator for c in each])
         },
     }
 
@@ -181,7 +237,7 @@ def fit(claims: Mapping[str, Sequence[Claim]]) -> tuple[float, float]:
     """
     x, y, weight = [], [], []
     each = {name: len(said) for name, said in claims.items()}
-    total = {g: sum(n for name, n in each.items() if _generator(name) == g) for g in set(map(_generator, each))}
+    total = {g: sum(n for name, n in each.items() if generator_of(name) == g) for g in set(map(generator_of, each))}
     rights = np.array([c["right"] for said in claims.values() for c in said])
     binary = bool(np.isin(rights, (0.0, 1.0)).all())
     high, low = (rights.sum() + 1) / (rights.sum() + 2), 1 / (len(rights) - rights.sum() + 2)
@@ -190,7 +246,7 @@ def fit(claims: Mapping[str, Sequence[Claim]]) -> tuple[float, float]:
             p = min(max(claim["claim"], 1e-3), 1 - 1e-3)
             x.append(np.log(p / (1 - p)))
             y.append(low + (high - low) * claim["right"] if binary else claim["right"])
-            weight.append(1 / total[_generator(name)])
+            weight.append(1 / total[generator_of(name)])
     odds, target, share = np.array(x), np.array(y), np.array(weight)
 
     def loss(numbers: np.ndarray) -> float:
@@ -220,10 +276,6 @@ def _mean(claims: Sequence[Claim], key: str) -> float:
     return round(float(np.mean([claim[key] for claim in claims])), 4)
 
 
-def _generator(name: str) -> str:
-    return name.split()[0]
-
-
 def _name(folder: Path) -> str:
     """Which generator wrote it, and the folder."""
     return f"{'own' if (folder / 'truth_masks').exists() else 'second'} {folder.name}"
@@ -235,97 +287,18 @@ def _by_word(claims: Mapping[str, Sequence[Claim]]) -> list[dict[str, Any]]:
     for name, said in claims.items():
         for claim in said:
             if claim["of"] in ("pose", "dimension"):
-                counts.setdefault((claim["of"], claim["kind"], _generator(name)), []).append(claim["right"])
+                counts.setdefault((claim["of"], claim["kind"], generator_of(name)), []).append(claim["right"])
     return [
         {"of": of, "word": word, "generator": generator, "claims": len(rights), "right": int(sum(rights))}
         for (of, word, generator), rights in sorted(counts.items())
     ]
 
 
-def page(document: Mapping[str, Any]) -> str:
-    """The page of the documentation."""
-    own = [name for name in document["recordings"] if _generator(name) == "own"]
-    lines = [
-        "# What a confidence is worth",
-        "",
-        "A confidence of 0.9 is meant to be right nine times in ten. `benchmarks/calibration.py` compares what is claimed with",
-        f"the truth of {len(own)} kitchens of the project's own sample generator and {len(document['recordings']) - len(own)}",
-        "of a second one that shares nothing with it, and fits a logistic map of two numbers to each confidence",
-        "(`r2c2r_core/calibration.py`), the generators of equal weight. What is after calibration is held out: no kitchen",
-        "is judged by a map that was fitted on it.",
-        "",
-        "![Claimed and right, before and after](calibration.svg)",
-        "",
-        "| confidence | right means | claims | off before | off after | slope | offset |",
-        "|---|---|---:|---:|---:|---:|---:|",
-        *(
-            f"| {name} | {RIGHT[name]} | {m['claims']} | {m['before']['off']:.3f} | {m['after']['off']:.3f} "
-            f"| {m['slope']:g} | {m['offset']:g} |"
-            for name, m in document["maps"].items()
-        ),
-        "",
-        "*Off* is the expected calibration error: the mean distance, over tenths of the claims, between what is claimed and",
-        "what is right.",
-        "",
-        "Both generators hang every door opposite its handle, so a handle that is found tells the side; a side told by a",
-        "neighbour, by default, or by a door seen open did not occur often enough to be measured, and keeps its stated guess.",
-        "Masks are those of the weight-free segmenter. A front cut together with its neighbour is as sharp as any: what gives",
-        "it away is its size, which lowers its claim before the map (`unlikely_left`).",
-        "",
-        "| confidence | generator | claims | claimed before | right |",
-        "|---|---|---:|---:|---:|",
-        *(
-            f"| {name} | {generator} | {g['claims']} | {g['claimed']:.3f} | {g['right']:.3f} |"
-            for name, m in document["maps"].items()
-            for generator, g in m["by_generator"].items()
-        ),
-        "",
-        "## Claims in words",
-        "",
-        "A placement is called unsure or not; it is right within 1.5 degrees and, along the axes that the scan shows from end",
-        "to end, within 15 mm of the truth once the scene is built. A size says where it comes from; it is right within 15 mm.",
-        "",
-        "| claim | generator | claims | right |",
-        "|---|---|---:|---:|",
-        *(f"| {w['of']}: {w['word']} | {w['generator']} | {w['claims']} | {w['right']} |" for w in document["words"]),
-        "",
-    ]
-    return "\n".join(lines)
-
-
-def picture(document: Mapping[str, Any]) -> str:
-    """The reliability diagram from 0.5 to 1, SVG: right over claimed; a circle's area is its number of claims."""
-    side, gap = 220, 50
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{(side + gap) * len(document["maps"]) + gap}" height="{side + 90}" '
-        'font-family="sans-serif" font-size="11">',
-        '<rect width="100%" height="100%" fill="white"/>',
-        '<text x="50" y="16">right over claimed: before (orange) and after calibration (blue, held out)</text>',
-    ]
-    for number, (name, found) in enumerate(document["maps"].items()):
-        left, bottom = gap + number * (side + gap), side + 40
-        lines += [
-            f'<rect x="{left}" y="40" width="{side}" height="{side}" fill="none" stroke="black" stroke-width="0.5"/>',
-            f'<line x1="{left}" y1="{bottom}" x2="{left + side}" y2="40" stroke="grey" stroke-dasharray="4"/>',
-            f'<text x="{left + side / 2:.0f}" y="{bottom + 32}" text-anchor="middle">{name}</text>',
-        ]
-        for tick in (0.5, 0.75, 1.0):
-            lines += [
-                f'<text x="{left + (2 * tick - 1) * side:.0f}" y="{bottom + 14}" text-anchor="middle">{tick:g}</text>',
-                f'<text x="{left - 5}" y="{bottom - (2 * tick - 1) * side + 4:.0f}" text-anchor="end">{tick:g}</text>',
-            ]
-        for when, colour in (("before", "#ef7820"), ("after", "#2166d6")):
-            for part in found[when]["bins"]:
-                x, y = left + side * (2 * part["claimed"] - 1), bottom - side * (2 * part["right"] - 1)
-                radius = 2 + 10 * (part["claims"] / found["claims"]) ** 0.5
-                lines.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}" fill-opacity="0.55"/>')
-    return "\n".join([*lines, "</svg>", ""])
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Claims of what is given and not known yet; then the maps, the figures and the picture."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
+    parser.add_argument("--check", nargs="*", type=Path, default=[], help="recordings that no map is fitted on")
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--until", choices=("segment", "synthesize"), default="synthesize")
     parser.add_argument("--workdir", type=Path)
@@ -333,7 +306,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     claims: dict[str, list[Claim]] = json.loads(options.claims.read_text()) if options.claims.exists() else {}
     with tempfile.TemporaryDirectory(prefix="r2c2r-calibration-") as scratch:
-        for folder in options.recordings:
+        for folder in (*options.recordings, *options.check):
             if _name(folder) in claims:
                 continue
             started, config = time.monotonic(), config_from(RAW | {"ingest": {"most_frames": options.frames}}, "calibration")
@@ -342,7 +315,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.claims.write_text(json.dumps(claims) + "\n", encoding="utf-8")
             print(f"{folder.name}: {len(claims[_name(folder)])} claims, {time.monotonic() - started:.0f} s", flush=True)
     if claims:
-        RESULTS.write_text(json.dumps(figures(claims), indent=1) + "\n", encoding="utf-8")
+        RESULTS.write_text(
+            json.dumps(figures(claims, {_name(folder) for folder in options.check}), indent=1) + "\n", encoding="utf-8"
+        )
     document = json.loads(RESULTS.read_text(encoding="utf-8"))
     PAGE.write_text(page(document), encoding="utf-8")
     PICTURE.write_text(picture(document), encoding="utf-8")

@@ -16,8 +16,8 @@ class Params:
     """How sure a mask is."""
 
     least_px: float = param(0.7, "px", "no border is better than that")
-    slope: float = param(1.1, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
-    offset: float = param(0.05, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
+    slope: float = param(0.68, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
+    offset: float = param(1.19, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
     unlikely_left: float = param(
         0.33,
         "share",
@@ -50,5 +50,5 @@ def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, b
     distance = max(float(np.median(frame.world_from_camera.inverse.apply(points_world)[:, 2])), 0.1)
     off_px = max(border_m * frame.rgb_camera.fx / distance, params.least_px)
     whole = params.unlikely_left + (1 - params.unlikely_left) * fit
-    claim = whole * area / (area + border * off_px) * (1 - params.hidden_cost * (1 - min(max(share, 0.0), 1.0)))
-    return calibrated(claim, params.slope, params.offset)
+    claim = area / (area + border * off_px) * (1 - params.hidden_cost * (1 - min(max(share, 0.0), 1.0)))
+    return whole * calibrated(claim, params.slope, params.offset)

@@ -31,8 +31,8 @@ class Params:
     certain_off_centre: float = param(
         0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
     )
-    slope: float = param(0.72, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
-    offset: float = param(2.43, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
+    slope: float = param(0.92, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
+    offset: float = param(1.53, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
     seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a leaf that several frames show open")
     in_pairs: float = param(
         0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"

@@ -1,0 +1,121 @@
+"""What confidences are worth, as a page of the documentation and a reliability diagram."""
+
+from collections.abc import Mapping
+from typing import Any
+
+RIGHT = {
+    "mask": "its IoU with the truth",
+    "edge": "the front ends within 10 mm of there",
+    "seam": "the front holds some of the next one",
+    "hinge": "the door is hinged there",
+}
+
+
+def generator_of(name: str) -> str:
+    """Which generator drew a recording: own or second."""
+    return name.split()[0]
+
+
+def page(document: Mapping[str, Any]) -> str:
+    """The page of the documentation."""
+    own = [name for name in document["recordings"] if generator_of(name) == "own"]
+    lines = [
+        "# What a confidence is worth",
+        "",
+        "A confidence of 0.9 is meant to be right nine times in ten. `benchmarks/calibration.py` compares what is claimed with",
+        f"the truth of {len(own)} kitchens of the project's own sample generator and {len(document['recordings']) - len(own)}",
+        "of a second one that shares nothing with it, and fits a logistic map of two numbers to each confidence",
+        "(`r2c2r_core/calibration.py`), the generators of equal weight. What is after calibration is held out: no kitchen",
+        "is judged by a map that was fitted on it. *Others* are",
+        f"{len(document['checked'])} more kitchens, in other styles of fronts too, that had no part in the fit at all.",
+        "",
+        "![Claimed and right, before and after](calibration.svg)",
+        "",
+        "| confidence | right means | claims | off before | off after | slope | offset | others | off before | off after |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        *(
+            f"| {name} | {RIGHT[name]} | {m['claims']} | {m['before']['off']:.3f} | {m['after']['off']:.3f} "
+            f"| {m['slope']:g} | {m['offset']:g} |{_others(m['checked'])}"
+            for name, m in document["maps"].items()
+        ),
+        "",
+        "*Off* is the expected calibration error: the mean distance, over tenths of the claims, between what is claimed and",
+        "what is right.",
+        "",
+        "Both generators hang every door opposite its handle, so a handle that is found tells the side; a side told by a",
+        "neighbour, by default, or by a door seen open did not occur often enough to be measured, and keeps its stated guess.",
+        "Masks are those of the weight-free segmenter. A front cut together with its neighbour is as sharp as any: what gives",
+        "it away is its size, which lowers its claim after the map (`unlikely_left`).",
+        "",
+        "| confidence | generator | claims | claimed before | right |",
+        "|---|---|---:|---:|---:|",
+        *(
+            f"| {name} | {generator} | {g['claims']} | {g['claimed']:.3f} | {g['right']:.3f} |"
+            for name, m in document["maps"].items()
+            for generator, g in m["by_generator"].items()
+        ),
+        "",
+        "## Claims that need no map",
+        "",
+        "What the network and the lines say of an edge, or of a seam that was not cut, is a probability as it comes: a map",
+        "fitted on some kitchens made it no better on others. What it does not know is face frames that it takes for fronts:",
+        "there an edge is as sure and off by the width of the frame.",
+        "",
+        "| claim | right means | claims | claimed | right | off | others | claimed | right | off |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        *(
+            f"| {name} | {RIGHT[name]} |{_row(found['fitted'])}{_row(found['checked'])}"
+            for name, found in document["as_claimed"].items()
+        ),
+        "",
+        "## Claims in words",
+        "",
+        "A placement is called unsure or not; it is right within 1.5 degrees and, along the axes that the scan shows from end",
+        "to end, within 15 mm of the truth once the scene is built. A size says where it comes from; it is right within 15 mm.",
+        "",
+        "| claim | generator | claims | right |",
+        "|---|---|---:|---:|",
+        *(f"| {w['of']}: {w['word']} | {w['generator']} | {w['claims']} | {w['right']} |" for w in document["words"]),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _row(found: Mapping[str, Any]) -> str:
+    if not found["claims"]:
+        return " 0 | | | |"
+    return f" {found['claims']} | {found['claimed']:.3f} | {found['right']:.3f} | {found['off']:.3f} |"
+
+
+def _others(checked: Mapping[str, Any]) -> str:
+    before, after = checked["before"], checked["after"]
+    return f" {before['claims']} | {before['off']:.3f} | {after['off']:.3f} |" if before["claims"] else " 0 | | |"
+
+
+def picture(document: Mapping[str, Any]) -> str:
+    """The reliability diagram from 0.5 to 1, SVG: right over claimed; a circle's area is its number of claims."""
+    side, gap = 220, 50
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{(side + gap) * len(document["maps"]) + gap}" height="{side + 90}" '
+        'font-family="sans-serif" font-size="11">',
+        '<rect width="100%" height="100%" fill="white"/>',
+        '<text x="50" y="16">right over claimed: before (orange) and after calibration (blue, held out)</text>',
+    ]
+    for number, (name, found) in enumerate(document["maps"].items()):
+        left, bottom = gap + number * (side + gap), side + 40
+        lines += [
+            f'<rect x="{left}" y="40" width="{side}" height="{side}" fill="none" stroke="black" stroke-width="0.5"/>',
+            f'<line x1="{left}" y1="{bottom}" x2="{left + side}" y2="40" stroke="grey" stroke-dasharray="4"/>',
+            f'<text x="{left + side / 2:.0f}" y="{bottom + 32}" text-anchor="middle">{name}</text>',
+        ]
+        for tick in (0.5, 0.75, 1.0):
+            lines += [
+                f'<text x="{left + (2 * tick - 1) * side:.0f}" y="{bottom + 14}" text-anchor="middle">{tick:g}</text>',
+                f'<text x="{left - 5}" y="{bottom - (2 * tick - 1) * side + 4:.0f}" text-anchor="end">{tick:g}</text>',
+            ]
+        for when, colour in (("before", "#ef7820"), ("after", "#2166d6")):
+            for part in found[when]["bins"]:
+                x, y = left + side * (2 * part["claimed"] - 1), bottom - side * (2 * part["right"] - 1)
+                radius = 2 + 10 * (part["claims"] / found["claims"]) ** 0.5
+                lines.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}" fill-opacity="0.55"/>')
+    return "\n".join([*lines, "</svg>", ""])
