@@ -44,9 +44,7 @@ class Params:
     most_hidden: float = param(0.6, "share", "of a category's depth: sides that end before it are seen in part only")
     looked_at: float = param(0.3, "cosine", "of the angle from which a face must be seen to be measured")
     wall_spread: float = param(0.2, "ratio", "of a draw's variation of depth, of one that ends at a wall")
-    guess_spread: float = param(1.0, "ratio", "of a draw's variation of depth, of one by the worktop or the category")
     block_error: float = param(0.25, "ratio", "to a handle's protrusion, of how odd a block is in its place")
-    none_error: float = param(1.0, "ratio", "to a handle's protrusion, of how odd a front without it is")
 
 
 def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
@@ -130,15 +128,13 @@ def _box_with_relief(box: BoxPart, world_from_local: Rigid3, at: Vector3, relief
 
 def _handle_error(relief: Relief, style: HandleStyle) -> float:
     """How far a handle in that style is from a usual one of what was seen: hands reach behind it."""
-    params = tuned(Params)
-    errors: dict[HandleStyle, float] = {"bar": 0.0, "block": params.block_error, "none": params.none_error}
+    errors: dict[HandleStyle, float] = {"bar": 0.0, "block": tuned(Params).block_error, "none": 1.0}
     return 0.0 if relief.handle is None else errors[style] * relief.handle.protrusion_m
 
 
 def _scale(behind: DepthBehind, variation: Variation) -> float:
     """A depth that the scan shows is varied little, a usual one by its full spread, one that is sold not at all."""
-    params = tuned(Params)
-    spread = {"wall": params.wall_spread, "worktop": params.guess_spread, "category": params.guess_spread}
+    spread = {"wall": tuned(Params).wall_spread, "worktop": 1.0, "category": 1.0}
     return 1.0 + spread.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
 
 
