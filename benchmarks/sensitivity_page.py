@@ -20,6 +20,14 @@ BETTER = {
     "segment.things.pixel_cut.smooth": "contrast across the borders that are sure in the same recording",
     "segment.planes.cell_m": "the spacing of the fused surface",
     "generate.lathe.bitten": "the likelihood of a profile under depth and masks, neck and body apart",
+    "generate.rear_edge.bin_m": "a change point of pixels, each weighed by the recording's depth noise, rather than of strips",
+    "generate.rear_edge.before_m": "the same",
+    "generate.rear_edge.clearer": "the same: the likelihood of an end against that of none",
+    "generate.rear_edge.flattest": "the same: a ray's weight falls with its slant",
+    "generate.rear_edge.least_gap_m": "the same",
+    "generate.rear_edge.sure": "the same",
+    "generate.rear_edge.widest_m": "the spread of the box's fit",
+    "generate.boxed.looked_at": "every frame that shows the front, weighted by what it adds",
     "generate.consistency.judges": "every frame that sees the object, weighted by what it adds",
 }
 """By number: the estimator that would stand in its place."""
