@@ -24,7 +24,9 @@ class Params:
     segments: int = param(40, "count", "round the axis", ge=6)
     step_px: float = param(0.25, "px", "between places across an outline", gt=0)
     same_width: float = param(0.08, "share", "of the median radius by which a view's own may differ and be whole")
-    bitten: float = param(0.88, "ratio", "of the narrower to the wider side, below which the mask is bitten, not the thing")
+    bitten: float = param(
+        0.88, "ratio", "of the narrower to the wider side, below which the mask is bitten, not the thing", gt=0, lt=1
+    )
     mask_weight: float = param(0.3, "ratio", "of the masks to the depth, where the axis is fitted")
     least_views: int = param(3, "count", "that tell a radius", ge=1)
     robust_scales_m: tuple[float, float, float, float] = param(

@@ -26,7 +26,7 @@ class Params:
         0.05, "m", "side of a patch whose depth counts once", source="errors of fused depth go together over about 3 cm"
     )
     least_share: float = param(0.07, "share", "of a face that depth must have seen to measure anything by it")
-    gap_m: float = param(0.06, "m", "a hole this long in a side is where it ends")
+    gap_m: float = param(0.01, "m", "by which a hole in a side is longer than a patch where the side ends", gt=0)
     least_reach_m: float = param(0.15, "m", "sides that end before this are dark, and depth has holes in them")
 
 
@@ -102,5 +102,5 @@ def _end(depths: np.ndarray) -> float:
     """Where depths along a face first end."""
     params = tuned(Params)
     ordered = np.sort(depths)
-    gaps = np.flatnonzero(np.diff(ordered) > params.gap_m)
+    gaps = np.flatnonzero(np.diff(ordered) > params.patch_m + params.gap_m)
     return float(ordered[gaps[0] if len(gaps) else -1]) + params.patch_m / 2
