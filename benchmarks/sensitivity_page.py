@@ -33,13 +33,13 @@ BETTER = {
 """By number: the estimator that would stand in its place."""
 
 WHY = (
-    "`segment.appliances.faces.gap_m` and `patch_m` were one limit told twice: with a patch longer than the gap, every patch was",
-    "the last one. Since the last run the gap is told beyond a patch's length.",
+    "`segment.appliances.faces.gap_m` and `patch_m` were one limit told twice: with a patch longer than the gap, every patch",
+    "was the last one. Since the last run the gap is told beyond a patch's length.",
     "`generate.lathe.bitten` above 1 called every mask bitten; it is bounded below 1 now.",
     "`segment.things.visual_hull.inside` and `pose_share` choose between a hull and a cylinder for one bottle, and",
     "`generate.consistency.judges` below 8 chooses another candidate; each stands where the choice is the right one.",
-    "The numbers of `generate.rear_edge` turn one event on or off: whether the rear edge of a refrigerator, at the limit of what",
-    "depth shows, is believed.",
+    "The numbers of `generate.rear_edge` turn one event on or off: whether the rear edge of a refrigerator, at the limit of",
+    "what depth shows, is believed.",
 )
 """Of those with the largest effects: what they decide."""
 
