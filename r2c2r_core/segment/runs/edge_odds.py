@@ -36,8 +36,11 @@ class Params:
 def edge_odds(mosaic: Image, relief: Relief, vertical: Evidence, horizontal: Evidence) -> PanelOdds:
     """Of a mosaic (rows, columns, 3), the relief of the same plane and the evidence of its lines."""
     odds = panel_odds(mosaic, relief.count, relief.raised, relief.level_m)
+    rows, columns = odds.front.shape
+    seen = mosaic[: rows * STEP, : columns * STEP].any(axis=2).reshape(rows, STEP, columns, STEP).any(axis=(1, 3))
     return replace(
         odds,
+        front=np.where(seen, odds.front, -SUREST).astype(np.float32),  # or what nobody saw would speak against lines through it
         upright=_with_lines(_with_ends(odds.upright, relief, 0), vertical),
         level=np.ascontiguousarray(_with_lines(_with_ends(odds.level.T, relief, 1), horizontal).T),
     )
