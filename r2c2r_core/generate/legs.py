@@ -97,7 +97,8 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     posts = tuple(seen_posts[corner] or _likely_post(seen_posts, slab, corner, seen.floor) for corner in corners)
     width = float(np.mean([post.width_m for post in posts]))  # each was seen from one side, and what was before it hides some
     posts = tuple(post._replace(width_m=width) for post in posts)
-    standing = [post if post.is_seen else _where_not_empty(carving, slab, post) for post in posts]
+    inwards = (0.0,) if any(post.is_seen for post in posts) else params.inwards
+    standing = [post if post.is_seen else _where_not_empty(carving, slab, post, inwards) for post in posts]
     found = tuple(post for post in standing if post is not None)
     return Support(slab, found) if len(found) == len(posts) else None
 
@@ -230,10 +231,10 @@ def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner
     return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), params.post_m, floor, False)
 
 
-def _where_not_empty(carving: Carving, slab: BoxPart, post: Post) -> Post | None:
-    """A post that nobody saw, further in where its corner was seen to be empty; None where all places were."""
+def _where_not_empty(carving: Carving, slab: BoxPart, post: Post, shares: Sequence[float]) -> Post | None:
+    """A post that nobody saw, at the first share of the way to the middle not seen to be empty; None where all were."""
     middle = (slab.low + slab.high)[:2] / 2
-    for inwards in tuned(Params).inwards:
+    for inwards in shares:
         moved = post._replace(top=np.append(post.top[:2] + inwards * (middle - post.top[:2]), post.top[2]))
         if not _is_empty(carving, moved):
             return moved
