@@ -19,22 +19,19 @@ class SimilarityFit(NamedTuple):
     inliers: np.ndarray  # (n,) bool
 
 
-def umeyama(source: Points, target: Points, *, weights: np.ndarray | None = None, scale: float | None = None) -> Similarity3:
-    """Similarity taking `source` onto `target` in (weighted) least squares; never a reflection (Umeyama 1991).
+def umeyama(source: Points, target: Points, *, scale: float | None = None) -> Similarity3:
+    """Similarity taking `source` onto `target` in least squares; never a reflection (Umeyama 1991).
 
     Replaces the paper's eq. 3-6: eq. 4 accumulates target @ source.T, for which eq. 5 as printed (V U^T) is the
     inverse, and neither carries the sign of the determinant, without which half of all flat fronts come out mirrored.
     `scale` freezes the scale. Raises DegenerateFitError when the points fix no rotation.
     """
-    weight = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=np.float64)
-    total = weight.sum()
-    if len(source) < 3 or total <= 0:
+    if len(source) < 3:
         raise DegenerateFitError(f"{len(source)} correspondences, 3 needed")
-    weight = weight / total
-    source_mean, target_mean = weight @ source, weight @ target
+    source_mean, target_mean = source.mean(axis=0), target.mean(axis=0)
     p, q = source - source_mean, target - target_mean
-    spread = float(weight @ (p**2).sum(axis=1))
-    u, d, vt = np.linalg.svd((q * weight[:, None]).T @ p)
+    spread = float((p**2).sum(axis=1).mean())
+    u, d, vt = np.linalg.svd(q.T @ p / len(p))
     if d[0] <= 0 or d[1] < 1e-9 * d[0]:
         raise DegenerateFitError("the correspondences lie on a line")
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
