@@ -33,7 +33,7 @@ from app.schemas.people import (
     Credentials,
     PasswordChange,
 )
-from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo
+from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo, PhotoState
 from app.schemas.projects import (
     Deleted,
     ImportPath,
@@ -121,6 +121,7 @@ __all__ = [
     "OverridePatch",
     "PasswordChange",
     "Photo",
+    "PhotoState",
     "Placement",
     "Point",
     "PointIn",

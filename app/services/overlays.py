@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,10 +21,11 @@ from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.ingest.store import depth_path
-from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.model.scene import Joint, SceneObject
 
 WIDTH = 640
 PHOTOS = 12
+_AT_BORDER = 0.01  # of the image: what reaches nearer to its edge may go on beyond
 FAR_M = 0.03  # a residual of this much has its full colour
 _OUTLINE = (77, 225, 255)  # BGR
 _EDGE = 0.004  # Laplacian of the inverse depth over its largest value: a step of about 1 cm at 2 m
@@ -47,13 +49,20 @@ def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectP
         item = queries.object_row(session, project_id, object_id)
         files = context.files(project)
     found = masks.found_of(context, project, item)
-    best = sorted(found.masks.seen().tolist() if found else [], key=lambda seen: -seen[2] * seen[1])[: 6 * PHOTOS]
-    spread = sorted(best)[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
-    shown = [photo for frame, sure, _ in spread if (photo := _photo(files, int(frame), sure)) is not None]
     fitted = _scene_object(files, "warp", item.result_name) or _scene_object(files, "synthesize", item.result_name)
+    seen = found.masks.seen().tolist() if found else []
+    best = sorted(seen, key=lambda seen: -seen[2] * seen[1])[: 6 * PHOTOS]
+    spread = sorted(best)[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
+    opened = _opened_frames(fitted) if fitted is not None else set()
+    chosen = spread + [one for one in seen if int(one[0]) in opened and one not in spread]
+    shown = [
+        photo
+        for frame, sure, _ in chosen
+        if found is not None and (photo := _photo(files, int(frame), sure, found.masks.entry(int(frame)), fitted)) is not None
+    ]
     stages: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
     return schemas.ObjectPhotos(
-        photos=sorted(shown, key=lambda photo: -photo.confidence),
+        photos=sorted(shown, key=lambda photo: (not photo.whole, -photo.confidence)),
         version=_version(files, item.result_name),
         of=[name for name, stage in stages.items() if _stored(files, stage, item.result_name)],
         world_from_object=fitted.world_from_object.matrix.tolist() if fitted else None,
@@ -83,7 +92,7 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
     if frame is None:
         return None
     try:
-        parts = parts_of(files, name, "fitted") or parts_of(files, name, "placed")
+        parts = parts_of(files, name, "fitted", index) or parts_of(files, name, "placed", index)
     except NotReady:
         return None
     camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
@@ -97,8 +106,8 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
     return [float(value) for value in frame.world_from_camera.apply(point)[0]]
 
 
-def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf) -> list[Part]:
-    """The object's meshes in the world; NotReady while that stage has not made them."""
+def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int) -> list[Part]:
+    """The object's meshes in the world as they stood in a frame; NotReady while that stage has not made them."""
     if of == "placed":
         placement, made = (views.latest(files, stage, name) for stage in ("align", "generate"))
         asset = (
@@ -118,13 +127,14 @@ def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf) -> list[Part
     found = _scene_object(files, "warp" if of == "fitted" else "synthesize", name)
     if found is None:
         raise NotReady(f"{name} is not {'fitted' if of == 'fitted' else 'built'} yet", hint="run the project first")
-    return _scene_parts(found)
+    return _scene_parts(found, index)
 
 
-def _scene_parts(item: SceneObject) -> list[Part]:
+def _scene_parts(item: SceneObject, index: int) -> list[Part]:
+    """Its links where they stood in a frame, as far as that was measured; closed where it was not."""
     parts = []
     for link in item.links:
-        world_from_link = item.world_from_object @ link.object_from_link
+        world_from_link = item.world_from_object @ _moved(item, link.name, index) @ link.object_from_link
         if link.visual is not None:
             mesh = link.visual
             placed = world_from_link.apply(mesh.vertices)
@@ -137,11 +147,41 @@ def _scene_parts(item: SceneObject) -> list[Part]:
     return parts
 
 
+def _moved(item: SceneObject, link: str, index: int) -> Rigid3:
+    """How a link stood away from its closed place in a frame, in the object's frame."""
+    joint = next((joint for joint in item.joints if joint.child == link), None)
+    if joint is None:
+        return Rigid3()
+    value, axis = _state(joint, index), joint.axis_object
+    before = _moved(item, joint.parent, index)
+    if joint.type == "prismatic":
+        return before @ Rigid3(np.eye(3), value * axis)
+    rotation = cv2.Rodrigues(value * axis)[0]
+    return before @ Rigid3(rotation, joint.origin_object - rotation @ joint.origin_object)
+
+
+def _state(joint: Joint, index: int) -> float:
+    """Its position in a frame, as it was filmed; 0 where that is not known."""
+    state = joint.motion.states.get(index) if joint.motion is not None else None
+    return state.value if state is not None and state.value is not None else 0.0
+
+
+def _opened_frames(item: SceneObject) -> set[int]:
+    """For each joint that was filmed open, a frame half way and one at its widest."""
+    chosen = set()
+    for joint in item.joints:
+        known = {f: s.value for f, s in joint.motion.states.items() if s.value} if joint.motion is not None else {}
+        for share in (0.5, 1.0) if known else ():
+            wanted = share * max(known.values())
+            chosen.add(min(known, key=lambda frame: abs(known[frame] - wanted)))
+    return chosen
+
+
 def _drawn(files: ProjectFiles, name: str, index: int, of: schemas.OverlayOf, look: schemas.OverlayLook) -> bytes:
     frame = views.frame_of(files, index)
     if frame is None:
         raise NotFound(f"the recording has no frame {index}")
-    parts, camera_from_world = parts_of(files, name, of), frame.world_from_camera.inverse
+    parts, camera_from_world = parts_of(files, name, of, index), frame.world_from_camera.inverse
     if look == "residual":
         image = _residual(files, index, parts, frame.depth_camera, camera_from_world)
         image = cv2.resize(image, (WIDTH, round(WIDTH * image.shape[0] / image.shape[1])), interpolation=cv2.INTER_NEAREST)
@@ -202,11 +242,16 @@ def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrin
     return np.dstack([image.astype(np.uint8), alpha.astype(np.uint8)])
 
 
-def _photo(files: ProjectFiles, index: int, confidence: float) -> schemas.Photo | None:
+def _photo(
+    files: ProjectFiles, index: int, confidence: float, entry: dict[str, Any] | None, item: SceneObject | None
+) -> schemas.Photo | None:
     frame = views.frame_of(files, index)
-    if frame is None:
+    if frame is None or entry is None:
         return None
-    camera = frame.rgb_camera
+    camera, bits = frame.rgb_camera, entry["mask"]
+    x, y = bits["left"] / bits["width"], bits["top"] / bits["height"]
+    right, bottom = x + bits["box_width"] / bits["width"], y + bits["box_height"] / bits["height"]
+    joints = item.joints if item is not None else ()
     return schemas.Photo(
         frame=frame.index,
         width=camera.width,
@@ -217,6 +262,13 @@ def _photo(files: ProjectFiles, index: int, confidence: float) -> schemas.Photo 
         cy=camera.cy,
         camera_from_world=frame.world_from_camera.inverse.matrix.tolist(),
         confidence=confidence,
+        box=[x, y, right, bottom],
+        whole=min(x, y) > _AT_BORDER and max(right, bottom) < 1 - _AT_BORDER,
+        states=[
+            schemas.PhotoState(joint=joint.name, type=joint.type, value=state.value, sigma=state.sigma)
+            for joint in joints
+            if joint.motion is not None and (state := joint.motion.states.get(index)) is not None
+        ],
     )
 
 

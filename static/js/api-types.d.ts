@@ -481,7 +481,7 @@ export interface ObjectPatch {
   version?: number | null;
 }
 
-/** The photos to check an object on, best first; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
+/** The photos to check an object on, whole ones first, then by confidence; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
 export interface ObjectPhotos {
   photos: Photo[];
   version: string;
@@ -563,6 +563,17 @@ export interface Photo {
   cy: number;
   camera_from_world: number[][];
   confidence: number;
+  box: number[];
+  whole: boolean;
+  states: PhotoState[];
+}
+
+/** Where a joint stood in a photo, as it was filmed: rad or m; null where that is not known. */
+export interface PhotoState {
+  joint: string;
+  type: "revolute" | "prismatic";
+  value: number | null;
+  sigma: number | null;
 }
 
 /** Where the chosen candidate stands, with the evidence for it. */

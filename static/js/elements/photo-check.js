@@ -1,5 +1,6 @@
 /**
- * The object's mesh over the photos it was seen in: ghost, outline, distance to the measured depth, before and after the fit.
+ * The object's mesh over the photos it was seen in: outline, ghost, distance to the measured depth, before and after the fit; where
+ * it was filmed open, as open as it was. Comments of the photo are pins; the object fills the picture, or the photo does.
  * Emits "pin-point" {frame, x, y} on a double click.
  */
 
@@ -7,6 +8,8 @@ import { getPhotos } from "../api.js";
 import { h, LiveElement, renew, segments, slider } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { boxEdges } from "../lib/box-view.js";
+import { sheetOf } from "../lib/crop-view.js";
+import { jointValue } from "../lib/format.js";
 import { sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").ObjectPhotos} ObjectPhotos */
@@ -17,7 +20,10 @@ import { sayError } from "./toasts.js";
 /** @type {Record<Of, string>} */
 const OF = { placed: "Placed", primitive: "Boxes", fitted: "Fitted" };
 /** @type {Record<Look, string>} */
-const LOOKS = { ghost: "Ghost", outline: "Outline", residual: "Distance" };
+const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
+const PIN_R = 0.008; // of the photo's width
+
+const SVG = "http://www.w3.org/2000/svg";
 
 export class PhotoCheck extends LiveElement {
   project = "";
@@ -29,24 +35,32 @@ export class PhotoCheck extends LiveElement {
   /** @type {Of} */
   #of = "fitted";
   /** @type {Look} */
-  #look = "ghost";
+  #look = "outline";
+  /** Whether the object fills the picture, rather than the photo. */
+  #near = true;
+  /** @type {import("../api-types").Comment[]} */
+  #comments = [];
   /** @type {{ pose: number[][], size: number[] } | null} what a correction would make of the box */
   #preview = null;
   #photo = h("img", { alt: "" });
   #under = h("img", { class: "over", alt: "" });
   #over = h("img", { class: "over", alt: "" });
-  #lines = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  #lines = document.createElementNS(SVG, "svg");
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "75", "aria-label": "Opacity over the photo" });
   #split = h("input", { type: "range", min: "0", max: "100", value: "100", "aria-label": "Before and after the fit" });
   #tools = h("div", { class: "bar" });
-  #pictures = h("div", { class: "pictures" }, this.#photo, this.#under, this.#over);
+  #sheet = h("div", { class: "sheet" }, this.#photo, this.#under, this.#over);
+  #pictures = h("div", { class: "pictures" }, this.#sheet);
   #strip = h("div", { class: "thumbs" });
   #legend = h("p", { class: "muted legend" });
 
   connected() {
     this.#lines.setAttribute("class", "over");
     this.#lines.setAttribute("aria-hidden", "true");
-    this.#pictures.append(this.#lines);
+    this.#sheet.append(this.#lines);
+    const observer = new ResizeObserver(() => this.#place());
+    observer.observe(this.#pictures);
+    this.signal.addEventListener("abort", () => observer.disconnect());
     this.replaceChildren(this.#tools, this.#pictures, this.#legend, this.#strip);
     for (const slider of [this.#opacity, this.#split])
       slider.addEventListener("input", () => this.#fade(), { signal: this.signal });
@@ -85,6 +99,12 @@ export class PhotoCheck extends LiveElement {
     this.#drawBox();
   }
 
+  /** @param {import("../api-types").Comment[]} comments that are open */
+  setComments(comments) {
+    this.#comments = comments;
+    this.#drawBox();
+  }
+
   /** @param {number} step */
   move(step) {
     const count = this.#all?.photos.length ?? 0;
@@ -118,13 +138,24 @@ export class PhotoCheck extends LiveElement {
     this.#under.hidden = this.#look !== "ghost" || this.#of === before;
     if (!this.#under.hidden) this.#under.src = this.#overlayUrl(photo, before, "ghost");
     this.#drawTools(all, before);
+    this.#place();
     this.#drawBox();
     this.#fade();
     this.#legend.textContent =
       this.#look === "residual"
         ? "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree."
-        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}. Hold B for the photo alone; double click pins a comment.`;
+        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}${filmed(photo)}. Hold B for the photo alone; double click pins a comment.`;
     this.#strip.replaceChildren(...all.photos.map((other, k) => this.#thumb(other, k)));
+  }
+
+  /** The photo on the screen. */
+  #place() {
+    const photo = this.#current;
+    const room = { width: this.#pictures.clientWidth, height: this.#pictures.clientHeight };
+    if (!photo || !room.width || !room.height) return;
+    const sheet = sheetOf(photo, room, this.#near ? photo.box : null);
+    for (const side of /** @type {const} */ (["left", "top", "width", "height"]))
+      this.#sheet.style[side] = `${sheet[side]}px`;
   }
 
   /**
@@ -144,6 +175,11 @@ export class PhotoCheck extends LiveElement {
       this.#tools,
       segments("Stage", ...all.of.map((of) => button(OF[of], of === this.#of, () => (this.#of = of)))),
       segments("Look", ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look)))),
+      segments(
+        "What fills the picture",
+        button("Object", this.#near, () => (this.#near = true)),
+        button("Photo", !this.#near, () => (this.#near = false)),
+      ),
       h("span", { class: "spring" }),
       slider("Opacity", this.#opacity),
       this.#under.hidden ? "" : slider(`${OF[before]} ↔`, this.#split),
@@ -176,8 +212,11 @@ export class PhotoCheck extends LiveElement {
     const photo = this.#current;
     const box = this.#preview;
     this.#lines.replaceChildren();
-    if (!photo || !box) return;
+    if (!photo) return;
     this.#lines.setAttribute("viewBox", `0 0 ${photo.width} ${photo.height}`);
+    const here = this.#comments.filter(({ frame, object }) => frame === photo.frame && object === this.#object);
+    this.#lines.append(...here.map((comment) => this.#commentPin(comment, photo)));
+    if (!box) return;
     for (const { from, to, front } of boxEdges(box.pose, box.size, photo)) {
       const line = document.createElementNS(this.#lines.namespaceURI, "line");
       const at = { x1: from[0], y1: from[1], x2: to[0], y2: to[1] };
@@ -185,6 +224,18 @@ export class PhotoCheck extends LiveElement {
       line.setAttribute("class", front ? "front" : "side");
       this.#lines.append(line);
     }
+  }
+
+  /** @param {import("../api-types").Comment} comment @param {Photo} photo */
+  #commentPin({ x, y, text, who }, { width }) {
+    const pin = document.createElementNS(SVG, "circle");
+    for (const [name, value] of Object.entries({ cx: x ?? 0, cy: y ?? 0, r: PIN_R * width }))
+      pin.setAttribute(name, String(value));
+    pin.setAttribute("class", "pin");
+    const title = document.createElementNS(SVG, "title");
+    title.textContent = `${who}: ${text}`;
+    pin.append(title);
+    return pin;
   }
 
   /** @param {MouseEvent} event */
@@ -213,4 +264,13 @@ export class PhotoCheck extends LiveElement {
   #overlayUrl(photo, of, look) {
     return `/media/${this.project}/overlay/${this.#object}/${photo.frame}.png?of=${of}&look=${look}&v=${this.#all?.version ?? ""}`;
   }
+}
+
+/** How far its joints were open in the photo. @param {Photo} photo */
+function filmed({ states }) {
+  const said = states.map(({ joint, type, value }) => {
+    const alone = states.length === 1 ? "" : `${joint} `;
+    return value === null ? `${alone}not known` : `${alone}${jointValue(type, value)}`;
+  });
+  return said.length ? `, filmed open by ${said.join(", ")}` : "";
 }

@@ -76,6 +76,7 @@ export class ReviewPage extends LiveElement {
     on(this.#centre, "pin", (pin) => this.#comment(pin));
     on(this.#centre, "store", (patch) => this.#decisions.correct(patch));
     on(this.#decisions, "stored", (stored) => this.#stored(stored));
+    on(this.#comments, "comments", (open) => this.#centre.photos.setComments(open));
     on(this.#comments, "show-comment", (comment) => this.#showComment(comment));
     on(live, "review", again);
     on(live, "hello", ({ reset }) => reset && again());
