@@ -43,17 +43,20 @@ def serve(
     behind_proxy: Sequence[str] = (),
     quotas: Quotas = Quotas(),  # frozen
     adopt: bool = False,
+    import_from: Sequence[Path] = (),
 ) -> None:
     """Run the app until it is stopped; the address is printed first, with its key when only this machine reaches it.
 
     `names` are host names by which people reach it, where they differ from the address it listens on; `behind_proxy` are the
     addresses or networks of proxies whose word about who asks, and whether by TLS, is believed. `adopt` makes projects of
-    the folders that the database does not know, and a new database where there is none.
+    the folders that the database does not know, and a new database where there is none. `import_from` are folders that
+    recordings may be imported from by path, beside the home folder.
     """
     data_dir = resolved(data_dir)
     proxies = [_network(address) for address in behind_proxy]
     settings = _settings(data_dir, host, names, shared=bool(proxies))
     settings = replace(settings, heavy_jobs=heavy_jobs, workers=workers, max_upload_bytes=max_upload_bytes, quotas=quotas)
+    settings = replace(settings, import_roots=(*settings.roots, *(resolved(folder) for folder in import_from)))
     keep_private(data_dir, DATABASE)
     with only_server(data_dir) as announce, _bound(host, port) as listening:
         with opened(settings.database, anew=adopt) as engine:  # what is wrong with it is said before an address is

@@ -74,7 +74,8 @@ def allowed_path(context: Context, path: str) -> Path:
         raise Forbidden(f"{resolved} is in a hidden folder", hint="recordings are taken from folders that are shown")
     if not _is_allowed(context, resolved):
         roots = ", ".join(str(root) for root in context.settings.roots)
-        raise Forbidden(f"{resolved} is outside the folders recordings may come from", hint=f"allowed: {roots}")
+        hint = f"allowed: {roots}; `r2c2r serve --import-from DIR` allows another one"
+        raise Forbidden(f"{resolved} is outside the folders recordings may come from", hint=hint)
     return resolved
 
 

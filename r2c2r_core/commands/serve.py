@@ -1,8 +1,9 @@
 """`r2c2r serve`."""
 
 import argparse
+from pathlib import Path
 
-from r2c2r_core.commands.options import Parsers, add_command, add_data, port, web_module, whole
+from r2c2r_core.commands.options import Parsers, add_command, add_data, existing, port, web_module, whole
 
 
 def add(parsers: Parsers) -> None:
@@ -18,6 +19,8 @@ def add(parsers: Parsers) -> None:
     quota = "what one person may have at a time: jobs, uploads, upload_gb, samples, projects"
     added.add_argument("--quota", action="append", default=[], metavar="NAME=N", help=quota)
     added.add_argument("--adopt", action="store_true", help="make projects of folders that the database does not know")
+    folder = "recordings may be imported by path from this folder too, beside the home folder"
+    added.add_argument("--import-from", type=Path, action="append", default=[], metavar="DIR", help=folder)
     added.add_argument("--name", action="append", default=[], metavar="HOST", help="another name people reach it by")
     trust = "believe what the proxy at this address says of who asks, and whether by TLS (X-Forwarded-For, X-Forwarded-Proto)"
     added.add_argument("--behind-proxy", action="append", default=[], metavar="ADDRESS", help=trust)
@@ -41,6 +44,7 @@ def serve(options: argparse.Namespace) -> int:
         names=options.name,
         behind_proxy=options.behind_proxy,
         adopt=options.adopt,
+        import_from=[existing(folder) for folder in options.import_from],
         **limits,
     )
     return 0

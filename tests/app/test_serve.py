@@ -15,6 +15,7 @@ import pytest
 from app.db.engine import open_engine
 from app.serve import serve
 from app.services import accounts, audit
+from app.settings import Settings
 from r2c2r_core.cli import main
 from r2c2r_core.errors import EnvironmentProblem, InputError
 from tests.app.conftest import Running
@@ -164,3 +165,27 @@ def _answers(address: str) -> bool:
             return bool(json.load(answer)["state"] == "ok")
     except OSError:
         return False
+
+
+def test_another_folder_is_allowed_to_import_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class _StoppedError(Exception):
+        """Before anything is served."""
+
+    roots: list[Path] = []
+
+    def create(settings: Settings) -> None:
+        roots.extend(settings.roots)
+        raise _StoppedError
+
+    monkeypatch.setattr("app.serve.create_app", create)
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    with pytest.raises(_StoppedError):
+        serve(host="127.0.0.1", port=0, data_dir=tmp_path / "data", import_from=[scans])
+    assert roots == [Path.home(), tmp_path / "data", scans]
+
+
+def test_a_folder_to_import_from_that_is_not_there_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "--data", str(tmp_path), "--import-from", str(tmp_path / "none")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "none: no such file or folder" in line

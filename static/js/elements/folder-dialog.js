@@ -1,6 +1,6 @@
-/** Choose a recording on the server's machine. Emits "choose" with the path. */
+/** Import a recording on the server's machine: a refused path stays as it was typed, with the reason. Emits "imported" with the project. */
 
-import { browse } from "../api.js";
+import { ApiError, browse, importPath } from "../api.js";
 import { h, LiveElement } from "../dom.js";
 import { bytes } from "../lib/format.js";
 import { sayError } from "./toasts.js";
@@ -12,14 +12,16 @@ export class FolderDialog extends LiveElement {
     placeholder: "/path/to/scan.r3d or a folder",
     "aria-label": "Path on this machine",
   });
+  #refusal = h("p", { role: "alert", class: "failure", hidden: true });
+  #import = h("button", { class: "primary", type: "submit" }, "Import this");
   #list = h("ul", { class: "folder-list" });
 
   connected() {
     const form = h(
       "form",
-      { class: "row", onSubmit: (/** @type {Event} */ event) => this.#submit(event) },
+      { class: "path", onSubmit: (/** @type {Event} */ event) => this.#submit(event) },
       this.#path,
-      h("button", { class: "primary", type: "submit" }, "Import this"),
+      this.#import,
     );
     const close = h("button", { type: "button", onClick: () => this.#dialog.close() }, "Cancel");
     this.#dialog.replaceChildren(
@@ -29,22 +31,42 @@ export class FolderDialog extends LiveElement {
         { class: "muted" },
         "A .r3d file, a zip, or the folder of an export. Nothing is copied until you import it.",
       ),
-      h("div", { class: "stack" }, form, this.#list, h("div", {}, close)),
+      h("div", { class: "stack" }, form, this.#refusal, this.#list, h("div", {}, close)),
     );
     this.replaceChildren(this.#dialog);
   }
 
   open() {
+    this.#refuse(null);
     this.#dialog.showModal();
     this.#show("");
   }
 
   /** @param {Event} event */
-  #submit(event) {
+  async #submit(event) {
     event.preventDefault();
-    if (!this.#path.value.trim()) return;
-    this.#dialog.close();
-    this.emit("choose", this.#path.value.trim());
+    const path = this.#path.value.trim();
+    if (!path) return;
+    this.#import.disabled = true;
+    try {
+      const project = await importPath(path);
+      this.#dialog.close();
+      this.emit("imported", project);
+    } catch (error) {
+      this.#refuse(error);
+    } finally {
+      this.#import.disabled = false;
+    }
+  }
+
+  /** @param {unknown} error why the path cannot be imported; null: nothing is wrong */
+  #refuse(error) {
+    this.#refusal.hidden = error === null;
+    const hint = error instanceof ApiError ? error.hint : "";
+    this.#refusal.replaceChildren(
+      h("strong", {}, error instanceof Error ? error.message : ""),
+      h("span", {}, hint && ` ${hint}`),
+    );
   }
 
   /** @param {string} path */

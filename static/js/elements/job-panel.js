@@ -1,6 +1,6 @@
 /** One job: stages, progress, time left, cancel, retry, log. */
 
-import { cancelJob, getJobLog, retryJob } from "../api.js";
+import { cancelJob, getJobEvents, getJobLog, retryJob } from "../api.js";
 import { h, LiveElement } from "../dom.js";
 import { duration } from "../lib/format.js";
 import { sayError } from "./toasts.js";
@@ -23,7 +23,9 @@ export class JobPanel extends LiveElement {
 
   /** @param {Job | null} job */
   set job(job) {
+    const further = job?.id === this.#job?.id && (job?.state !== this.#job?.state || job?.stage !== this.#job?.stage);
     this.#job = job;
+    if (job && further && !this.#log.hidden) this.#readLog(job.id).catch(sayError);
     this.#draw();
   }
 
@@ -74,6 +76,16 @@ export class JobPanel extends LiveElement {
     return h("p", { role: "alert", class: "failure" }, h("strong", {}, error.message), h("span", {}, error.hint ?? ""));
   }
 
+  /** What its processes wrote; before they wrote anything, what it did. @param {number} job */
+  async #readLog(job) {
+    const text = await getJobLog(job);
+    const events = text ? [] : await getJobEvents(job);
+    const lines = events.map(
+      ({ at, stage, text: line }) => `${new Date(1000 * at).toLocaleTimeString()}  ${stage.padEnd(11)} ${line}`,
+    );
+    this.#log.textContent = text || lines.join("\n") || "Nothing has been written yet.";
+  }
+
   /**
    * @param {Job} job
    * @param {boolean} running
@@ -90,7 +102,7 @@ export class JobPanel extends LiveElement {
     if (job.has_log) {
       add(this.#log.hidden ? "Show the log" : "Hide the log", async () => {
         this.#log.hidden = !this.#log.hidden;
-        if (!this.#log.hidden) this.#log.textContent = (await getJobLog(job.id)) || "The log is empty.";
+        if (!this.#log.hidden) await this.#readLog(job.id);
         this.#draw();
       });
     }

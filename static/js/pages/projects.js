@@ -5,7 +5,6 @@ import {
   changeProject,
   deleteProject,
   getSystem,
-  importPath,
   listProjects,
   listUploads,
   makeSample,
@@ -64,7 +63,7 @@ export class ProjectsPage extends LiveElement {
     );
     const { signal } = this;
     this.#picker.addEventListener("change", () => this.#send(this.#picker.files?.[0]), { signal });
-    this.#folders.addEventListener("choose", (event) => this.#import(detailOf(event)), { signal });
+    this.#folders.addEventListener("imported", (event) => go(`/p/${detailOf(event).id}`), { signal });
     this.addEventListener("dragover", (event) => this.#dragging(event), { signal });
     this.addEventListener("dragleave", () => this.classList.remove("dropping"), { signal });
     this.addEventListener("drop", (event) => this.#drop(event), { signal });
@@ -160,15 +159,6 @@ export class ProjectsPage extends LiveElement {
   async #sample() {
     try {
       go(`/p/${(await makeSample({})).id}`);
-    } catch (error) {
-      sayError(error);
-    }
-  }
-
-  /** @param {string} path */
-  async #import(path) {
-    try {
-      go(`/p/${(await importPath(path)).id}`);
     } catch (error) {
       sayError(error);
     }

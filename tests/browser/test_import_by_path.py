@@ -1,0 +1,36 @@
+"""A recording on the server's machine: a refused path stays with its reason, one from a folder that was allowed comes in."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.together import Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    (tmp_path / "data").mkdir()
+    with Server(tmp_path / "data") as running:
+        yield running
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_refused_path_stays_and_says_what_allows_it(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    page.get_by_role("button", name="From this machine…").click()
+    field = page.get_by_label("Path on this machine")
+    box = field.bounding_box()
+    assert box is not None
+    assert box["width"] > 480  # some 60 characters
+    field.fill("/usr/share/kitchen.r3d")
+    field.press("Enter")
+    alert = page.get_by_role("dialog").get_by_role("alert")
+    expect(alert).to_contain_text("/usr/share/kitchen.r3d is outside the folders recordings may come from")
+    expect(alert).to_contain_text("--import-from DIR")
+    expect(field).to_have_value("/usr/share/kitchen.r3d")
+    picture(page, f"import-refused-{theme}")
+    context.close()

@@ -1,0 +1,36 @@
+"""The log of a job says what it did, also before its processes wrote anything."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_together import sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with Server(tmp_path) as running:
+        yield running
+
+
+def test_a_running_and_a_cancelled_job_have_a_log(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    folder = server.data / "projects" / project.split("/p/")[1]
+    (folder / "behave.json").write_text(json.dumps({"align": "hang"}))
+    page.goto(f"{project}/run")
+    page.get_by_role("button", name="Run", exact=True).click()
+    expect(page.locator("r2c2r-job li", has_text="align")).to_contain_text("running")
+    page.get_by_role("button", name="Show the log").click()
+    log = page.get_by_label("Log")
+    expect(log).to_contain_text("align")
+    expect(log).not_to_contain_text("empty")
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator("r2c2r-job")).to_contain_text("cancelled")
+    expect(log).to_contain_text("cancelled")
+    context.close()
