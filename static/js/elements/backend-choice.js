@@ -8,7 +8,7 @@ import { h, LiveElement } from "../dom.js";
 
 /** @type {Record<Seam, [string, string]>} title and what to know */
 const TITLES = {
-  segmenter: ["Masks", "Who draws them; both sets are kept when you change your mind"],
+  segmenter: ["Masks", "The method that makes them; the masks of both are kept when you switch"],
   generator: ["Candidates", "Who makes the meshes; the next run uses it"],
   matcher: ["Alignment", "Who finds a mesh's place in the photos; the next run uses it"],
 };

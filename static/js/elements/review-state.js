@@ -83,7 +83,9 @@ export class ReviewState extends LiveElement {
     const move = (status.state === seen.state && status.moves.find(({ to }) => to === wanted.to)) || wanted;
     let reason = "";
     if (move.unmet.length || move.needs_reason) {
-      const label = move.unmet.length ? "Why all the same? The history keeps it." : "What has to change?";
+      const label = move.unmet.length
+        ? "Reason for going on with open points (kept in the history)"
+        : "What has to change?";
       const given = await askForText(move.text, label, { button: move.text, notes: move.unmet });
       if (!given) return;
       reason = given;

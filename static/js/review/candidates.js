@@ -6,7 +6,7 @@ import { counted } from "../lib/format.js";
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Candidate} Candidate */
 
-/** @typedef {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void }} Told */
+/** @typedef {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void, judges: boolean }} Told */
 
 /**
  * A card of each, the one that is used first.
@@ -74,12 +74,7 @@ function card(group, candidate, current, told) {
       evidence(candidate),
       said ? h("div", { class: "muted" }, said) : "",
       ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
-      h(
-        "div",
-        { class: "verdicts" },
-        verdict(candidate, "accepted", told.verdict),
-        verdict(candidate, "rejected", told.verdict),
-      ),
+      h("div", { class: "verdicts" }, verdict(candidate, "accepted", told), verdict(candidate, "rejected", told)),
     ),
   );
 }
@@ -95,7 +90,7 @@ function evidence({ metrics, watertight, faces, generator }) {
   }
   if (metrics.seen_fraction !== undefined) figures.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
   if (metrics.extent_middle !== undefined && metrics.extent_short !== undefined) {
-    figures.push([`1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
+    figures.push([`proportions 1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
   }
   figures.push(
     [watertight ? "watertight" : "not watertight", !watertight],
@@ -115,17 +110,17 @@ function evidence({ metrics, watertight, faces, generator }) {
 /**
  * @param {Candidate} candidate
  * @param {"accepted" | "rejected"} said
- * @param {Told["verdict"]} told
+ * @param {Told} told
  */
 function verdict(candidate, said, told) {
   const [name, text] = said === "accepted" ? ["check", "Accept"] : ["cross", "Reject"];
   const button = h(
     "button",
-    { type: "button", value: said, "aria-pressed": String(candidate.verdict === said) },
+    { type: "button", disabled: !told.judges, value: said, "aria-pressed": String(candidate.verdict === said) },
     icon(name ?? ""),
     text,
   );
   button.dataset.at = `${said}:${candidate.id}`;
-  button.addEventListener("click", () => told(candidate, said));
+  button.addEventListener("click", () => told.verdict(candidate, said));
   return button;
 }

@@ -13,10 +13,10 @@ const DEGREES = Math.PI / 180;
 /**
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
- * @param {{ move: (() => void) | null, open: boolean }} how `move` begins to move it: null where there is no box yet
+ * @param {{ move: (() => void) | null, open: boolean, judges: boolean }} how `move` begins to move it: null where there is no box yet
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
-export function corrections(group, item, { move, open }, change) {
+export function corrections(group, item, { move, open, judges }, change) {
   const summary = h("summary", {}, "Correct it");
   summary.dataset.at = "correct:";
   return h(
@@ -24,8 +24,8 @@ export function corrections(group, item, { move, open }, change) {
     { open: open || hasCorrection(group) },
     summary,
     h(
-      "div",
-      { class: "stack" },
+      "fieldset",
+      { class: "stack plain", disabled: !judges },
       side(group, item, change),
       ...limits(group, item, change),
       move && h("button", { type: "button", onClick: move }, "Move or resize it…"),

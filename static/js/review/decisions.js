@@ -14,6 +14,8 @@ import { outbox } from "../outbox.js";
 /** @typedef {import("../api-types").Reviewed} Reviewed */
 /** @typedef {"accepted" | "rejected"} Verdict */
 
+export const REVIEWERS = "A reviewer accepts, rejects and corrects; you can comment.";
+
 export class Decisions extends EventTarget {
   #objects;
 
@@ -41,7 +43,7 @@ export class Decisions extends EventTarget {
    */
   async judge(candidate, said) {
     const { group } = this.#objects;
-    if (!group) return;
+    if (!group || !this.#may()) return;
     const again = candidate.verdict === said;
     const reason = said === "rejected" && !again ? await askWhy(candidate) : "";
     if (reason === null) return;
@@ -54,10 +56,16 @@ export class Decisions extends EventTarget {
     await this.#objects.load();
   }
 
+  /** Whether who looks may decide; says who may. */
+  #may() {
+    if (!this.#objects.judges) say(REVIEWERS);
+    return this.#objects.judges;
+  }
+
   /** @param {Partial<OverridePatch>} patch */
   correct(patch) {
     const { group } = this.#objects;
-    if (group) this.#report(outbox.send(changeOverride(this.#project, group, patch)));
+    if (group && this.#may()) this.#report(outbox.send(changeOverride(this.#project, group, patch)));
   }
 
   /** Another draw of candidates beside those that are there. */

@@ -22,7 +22,7 @@ export function placement(placement, item) {
     ["To the scan", placement.rms_m === null ? "no depth" : `${(1000 * placement.rms_m).toFixed(1)} mm rms`],
     ["Silhouette", `${(100 * placement.mask_iou).toFixed(0)} % overlap`],
     ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
-    ["Held to", held(placement.spread)],
+    ["Uncertainty", held(placement.spread)],
     ["Runner-up", runnerUp(placement)],
   ];
   if (item) rows.push(["W × D × H", `${item.dimensions_m.map(centimetres).join(" × ")} cm`]);

@@ -3,7 +3,7 @@
  * Says "change" when any of it is to be drawn anew, "choose" when another object is looked at.
  */
 
-import { getCertificate, getScene, listCandidates } from "../api.js";
+import { getCertificate, getScene, getSystem, listCandidates } from "../api.js";
 import { sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
 
@@ -24,6 +24,8 @@ export class ReviewObjects extends EventTarget {
   items = [];
   /** @type {Certificate | null} */
   certificate = null;
+  /** Whether who looks may accept, reject and correct. */
+  judges = true;
   /** Objects that were accepted here and are not stored yet, with the candidate. @type {Map<number, string>} */
   #accepting = new Map();
   #answers = new Answers();
@@ -36,8 +38,10 @@ export class ReviewObjects extends EventTarget {
         listCandidates(this.project),
         getScene(this.project).catch(orNone),
         getCertificate(this.project).catch(orNone),
+        getSystem(),
       ]);
-      await this.#answers.take(all, ([groups, scene, certificate]) => {
+      await this.#answers.take(all, ([groups, scene, certificate, { role }]) => {
+        this.judges = role !== "annotator";
         this.groups = groups.map((group) => this.#asSaid(group));
         this.items = scene?.items ?? [];
         this.certificate = certificate;

@@ -4,6 +4,7 @@ import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
 import { cards, choice } from "./candidates.js";
 import { corrections } from "./corrections.js";
+import { REVIEWERS } from "./decisions.js";
 import { findingsOf, placement } from "./evidence.js";
 
 /** @typedef {import("../api-types").Candidate} Candidate */
@@ -28,27 +29,34 @@ export function panel(objects, decisions, asked, correcting) {
   const { group, item, groups, certificate, candidate } = objects;
   if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
   const names = groups.map(({ run_name }) => run_name);
-  const told = { show: asked.show, verdict: decisions.judge.bind(decisions) };
+  const { judges } = objects;
+  const told = { show: asked.show, verdict: decisions.judge.bind(decisions), judges };
   const [used, ...rest] = cards(group, candidate, told);
   return [
-    heading(group, decisions),
+    heading(group, decisions, judges),
+    judges ? "" : h("p", { class: "muted" }, REVIEWERS),
     used ?? "",
     choice(group),
     group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
     findingsOf(certificate, group.run_name, names),
-    corrections(group, item, { move: asked.move, open: correcting }, (patch) => decisions.correct(patch)),
+    corrections(group, item, { move: asked.move, open: correcting, judges }, (patch) => decisions.correct(patch)),
     rest.length ? h("h3", {}, counted(rest.length, "other candidate")) : "",
     ...rest,
-    others(group, decisions, asked),
+    others(group, decisions, asked, judges),
   ];
 }
 
 /**
  * @param {CandidateGroup} group
  * @param {Decisions} decisions
+ * @param {boolean} judges
  */
-function heading(group, decisions) {
-  const undo = h("button", { class: "quiet", disabled: !group.can_undo, "aria-label": "Undo" }, icon("undo"));
+function heading(group, decisions, judges) {
+  const undo = h(
+    "button",
+    { class: "quiet", disabled: !group.can_undo || !judges, "aria-label": "Undo" },
+    icon("undo"),
+  );
   undo.dataset.at = "undo:";
   undo.addEventListener("click", () => decisions.undoRedo("undo"));
   const category = h("span", { class: "chip" }, group.category);
@@ -60,14 +68,20 @@ function heading(group, decisions) {
  * @param {CandidateGroup} group
  * @param {Decisions} decisions
  * @param {Asked} asked
+ * @param {boolean} judges
  */
-function others(group, decisions, { comment }) {
+function others(group, decisions, { comment }, judges) {
   const mesh = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
   mesh.addEventListener("change", () => mesh.files?.[0] && decisions.upload(mesh.files[0]));
   /** @type {[string, string, () => void, string][]} */
   const buttons = [
-    ["more", "More candidates", () => decisions.more(), group.can_regenerate ? "" : "no further ones are made"],
-    ["upload", "Upload a mesh…", () => mesh.click(), ""],
+    [
+      "more",
+      "More candidates",
+      () => decisions.more(),
+      judges && group.can_regenerate ? "" : "no further ones are made",
+    ],
+    ["upload", "Upload a mesh…", () => mesh.click(), judges ? "" : REVIEWERS],
     ["comment", "Comment", comment, ""],
   ];
   const made = buttons.map(([at, text, act, not]) => {

@@ -1,0 +1,43 @@
+"""Who may not decide sees no button that would be refused, and can comment."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from app.db.engine import open_engine
+from app.services import accounts
+from tests.app.nouns import finish
+from tests.browser.test_journey import picture
+from tests.browser.test_together import sample
+from tests.browser.together import PASSWORD, Server, signed_in
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    made = Server(tmp_path)
+    engine = open_engine(tmp_path / "r2c2r.db")
+    accounts.add(engine, "cleo", "annotator", PASSWORD)
+    engine.dispose()
+    with made as running:
+        yield running
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_an_annotator_is_told_that_a_reviewer_decides(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "cleo")
+    project = sample(page)
+    finish(server.data / "projects" / project.split("/p/")[1] / "work")
+    page.goto(f"{project}/review")
+    expect(page.get_by_text("A reviewer accepts, rejects and corrects; you can comment.")).to_be_visible()
+    for name in ("Accept", "Reject", "More candidates", "Upload a mesh…"):
+        expect(page.get_by_role("button", name=name, exact=True).first).to_be_disabled()
+    page.get_by_text("Correct it").click()
+    expect(page.get_by_role("combobox").first).to_be_disabled()
+    expect(page.get_by_role("button", name="Comment", exact=True)).to_be_enabled()
+    page.keyboard.press("y")
+    expect(page.locator(".toast", has_text="A reviewer accepts")).to_be_visible()
+    picture(page, f"annotator-{theme}")
+    context.close()
