@@ -6,16 +6,24 @@
 
 import { h, icon, LiveElement, renew } from "../dom.js";
 import { inkOn } from "../lib/colour.js";
+import { matches } from "../lib/filter.js";
 import { counted, usableName } from "../lib/format.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {import("../lib/contradictions.js").Said} Said */
 /** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => Said[] }} View */
 
+const MANY = 9; // objects, from which they are searched through
+
 export class ObjectList extends LiveElement {
   #list = h("ul", { class: "object-list" });
   #categories = h("datalist", { id: "categories" });
   #new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
+  #search = h("input", { type: "search", placeholder: "Name or category", "aria-label": "Find objects" });
+  #found = h("span", { class: "muted", role: "status" });
+  #find = h("div", { class: "find", hidden: true }, this.#search, this.#found);
+  /** What is drawn again when something else is searched for. */
+  #again = () => {};
   #drawn = "";
   /** @type {number | null} whose line was brought into sight */
   #shown = null;
@@ -23,7 +31,12 @@ export class ObjectList extends LiveElement {
   #waiting = null;
 
   connected() {
-    this.replaceChildren(this.#new, this.#list, this.#categories);
+    this.replaceChildren(h("div", { class: "list-head" }, this.#new, this.#find), this.#list, this.#categories);
+    const search = () => {
+      this.#again();
+      this.parentElement?.scrollTo(0, 0); // to what was found
+    };
+    this.#search.addEventListener("input", search, { signal: this.signal });
     this.#new.addEventListener("click", () => this.emit("pick-object", null), { signal: this.signal });
     this.addEventListener("focusout", () => setTimeout(() => this.#waiting?.()), { signal: this.signal });
   }
@@ -46,12 +59,20 @@ export class ObjectList extends LiveElement {
       this.#waiting = () => this.setObjects(objects, view);
       return;
     }
+    this.#again = () => this.setObjects(objects, view);
     this.#new.setAttribute("aria-pressed", String(current === null));
-    const state = JSON.stringify([objects, current, objects.map(isHidden), objects.map(view.contradicted)]);
+    const typed = this.#search.value.trim();
+    const state = JSON.stringify([typed, objects, current, objects.map(isHidden), objects.map(view.contradicted)]);
     if (state === this.#drawn) return;
     this.#drawn = state;
     const none = h("li", { class: "muted none" }, "Click a drawer, a door or a thing in the picture.");
-    renew(this.#list, ...(objects.length ? objects.map((object, k) => this.#item(object, k + 1, view)) : [none]));
+    const found = objects.flatMap((object, k) => {
+      const shown = object.id === current || matches(typed, [object.name, object.category]);
+      return shown ? [this.#item(object, k + 1, view)] : [];
+    });
+    this.#find.hidden = objects.length < MANY && !typed;
+    this.#found.textContent = `${found.length} of ${objects.length}`;
+    renew(this.#list, ...(objects.length ? found : [none]));
     if (this.#shown !== current) this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
     this.#shown = current;
   }

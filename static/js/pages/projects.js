@@ -11,6 +11,7 @@ import {
   uploadRecording,
 } from "../api.js";
 import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { matches } from "../lib/filter.js";
 import { FolderDialog } from "../elements/folder-dialog.js";
 import { stateChip as stateOf } from "../elements/review-state.js";
 import { say, sayError } from "../elements/toasts.js";
@@ -22,6 +23,13 @@ import { go } from "../router.js";
 
 /** @typedef {import("../api-types").ProjectSummary} Project */
 
+/** @type {Record<string, (a: Project, b: Project) => number>} beside last changed first, as they come */
+const ORDERS = {
+  name: (a, b) => a.name.localeCompare(b.name),
+  size: (a, b) => b.size_bytes - a.size_bytes,
+};
+const MANY = 4; // projects, from which they are searched through
+
 export class ProjectsPage extends LiveElement {
   #answers = new Answers();
   #cards = h("ul", { class: "cards" });
@@ -30,6 +38,20 @@ export class ProjectsPage extends LiveElement {
   #unknown = new UnknownList();
   #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
   #folders = new FolderDialog();
+  /** @type {Project[]} */
+  #projects = [];
+  #search = h("input", { type: "search", placeholder: "Name", "aria-label": "Find projects" });
+  #sort = h(
+    "select",
+    { "aria-label": "Order of the projects" },
+    ...[
+      ["", "Last changed first"],
+      ["name", "By name"],
+      ["size", "Largest first"],
+    ].map(([value, text]) => h("option", { value }, text ?? "")),
+  );
+  #count = h("span", { class: "muted", role: "status" });
+  #find = h("div", { class: "row find-projects", hidden: true }, this.#search, this.#sort, this.#count);
   #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
   #admin = true;
   #limit = Infinity;
@@ -56,6 +78,7 @@ export class ProjectsPage extends LiveElement {
         this.#upload,
         this.#stopped,
         this.#unknown,
+        this.#find,
         this.#cards,
       ),
       this.#picker,
@@ -68,6 +91,8 @@ export class ProjectsPage extends LiveElement {
     this.addEventListener("dragleave", () => this.classList.remove("dropping"), { signal });
     this.addEventListener("drop", (event) => this.#drop(event), { signal });
     for (const type of ["projects", "project", "job"]) live.addEventListener(type, () => this.#load(), { signal });
+    this.#search.addEventListener("input", () => this.#show(this.#projects), { signal });
+    this.#sort.addEventListener("change", () => this.#show(this.#projects), { signal });
     getSystem().then((system) => this.#allow(system), sayError);
     this.#load();
     this.#showStopped();
@@ -84,14 +109,21 @@ export class ProjectsPage extends LiveElement {
 
   async #load() {
     try {
-      await this.#answers.take(listProjects(this.signal), (projects) =>
-        this.#cards.replaceChildren(
-          ...(projects.length ? projects.map((project) => this.#card(project)) : [this.#empty()]),
-        ),
-      );
+      await this.#answers.take(listProjects(this.signal), (projects) => this.#show(projects));
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /** @param {Project[]} projects last touched first */
+  #show(projects) {
+    this.#projects = projects;
+    this.#find.hidden = projects.length < MANY && !this.#search.value;
+    const found = projects.filter(({ name }) => matches(this.#search.value.trim(), [name]));
+    const order = ORDERS[this.#sort.value];
+    const sorted = order ? found.toSorted(order) : found;
+    this.#count.textContent = `${found.length} of ${projects.length}`;
+    this.#cards.replaceChildren(...(projects.length ? sorted.map((project) => this.#card(project)) : [this.#empty()]));
   }
 
   #empty() {
