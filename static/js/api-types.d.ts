@@ -481,7 +481,7 @@ export interface ObjectPatch {
   version?: number | null;
 }
 
-/** The photos to check an object on, whole ones first, then by confidence; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
+/** The photos to check an object on, whole ones first, then the surest; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
 export interface ObjectPhotos {
   photos: Photo[];
   version: string;
