@@ -11,6 +11,7 @@ from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
+from r2c2r_core.segment.fronts.clicked_open import closed_place
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
@@ -41,7 +42,8 @@ def find_object(
     `others` (n, 3) are points of other objects that were clicked on.
     """
     if category.kind == "front":
-        found = _front(prepared, category, positives.points, negatives.points, others)
+        closed = [closed_place(prepared, p, c.frame) for p, c in zip(positives.points, positives.clicks, strict=True)]
+        found = _front(prepared, category, np.array(closed), negatives.points, others)
         if found is not None:
             return found
     if category.kind == "appliance":

@@ -41,3 +41,17 @@ def test_a_door_open_in_the_last_frames_tells_its_hinge_and_its_angle(tmp_path: 
     np.testing.assert_allclose(angles, 60.0, atol=2.0)
     overlap = [mask_iou(unpack_mask(track.masks[f]), truth["door_c"][f]) for f in track.opened_frames]
     assert np.mean(overlap) > 0.85
+
+
+def test_clicks_on_what_stands_open_mean_what_is_closed_there(tmp_path: Path) -> None:
+    """The same click on a front, where it is closed and where it stands open for a while."""
+    capture, _ = kitchen(OUT_M, from_step=12)
+    session = open_session(capture, tmp_path)
+    closed, opened = (
+        session.track(prompt("drawer_mid", "drawer", click_on(capture, (1.5, y, 0.5), frame))).front
+        for y, frame in ((FRONT_Y, 20), (FRONT_Y - OUT_M, 120))
+    )
+    assert closed is not None
+    assert opened is not None
+    np.testing.assert_allclose(opened.world_from_front.matrix, closed.world_from_front.matrix, atol=0.005)
+    assert (opened.width_m, opened.height_m) == pytest.approx((closed.width_m, closed.height_m), abs=0.01)
