@@ -266,7 +266,7 @@ class LineField:
         a rail of a frame follows.
         """
         params, worth = self.params, np.zeros(stop - start)
-        borders = self._bordersacross(cell, axis)
+        borders = self._borders(cell, axis)
         if borders is None or np.median(borders, axis=1).min() <= 0:
             return worth
         sums, blur = np.cumsum(np.pad(borders, ((0, 0), (1, 0))), axis=1), round(params.blur_m / self.cell_m)
@@ -280,7 +280,7 @@ class LineField:
             worth[inside] = np.maximum(worth[inside], np.clip(absent * part, 0, params.crossed))
         return np.where(paths.odds.mean(axis=0) > params.possible, worth, 0)
 
-    def _bordersacross(self, cell: Cell, axis: int) -> np.ndarray | None:
+    def _borders(self, cell: Cell, axis: int) -> np.ndarray | None:
         """Odds (2, positions) of a cell's borders across the lines of an axis; None at the end of the grid."""
         span, odds = self._span(cell, 1 - axis), self.odds[1 - axis]
         at = [round(border / STEP - 0.5) for border in across(cell, 1 - axis)]
