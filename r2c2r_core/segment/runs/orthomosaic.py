@@ -35,9 +35,7 @@ class Params:
     least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
     part_m: float = param(0.1, "m", "between the points of a plane by which views of it are judged", gt=0)
     past_m: float = param(0.05, "m", "behind the plane, from where a view looks past it: deeper than a panel is sunk")
-    shut: float = param(
-        0.15, "share", "of the views of a part that must show it, for those that look past to have found it open"
-    )
+    seldom: float = param(0.5, "share", "of the views of a part, below which those that look past it found it open", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,10 +154,7 @@ def frame_quality(grid: PlaneGrid, parts: np.ndarray, scene: Scene) -> np.ndarra
 
 
 def open_parts(grid: PlaneGrid, parts: np.ndarray, scene: Scene) -> np.ndarray:
-    """Parts (frames, parts) that a frame looks past and others do not: a front is open there, and its inside shows.
-
-    What nearly all look past is no front, or glass.
-    """
+    """Parts (frames, parts) that a frame looks past and most others do not: a front is open there, and its inside shows."""
     params, points = tuned(Params), grid.points_at(parts)
     if len(points) == 0:
         return np.zeros((len(scene.frames), 0), bool)
@@ -167,7 +162,7 @@ def open_parts(grid: PlaneGrid, parts: np.ndarray, scene: Scene) -> np.ndarray:
     z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
     past = scene.noise.seen_through(seen, z, params.past_m)
     there = scene.noise.agrees(seen, z, params.past_m)
-    return np.asarray(past & (there.sum(axis=0) > params.shut * (past | there).sum(axis=0)))
+    return np.asarray(past & (past.sum(axis=0) < params.seldom * (past | there).sum(axis=0)))
 
 
 def choose_frames(quality: np.ndarray, scene: Scene, count: int) -> list[int]:
