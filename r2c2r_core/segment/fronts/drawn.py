@@ -15,15 +15,7 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
 from r2c2r_core.segment.runs.handles import GridHandle
 from r2c2r_core.segment.runs.lines import gather, scored
-from r2c2r_core.segment.runs.orthomosaic import (
-    Cell,
-    PlaneGrid,
-    choose_frames,
-    frame_quality,
-    make_tile,
-    open_parts,
-    plane_parts,
-)
+from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, choose_frames, frame_quality, make_tile
 from r2c2r_core.segment.runs.relief import measure_relief
 from r2c2r_core.segment.runs.run import Run, run_on
 from r2c2r_core.segment.scene import Scene
@@ -74,9 +66,7 @@ def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]
 def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
     """What `make_run` gives, of one known panel."""
     region = _region(grid, cell)
-    parts = plane_parts(grid, region)
-    quality = np.where(open_parts(grid, parts, scene), 0.0, frame_quality(grid, parts, scene))
-    chosen = choose_frames(quality, scene, frame_count)
+    chosen = choose_frames(frame_quality(grid, region, scene), scene, frame_count)
     tiles = [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
     if not tiles:
         raise ObjectNotSeen(

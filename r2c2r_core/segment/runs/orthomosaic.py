@@ -8,7 +8,6 @@ import numpy as np
 from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
@@ -33,9 +32,6 @@ class Params:
     odd_lab: float = param(25.0, "grey", "off what most frames show, from where a frame counts little", gt=0)
     odd_weight: float = param(0.02, "share", "of its weight that such a frame keeps", gt=0)
     least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
-    part_m: float = param(0.1, "m", "between the points of a plane by which views of it are judged", gt=0)
-    past_m: float = param(0.05, "m", "behind the plane, from where a view looks past it: deeper than a panel is sunk")
-    seldom: float = param(0.5, "share", "of the views of a part, below which those that look past it found it open", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,32 +133,15 @@ def support_on(grid: PlaneGrid, region: PlaneRegion, reach_m: float) -> np.ndarr
     return cv2.resize(seen, (grid.columns, grid.rows), interpolation=cv2.INTER_NEAREST) > 0
 
 
-def plane_parts(grid: PlaneGrid, region: PlaneRegion) -> np.ndarray:
-    """Grid positions (n, 2), evenly spaced, of what the scan saw of a region."""
-    spacing = min(tuned(Params).part_m, region.width_m / 2, region.height_m / 2) / grid.cell_m
+def frame_quality(grid: PlaneGrid, region: PlaneRegion, scene: Scene) -> np.ndarray:
+    """How well each frame sees each coarse part of a region (frames, parts): large, sharp and frontal is best, 0 not at all."""
+    spacing = min(0.1, region.width_m / 2, region.height_m / 2) / grid.cell_m
     column, row = np.meshgrid(np.arange(spacing / 2, grid.columns, spacing), np.arange(spacing / 2, grid.rows, spacing))
-    parts = np.stack([column.ravel(), row.ravel()], axis=1)
-    return parts[region.supports(grid.points_at(parts), 0.03)]
-
-
-def frame_quality(grid: PlaneGrid, parts: np.ndarray, scene: Scene) -> np.ndarray:
-    """How well each frame sees each part of a plane (frames, parts): large, sharp and frontal is best, 0 not at all."""
-    points = grid.points_at(parts)
+    points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
+    points = points[region.supports(points, 0.03)]
     if len(points) == 0:
         return np.zeros((len(scene.frames), 0))
     return np.stack([_view_quality(points, grid.outward, frame, scene) for frame in scene.frames])
-
-
-def open_parts(grid: PlaneGrid, parts: np.ndarray, scene: Scene) -> np.ndarray:
-    """Parts (frames, parts) that a frame looks past and most others do not: a front is open there, and its inside shows."""
-    params, points = tuned(Params), grid.points_at(parts)
-    if len(points) == 0:
-        return np.zeros((len(scene.frames), 0), bool)
-    looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in scene.frames]
-    z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
-    past = scene.noise.seen_through(seen, z, params.past_m)
-    there = scene.noise.agrees(seen, z, params.past_m)
-    return np.asarray(past & (past.sum(axis=0) < params.seldom * (past | there).sum(axis=0)))
 
 
 def choose_frames(quality: np.ndarray, scene: Scene, count: int) -> list[int]:

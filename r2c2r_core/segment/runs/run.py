@@ -1,6 +1,6 @@
 """A furniture run: one plane's orthomosaic, line evidence, panels and handles. Keyed by plane, never by click."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -20,11 +20,8 @@ from r2c2r_core.segment.runs.orthomosaic import (
     frame_quality,
     make_grid,
     make_tile,
-    open_parts,
-    plane_parts,
     support_on,
 )
-from r2c2r_core.segment.runs.orthomosaic import Params as OrthoParams
 from r2c2r_core.segment.runs.panel_net import PanelOdds
 from r2c2r_core.segment.runs.panels import cut_panels
 from r2c2r_core.segment.runs.relief import Relief, measure_relief
@@ -135,10 +132,7 @@ class _Views:
 
     def __init__(self, grid: PlaneGrid, region: PlaneRegion, scene: Scene, margin_m: float) -> None:
         self.grid, self._scene = grid, scene
-        self._parts = plane_parts(grid, region)
-        self._open = dict(zip((f.index for f in scene.frames), open_parts(grid, self._parts, scene), strict=True))
-        quality = frame_quality(grid, self._parts, scene)
-        self._quality = np.where(np.stack(list(self._open.values())), 0.0, quality)
+        self._quality = frame_quality(grid, region, scene)
         near = support_on(grid, region, tuned(Params).allowed_m + margin_m).astype(np.float32)
         self._allowed = cv2.blur(near, (3, 3)) > 0.5
         self._made: dict[int, ScoredTile | None] = {}
@@ -156,23 +150,9 @@ class _Views:
         tiles = self.tiles(count)
         return gather(tiles, 0, self.grid.cell_m), gather(tiles, 1, self.grid.cell_m)
 
-    def _closed(self, frame_index: int) -> np.ndarray:
-        """Cells (rows, columns) that are not about a part that stands open in a frame."""
-        cells = np.ones((self.grid.rows, self.grid.columns), np.float32)
-        reach = tuned(OrthoParams).part_m / self.grid.cell_m
-        for column, row in self._parts[self._open[frame_index]]:
-            low, high = (
-                np.maximum([row - reach, column - reach], 0).astype(int),
-                np.ceil([row + reach, column + reach]).astype(int),
-            )
-            cells[low[0] : high[0], low[1] : high[1]] = 0
-        return cells
-
     def _tile(self, frame_index: int) -> ScoredTile | None:
         if frame_index not in self._made:
             tile = make_tile(self.grid, self._scene, frame_index)
-            if tile is not None and self._open[frame_index].any():
-                tile = replace(tile, weight=tile.weight * self._closed(frame_index))
             self._made[frame_index] = None if tile is None else scored(tile, self.grid.cell_m, self._allowed)
         return self._made[frame_index]
 
