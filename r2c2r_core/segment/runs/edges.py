@@ -204,11 +204,9 @@ def _step_near(begins: int, gradient: np.ndarray, least: float, cell_m: float) -
     """The innermost clear step of colour from where depth shows a panel to begin, or else the clearest one there."""
     params = tuned(Params)
     off = round(params.depth_off_m / cell_m)
-    first, last = begins - off, begins + round(params.inside_m / cell_m) + 1
-    peaks = _peaks(gradient[first - 1 : last], least)
-    if peaks:
-        return first - 1 + peaks[-1] + 0.5
-    return first + int(np.argmax(gradient[first : begins + off + 1])) + 0.5
+    first, last = begins - off, begins + off + 1
+    peaks = _peaks(gradient[first - 1 : last + 1], least)
+    return (first - 1 + peaks[-1] if peaks else first + int(np.argmax(gradient[first:last]))) + 0.5
 
 
 def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
