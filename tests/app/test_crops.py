@@ -10,7 +10,7 @@ from tests.app.test_reviews import Reviewed, reviewed
 __all__ = ["reviewed"]
 
 CROP: dict[str, Any] = {"corner_m": [0.1, 0.2, 0.3], "edges_m": [[0.4, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.6]]}
-MUG = {"category": "mug", "points": [{"frame": 3, "x": 40, "y": 40}]}
+MUG = {"category": "mug", "points": [{"frame": 3, "x": 152, "y": 40}]}  # tests/app/fakes/live.py takes its time there
 
 
 def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> None:
@@ -27,7 +27,7 @@ def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> N
     web.until(lambda: state() == "done")
     cropped = web.patch(here, {"crop": CROP})
     assert cropped["crop"] == CROP
-    assert cropped["segment"] == "waiting"
+    assert cropped["segment"] in ("waiting", "running")
     assert web.patch(here, {"name": "renamed"})["crop"] == CROP  # absent is not none
     assert web.patch(here, {"crop": None})["crop"] is None
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["crop"] == CROP

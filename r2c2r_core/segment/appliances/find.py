@@ -13,10 +13,10 @@ from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, near_plane, nudged
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
+from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import find_handle
 from r2c2r_core.segment.runs.orthomosaic import Cell
-from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height

@@ -12,7 +12,7 @@ from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.motion.likelihood import closed_counts, evidence, lay_out
-from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 

@@ -17,7 +17,7 @@ from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
-from r2c2r_core.segment.runs.prepared import Hits, PreparedCapture
+from r2c2r_core.segment.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing

@@ -31,10 +31,10 @@ from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.geometric.cache import kept
 from r2c2r_core.segment.geometric.finders import find_drawn, find_object, glimpse_object
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
+from r2c2r_core.segment.prepared import Hits
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.proposals.propose import propose_steps
 from r2c2r_core.segment.protocol import Glimpse, SegmentConfig, Segmenter
-from r2c2r_core.segment.runs.prepared import Hits
 from r2c2r_core.segment.runs.run import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
 from r2c2r_core.sources import source_key

@@ -20,10 +20,10 @@ from r2c2r_core.segment.fronts.front import Front, depth_behind, front_leaf, fro
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
+from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.edges import panel_edges, surface_of
 from r2c2r_core.segment.runs.handles import find_handle
 from r2c2r_core.segment.runs.orthomosaic import Cell, joined
-from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of

@@ -18,11 +18,11 @@ from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import front_mask
 from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.proposals.clicks import best_views, click_on, clump_clicks, panel_clicks
 from r2c2r_core.segment.proposals.clutter import Clump, find_clumps
 from r2c2r_core.segment.proposals.naming import name_thing
 from r2c2r_core.segment.proposals.panels import Panel, find_panels, is_on_wall, outlined, without_sides
-from r2c2r_core.segment.runs.prepared import PreparedCapture
 from r2c2r_core.tuning import param, tuned
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]

@@ -11,7 +11,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.prepared import PreparedCapture
+from r2c2r_core.segment.prepared import PreparedCapture
 
 
 def plane(centre: tuple[float, float, float], outward: tuple[float, float], width_m: float, height_m: float) -> PlaneRegion:
