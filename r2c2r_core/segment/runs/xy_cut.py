@@ -27,6 +27,7 @@ class Params:
     width_spread: float = param(0.5, "log", "standard deviation of the logarithm of fronts' widths", gt=0)
     height_spread: float = param(0.9, "log", "standard deviation of the logarithm of fronts' heights", gt=0)
     odd_share: float = param(0.05, "share", "of parts of any size: fillers, end panels, wide fronts", gt=0, lt=1)
+    odd_handle: float = param(0.2, "share", "of those, that have a handle: pull-outs, wide fronts", gt=0, lt=1)
     size_weight: float = param(0.5, "ratio", "of what sizes say: what the network was trained on knows a part of it")
     handle_weight: float = param(1, "ratio", "of what handles say, likewise")
     no_handle: float = param(0.5, "share", "of fronts without a handle", gt=0, lt=1)
@@ -252,10 +253,11 @@ class LineField:
         at = np.arange(start, stop) - low
         before, after = at + 0.5, high - low - at - 0.5
         fronts = (on[at] > 0.5 * before) & (on[-1] - on[at] > 0.5 * after)
-        sizes = self._log_density(before, axis) + self._log_density(after, axis) - self._log_density(before + after, axis)
         handles = self._handles_in(cell, axis)
         first = np.searchsorted(handles, np.arange(start, stop) + 0.5)
         count = len(handles)
+        sizes = self._log_density(before, axis, first) + self._log_density(after, axis, count - first)
+        sizes -= self._log_density(before + after, axis, np.full_like(first, count))
         shares = self._log_share(first) + self._log_share(count - first) - self._log_share(np.array(count))
         return np.where(fronts, self.params.size_weight * sizes + self.params.handle_weight * shares, 0.0)
 
@@ -302,15 +304,16 @@ class LineField:
         one = np.log(1 - params.no_handle - params.two_handles / (1 - params.more_handles))
         return np.select([count == 0, count == 1], [np.log(params.no_handle), one], more)
 
-    def _log_density(self, cells: np.ndarray, axis: int) -> np.ndarray:
-        """Of the logarithm of a front's width or height."""
+    def _log_density(self, cells: np.ndarray, axis: int, handles: np.ndarray) -> np.ndarray:
+        """Of the logarithm of a part's width or height, by how many handles it has: fillers and end panels have none."""
         params = self.params
         usual, spread = (
             (params.usual_width_m, params.width_spread) if axis == 0 else (params.usual_height_m, params.height_spread)
         )
         z = np.log(np.maximum(cells, 1) * self.cell_m / usual) / spread
         normal = np.exp(-0.5 * z * z) / (spread * np.sqrt(2 * np.pi))
-        return np.asarray(np.log((1 - params.odd_share) * normal + params.odd_share * _ODD_DENSITY))
+        odd = np.where(handles > 0, params.odd_share * params.odd_handle, params.odd_share)
+        return np.asarray(np.log((1 - odd) * normal + odd * _ODD_DENSITY))
 
     def _span(self, cell: Cell, axis: int) -> slice:
         low, high = across(cell, 1 - axis)

@@ -77,7 +77,8 @@ def test_a_stile_with_the_handle_on_it_is_no_front() -> None:
     """A faint line at 6 cm from a door's edge: a strip so narrow is hardly ever a front, nor the rest without handle."""
     whole, line = Cell(0, 0, 200, 288), [(176, 0, 288)]
     assert len(cut_panels(odds(200, 288, line, [], sure=1.0, handles=[(188, 60)]), whole, CELL_M)) == 1
-    assert len(cut_panels(odds(200, 288, line, [], sure=3.5, handles=[(188, 60)]), whole, CELL_M)) == 2  # a pull-out
+    pull_out = [(140, 0, 288)]  # 15 cm wide
+    assert len(cut_panels(odds(200, 288, pull_out, [], sure=3.5, handles=[(170, 60)]), whole, CELL_M)) == 2
 
 
 @pytest.mark.parametrize("grid", [Cell(0, 0, 8, 400), Cell(0, 0, 400, 8), Cell(0, 0, 2, 2), Cell(0, 0, 1, 1)])
@@ -155,3 +156,10 @@ def test_a_line_too_faint_for_one_front_cuts_a_row_of_them() -> None:
     assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 8
     row.level[22, 80:] = -4.0  # only one of four has it
     assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 4
+
+
+def test_a_strip_with_a_handle_is_no_filler() -> None:
+    """A line 6 cm before a door's end, with the knob beyond it: the inner line of its stile, not the end of the door."""
+    door, line = Cell(0, 0, 176, 300), [(152, 0, 300)]
+    assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[(164, 30)]), door, CELL_M)) == 1
+    assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[]), door, CELL_M)) == 2
