@@ -25,6 +25,7 @@ from r2c2r_core.segment.runs.orthomosaic import (
 from r2c2r_core.segment.runs.panel_net import PanelOdds
 from r2c2r_core.segment.runs.panels import cut_panels
 from r2c2r_core.segment.runs.relief import Relief, measure_relief
+from r2c2r_core.segment.runs.stiles import whole_frames
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -119,7 +120,9 @@ def run_on(
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles, max(frame_count // 2, 8))
     odds = edge_odds(mosaic, relief, vertical, horizontal)
-    cells = cells or tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m))
+    if cells is None:
+        cut = cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m)
+        cells = tuple(whole_frames(odds, cut, grid.cell_m, (vertical, horizontal)))
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
     handles = tuple(find_handle(odds, relief, cell) for cell in cells)
     slides = {tile.frame_index: tile.shift for tile in tiles}

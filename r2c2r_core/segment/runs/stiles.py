@@ -66,12 +66,12 @@ def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: in
 
 def _is_stile(field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence, Evidence], axis: int, end: int) -> bool:
     """Whether lines at a front's other three sides stand as far in as the strip is wide, and none inside its own side."""
-    params, cells_m = tuned(Params), field.cell_m / STEP
+    params, cell_m = tuned(Params), field.cell_m / STEP
     (low, high), beside = across(front, axis), across(front, 1 - axis)
     near, away = (high, -1) if end else (low, 1)  # inwards
     opposite = low if end else high
     width = across(strip, axis)[1] - across(strip, axis)[0]
-    alike, narrowest, widest = (size / cells_m for size in (params.alike_m, params.narrowest_m, params.widest_m))
+    alike, narrowest, widest = (size / cell_m for size in (params.alike_m, params.narrowest_m, params.widest_m))
     if high - low < 2 * width or beside[1] - beside[0] < 2 * narrowest:
         return False
 

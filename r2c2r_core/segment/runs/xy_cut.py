@@ -58,7 +58,7 @@ class Paths(NamedTuple):
     score: np.ndarray  # (positions,) sum of odds less what stepping aside costs
 
 
-class Evidence(NamedTuple):
+class LineEvidence(NamedTuple):
     """Of lines through a cell, at positions from `start` on."""
 
     start: int
@@ -152,14 +152,14 @@ class LineField:
         position = self._centre(cell, axis, first + paths.at[:, best], np.ones(len(paths.at), bool))
         return Line(mean * (span.stop - span.start), axis, position * STEP, mean)
 
-    def evidence(self, cell: Cell, axis: int) -> Evidence | None:
+    def evidence(self, cell: Cell, axis: int) -> LineEvidence | None:
         """What speaks for a line at each position within a cell; None where none fits."""
         start, stop = self._within(cell, axis)
         paths = self._paths(cell, axis, start, stop)
         if paths is None:
             return None
         odds = paths.odds.mean(axis=0) + self._crossed(cell, axis, start, stop, paths)
-        return Evidence(start, odds, self._prior(cell, axis, start, stop))
+        return LineEvidence(start, odds, self._prior(cell, axis, start, stop))
 
     def _within(self, cell: Cell, axis: int) -> tuple[int, int]:
         """From which position up to which a line is far enough from a cell's ends."""

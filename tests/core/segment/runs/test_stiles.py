@@ -1,5 +1,8 @@
 """Strips beside panels: stiles of their frames, or of the frame of the cupboard."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,8 @@ from r2c2r_core.segment.runs.lines import Evidence
 from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.panel_net import PanelOdds
 from r2c2r_core.segment.runs.stiles import whole_frames
+from r2c2r_core.segment.stage import open_session
+from tests.core.segment.scenes import kitchen
 
 CELL_M, BLOCK = 0.0025, 20
 DOOR, PANEL = Cell(80, 20, 280, 320), Cell(110, 50, 250, 290)
@@ -60,3 +65,18 @@ def test_a_strip_beside_a_whole_door_is_none_of_it(upright: list[float], level: 
 
 def test_a_door_beside_a_door_is_no_stile() -> None:
     assert door_of(whole_frames(odds(0), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES))) == CUT
+
+
+def test_the_panels_of_a_run_are_whole_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[list[Cell]] = []
+
+    def noted(odds: PanelOdds, cells: Sequence[Cell], cell_m: float, lines: tuple[Evidence, Evidence]) -> list[Cell]:
+        made.append(whole_frames(odds, cells, cell_m, lines)[::-1])
+        return made[-1]
+
+    monkeypatch.setattr("r2c2r_core.segment.runs.run.whole_frames", noted)
+    capture, _ = kitchen()
+    session = open_session(capture, tmp_path)
+    run = session.run_of(session.planes[0])
+    assert run is not None
+    assert list(run.cells) in made
