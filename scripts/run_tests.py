@@ -1,8 +1,10 @@
-"""Everything CI runs: Python tests, JavaScript tests, browser tests. What cannot run here is reported as not run.
+"""Everything CI runs: JavaScript tests, Python tests on two workers, browser tests on one; failed tests once more, alone.
 
-With R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required instead.
+Arguments go to both pytest passes. With R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, what cannot
+run is reported as not run.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -10,11 +12,16 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build"
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
+WITHOUT_BROWSER = ("-m", "not browser", "-n", "2", "--dist", "loadfile")
+WITH_BROWSER = ("-m", "browser", "-n", "0")  # a test is a server, a segmenter and a Chromium: two cores have work enough
+PASSED, FAILED, NOTHING_RAN = 0, 1, 5  # exit codes of pytest
+MAX_RERUN = 20  # tests; more failures than that are no accident of timing
 
 
 def main() -> int:
-    """Run the suites; the exit code is the worst of them."""
+    """Run the suites; the exit code is 0 when every test passed, at the latest when it was run alone."""
     node = shutil.which("node")
     chromium = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
     not_run = [
@@ -27,12 +34,58 @@ def main() -> int:
     if node:
         tests = sorted(str(path) for path in (ROOT / "tests" / "js").glob("*.test.js"))
         codes.append(subprocess.call([node, "--test", *tests], cwd=ROOT))
-    selection = ["-m", "not browser"] if chromium is None else []
-    workers = ["-n", "2", "--dist", "loadfile"]
-    codes.append(subprocess.call([sys.executable, "-m", "pytest", *workers, *selection, *sys.argv[1:]], cwd=ROOT))
+    codes.append(run_python([WITHOUT_BROWSER, WITH_BROWSER] if chromium else [WITHOUT_BROWSER], sys.argv[1:]))
     for what in not_run:
         sys.stdout.write(f"NOT RUN: {what}\n")
     return max(codes)
+
+
+def run_python(passes: list[tuple[str, ...]], arguments: list[str]) -> int:
+    """Run pytest once a pass, then each failed test once more in a process of its own."""
+    BUILD.mkdir(exist_ok=True)
+    failures: dict[str, str] = {}
+    codes = []
+    for selection in passes:
+        code, failed = run_pytest(*selection, "--durations=40", *arguments)
+        if code == FAILED and not failed:
+            return FAILED  # nothing to run again: the session itself failed
+        failures |= failed
+        codes.append(code)
+    if others := set(codes) - {PASSED, FAILED, NOTHING_RAN}:
+        return max(others)
+    if set(codes) == {NOTHING_RAN}:
+        return NOTHING_RAN
+    return run_again(failures)
+
+
+def run_pytest(*arguments: str) -> tuple[int, dict[str, str]]:
+    """Exit code of one pytest run, and the report of each test that failed by its node id."""
+    path = BUILD / "failures.jsonl"
+    path.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", *arguments]
+    code = subprocess.call(command, cwd=ROOT)
+    lines = path.read_text().splitlines() if path.exists() else []
+    return code, {line["test"]: line["report"] for line in map(json.loads, lines)}
+
+
+def run_again(failures: dict[str, str]) -> int:
+    """Run failed tests alone: those that pass are reported as flaky with their first failure, the others fail the run."""
+    if len(failures) > MAX_RERUN:
+        sys.stdout.write(f"{len(failures)} tests failed; up to {MAX_RERUN} would have been run once more\n")
+        return FAILED
+    flaky, failed = [], []
+    for test in failures:
+        sys.stdout.write(f"once more, alone: {test}\n")
+        sys.stdout.flush()
+        code, _ = run_pytest("-n", "0", test)
+        (failed if code else flaky).append(test)
+    for test in flaky:
+        sys.stdout.write(f"\nFLAKY {test}: first failure\n{failures[test]}\n")
+    with (BUILD / "flaky.txt").open("a") as names:
+        names.writelines(f"{test}\n" for test in flaky)
+    sys.stdout.writelines(f"FLAKY {test}: failed in the suite, passed alone\n" for test in flaky)
+    sys.stdout.writelines(f"FAILED {test}: in the suite and alone\n" for test in failed)
+    return FAILED if failed else PASSED
 
 
 if __name__ == "__main__":

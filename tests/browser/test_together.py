@@ -17,12 +17,6 @@ CLOSES_MS = 5000
 STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with Server(tmp_path_factory.mktemp("together")) as running:
-        yield running
-
-
 @pytest.fixture
 def people(browser: Browser, server: Server) -> Iterator[tuple[Page, Page]]:
     """A page of Ann's and one of Bea's, both signed in."""
@@ -73,6 +67,11 @@ def rename(page: Page, name: str, to: str) -> None:
     page.get_by_label(f"Name of {name}").press("Enter")
 
 
+def stored(page: Page) -> None:
+    """Wait until the server has answered every change of this page's person: its outbox is empty."""
+    page.wait_for_function("Object.keys(localStorage).every((name) => !name.startsWith('r2c2r-change'))")
+
+
 def ready(page: Page) -> None:
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for()
 
@@ -121,6 +120,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
         expect(page.get_by_role("button", name="cup_of_ann", exact=True)).to_be_visible()
 
     # the server dies; what is clicked meanwhile is sent when it is back, even from a page that was closed
+    stored(ann)
     server.kill()
     pick(ann, "drawer_1")
     click_frame(ann, 60, 60)
@@ -133,7 +133,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     again.goto(f"{project}/annotate?frame=3")
     expect(rows(again).first).to_contain_text("3 clicks")
     expect(rows(bea).first).to_contain_text("3 clicks")
-    assert again.evaluate("Object.keys(localStorage).filter((name) => name.startsWith('r2c2r-change')).length") == 0
+    stored(again)
 
 
 def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server: Server) -> None:

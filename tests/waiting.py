@@ -1,0 +1,31 @@
+"""How long tests wait: one patience for every limit, stretched by R2C2R_PATIENCE on a slow machine."""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+FACTOR = float(os.environ.get("R2C2R_PATIENCE", "1"))
+PATIENCE_S = 180 * FACTOR
+"""Seconds until a test gives up waiting for what should happen: nothing that works comes near it."""
+PATIENCE_MS = 1000 * PATIENCE_S
+LOOK_S = 0.02  # between two looks at a condition
+
+
+def until(condition: Callable[[], object], said: str = "what was waited for did not happen") -> None:
+    """Wait until the condition holds; fails after `PATIENCE_S`."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, said
+        time.sleep(LOOK_S)
+
+
+@contextmanager
+def held() -> Iterator[threading.Event]:
+    """An event that what is held waits for; set at the latest when the block ends, so that no thread outlives its test."""
+    released = threading.Event()
+    try:
+        yield released
+    finally:
+        released.set()
