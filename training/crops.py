@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from r2c2r_core.segment.runs.panel_net import features
+from r2c2r_core.segment.mosaics.panel_net import features
 from training.elevations import draw
 from training.sight import seen
 

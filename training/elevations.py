@@ -10,7 +10,7 @@ import numpy as np
 
 from training.canvas import CELL_M, Area, Elevation, any_paint, clip, fill, noise
 from training.fronts import appliance, front, niche, plain
-from training.styles import Style, any_style, grained
+from training.styles import FaceFrame, Style, any_style, grained
 
 
 def draw(seed: int) -> Elevation:
@@ -29,6 +29,8 @@ def draw(seed: int) -> Elevation:
         np.zeros(shape, np.uint8),
     )
     first = any_style(rng)
+    if rng.random() < 0.12:  # furniture painted as the wall
+        e.colour *= first.paint / np.maximum(e.colour.mean(axis=(0, 1)), 1e-3) * rng.uniform(0.85, 1.15)
     second = first if rng.random() < 0.7 else any_style(rng)
     what = rng.choice(["base", "both", "tall", "wall", "mixed", "closet"], p=[0.3, 0.2, 0.12, 0.13, 0.15, 0.1])
     if what in ("base", "both", "mixed"):
@@ -193,10 +195,12 @@ def _unit(e: Elevation, style: Style, area: Area, *, tall: bool, wall: bool) -> 
     left, top, right, bottom = area
     if min(right - left, bottom - top) < e.cells(0.08):
         return
-    frame = e.cells(style.inset_m) if style.inset_m else 0
-    if frame:
-        fill(e, area, style.paint)
-        grained(e, clip(e, area), style)
+    if style.frame:
+        left, top, right, bottom = _framed(e, style, style.frame, area)
+        if min(right - left, bottom - top) < e.cells(0.08):
+            return
+    rail = e.cells(style.frame.between_m) if style.frame else 0
+    mullion = e.cells(style.frame.mullion_m) if style.frame and style.frame.mullion_m else 0
     cuts = [bottom - top]
     kind = rng.random()
     wide_m, high_m = (right - left) * CELL_M, (bottom - top) * CELL_M
@@ -216,11 +220,23 @@ def _unit(e: Elevation, style: Style, area: Area, *, tall: bool, wall: bool) -> 
         door = high * CELL_M > 0.38
         leaves = 2 if door and wide_m > 0.55 and rng.random() < (0.85 if wide_m > 0.75 else 0.3) else 1
         leaves = 2 if not door and wide_m > 0.7 and rng.random() < 0.12 else leaves
+        ends = np.linspace(left, right + mullion, leaves + 1).astype(int)
         for k in range(leaves):
-            part = (left + (right - left) * k // leaves, y, left + (right - left) * (k + 1) // leaves, y + high)
+            part = (int(ends[k]), y, int(ends[k + 1]) - mullion, y + high - (rail if y + high < bottom else 0))
             side = ("right", "left")[k] if leaves == 2 else str(rng.choice(["left", "right"]))
-            front(e, style, part, door=door, side=side, wall=wall, frame=frame)
+            front(e, style, part, door=door, side=side, wall=wall)
         y += high
+
+
+def _framed(e: Elevation, style: Style, frame: FaceFrame, area: Area) -> Area:
+    """A unit's face frame; where its fronts are."""
+    left, top, right, bottom = area
+    fill(e, area, style.paint * frame.light, lift=-frame.behind_m)
+    grained(e, clip(e, area), style)
+    e.colour[clip(e, (left, top, left + 1, bottom))] *= frame.joint_light
+    stile = e.cells(frame.stile_m)
+    over, under = (round(rail / CELL_M) for rail in (frame.top_m, frame.bottom_m))
+    return left + stile, top + over, right - stile, bottom - under
 
 
 def _parts(rng: np.random.Generator, total: int, count: int, *, even: bool) -> list[int]:

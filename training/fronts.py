@@ -7,18 +7,21 @@ from training.canvas import CELL_M, Area, Elevation, any_paint, clip, fill, nois
 from training.styles import Style, any_style, board, grained
 
 
-def front(e: Elevation, style: Style, area: Area, *, door: bool, side: str, wall: bool, frame: int) -> None:
+def front(e: Elevation, style: Style, area: Area, *, door: bool, side: str, wall: bool) -> None:
     """A front with its gap around it, its profile and its handle; its edges are told."""
     rng = e.rng
     left, top, right, bottom = area
-    gap = max(style.gap_m / CELL_M, 0.4)
-    if frame:
-        left, right, top, bottom = left + frame // 2, right - frame // 2, top + frame // 2, bottom - frame // 2
+    gap = max(style.gap_m / CELL_M, 0.4) * (2 if style.frame else 1)  # a neighbour has the other half
     channel = e.cells(rng.uniform(0.008, 0.035)) if style.handle == "channel" and not wall else 0
     if right - left < e.cells(0.05) or bottom - top - channel < e.cells(0.05):
         return
     fill(e, (left, top, right, bottom), style.paint * style.gap_light * rng.uniform(0.85, 1.1))
+    if style.gap_shown < 1:
+        _dashed(e, (left, top, right, bottom), style)
     if channel:
+        if rng.random() < 0.7:  # the upper face of the front, which a camera above it sees behind its edge
+            band = e.cells(rng.uniform(0.002, 0.8 * channel * CELL_M))
+            fill(e, (left, top - band, right, top), style.paint * rng.uniform(0.55, 1.3), lift=-rng.uniform(0.0, 0.02))
         fill(e, (left, top, right, top + channel), style.paint * rng.uniform(0.03, 0.6), lift=-rng.uniform(0.01, 0.04))
         top += channel
     light = style.paint * (1 + rng.uniform(-style.uneven, style.uneven))
@@ -30,6 +33,15 @@ def front(e: Elevation, style: Style, area: Area, *, door: bool, side: str, wall
     _handle(e, style, box, door=door, side=side, wall=wall)
     if rng.random() < 0.03:
         _cloth(e, box)
+
+
+def _dashed(e: Elevation, area: Area, style: Style) -> None:
+    """Where a gap does not show, it is as light as the front."""
+    at = clip(e, area)
+    shape = e.front[at].shape
+    if all(shape):
+        hidden = noise(e.rng, shape, e.rng.uniform(2, 12)) > np.clip(style.gap_shown, 0, 1)
+        e.colour[at] = np.where(hidden[..., None], style.paint, e.colour[at])
 
 
 def plain(e: Elevation, area: Area, style: Style, paint: np.ndarray) -> None:

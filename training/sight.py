@@ -33,6 +33,8 @@ def seen(e: Elevation) -> Sight:
         cv2.fillPoly(patch, [polygon.astype(np.int32)], 1.0)
         patch = cv2.GaussianBlur(patch, (0, 0), rng.uniform(1.5, 40))
         image *= (1 + rng.uniform(-0.35, 0.25) * patch)[..., None]
+    if rng.random() < 0.2:
+        image += _reflections(rng, shape)[..., None]
     image = np.clip(image * rng.uniform(0.5, 1.3), 0, 1)
     if rng.random() < 0.5:  # frames that lie a few millimetres off each other
         most = rng.choice([0.6, 1.5, 3.0])
@@ -66,6 +68,18 @@ def seen(e: Elevation) -> Sight:
             image[hole > 0] = np.clip(any_paint(rng) * 255, 1, 255).astype(np.uint8)
         e.lift[hole > 0] = np.nan
     return Sight(image, *_depth(e), truth)
+
+
+def _reflections(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+    """Windows and lamps that glossy fronts mirror: light that is added, and goes on from front to front."""
+    light = np.zeros(shape, np.float32)
+    for _ in range(rng.integers(1, 4)):
+        middle, size = rng.uniform(0, shape[::-1]), rng.uniform(0.1, 0.8, 2) * shape[::-1]
+        window = np.zeros(shape, np.float32)
+        corners = cv2.boxPoints((middle.tolist(), size.tolist(), rng.normal(0, 6)))
+        cv2.fillPoly(window, [np.round(corners).astype(np.int32)], 1.0)
+        light += rng.uniform(0.01, 0.2) * cv2.GaussianBlur(window, (0, 0), rng.uniform(1.5, 50))
+    return light
 
 
 def _bounded(e: Elevation) -> Elevation:
@@ -111,6 +125,8 @@ def _depth(e: Elevation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     there = np.isfinite(half) & (cv2.resize(e.known.astype(np.uint8), (columns, rows), interpolation=cv2.INTER_NEAREST) > 0)
     if rng.random() < 0.15:
         there &= False  # no depth at all
+    if rng.random() < 0.3:
+        there = _short_of_ends(rng, there)
     sigma = rng.uniform(0.8, 5)  # cells of 5 mm
     weight = cv2.GaussianBlur(there.astype(np.float32), (0, 0), sigma)
     lift = cv2.GaussianBlur(np.where(there, half, 0).astype(np.float32), (0, 0), sigma) / np.maximum(weight, 1e-3)
@@ -129,3 +145,10 @@ def _depth(e: Elevation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _normal_cdf(z: np.ndarray) -> np.ndarray:
     return np.clip(0.5 * (1 + np.tanh(0.8 * z)), 0, 1)
+
+
+def _short_of_ends(rng: np.random.Generator, there: np.ndarray) -> np.ndarray:
+    """Without what lies near jumps of depth, which cameras and readers drop: by up to 35 mm, each side by its own."""
+    up, down, left, right = rng.integers(0, 8, 4).tolist()
+    kernel = np.ones((up + down + 1, left + right + 1), np.uint8)
+    return np.asarray(cv2.erode(there.astype(np.uint8), kernel, anchor=(left, up), borderValue=1) > 0)

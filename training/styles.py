@@ -8,14 +8,29 @@ from training.canvas import Elevation, any_paint, clip, noise
 
 
 @dataclass(frozen=True)
+class FaceFrame:
+    """What fronts are inset in: rails and stiles of the carcass, of their own widths; none of it is a front."""
+
+    top_m: float
+    bottom_m: float
+    between_m: float  # rails between the fronts of a unit
+    stile_m: float  # at each side of a unit
+    mullion_m: float  # between the doors of a pair; 0: none
+    light: np.ndarray  # of the fronts' paint: mostly the same
+    behind_m: float  # fronts may overlay it
+    joint_light: float  # of the hairline where two units' frames meet; 1: none
+
+
+@dataclass(frozen=True)
 class Style:
     """How the fronts of one kitchen are made."""
 
     kind: str  # slab, shaker, raised, bead, louver, glass
     handle: str  # bar, knob, cup, edge, channel, none
     gap_m: float
-    gap_light: float  # of the front's light that a gap shows
-    inset_m: float  # face frame between fronts; 0: none
+    gap_light: float  # of the front's light that a gap shows: edges of dark fronts may be lighter
+    gap_shown: float  # share of a gap's length that shows: thin ones come out dashed
+    frame: FaceFrame | None
     stile_m: float
     recess_light: float
     line_light: float
@@ -35,7 +50,6 @@ def any_style(rng: np.random.Generator) -> Style:
     kind = str(rng.choice(["slab", "shaker", "raised", "bead", "louver", "glass"], p=[0.46, 0.26, 0.12, 0.06, 0.03, 0.07]))
     handle = str(rng.choice(["bar", "knob", "cup", "edge", "channel", "none"], p=[0.52, 0.17, 0.06, 0.08, 0.09, 0.08]))
     paint = any_paint(rng)
-    inset = rng.uniform(0.018, 0.06) if rng.random() < 0.17 else 0.0
     metal = rng.uniform(0.25, 0.9)
     handle_colour = (
         np.full(3, metal) if rng.random() < 0.6 else rng.uniform(0.01, 0.2, 3) if rng.random() < 0.6 else any_paint(rng)
@@ -45,8 +59,9 @@ def any_style(rng: np.random.Generator) -> Style:
         kind=kind,
         handle=handle,
         gap_m=float(rng.choice([rng.uniform(0.001, 0.004), rng.uniform(0.003, 0.008)], p=[0.8, 0.2])),
-        gap_light=float(rng.choice([rng.uniform(0.03, 0.4), rng.uniform(0.4, 0.93)], p=[0.65, 0.35])),
-        inset_m=inset,
+        gap_light=_gap_light(rng),
+        gap_shown=float(rng.uniform(0.3, 0.8)) if rng.random() < 0.25 else 1.0,
+        frame=_face_frame(rng) if rng.random() < 0.33 else None,
         stile_m=rng.uniform(0.035, 0.11),
         recess_light=rng.uniform(0.82, 1.08),
         line_light=float(rng.uniform(0.25, 0.95)),
@@ -60,6 +75,24 @@ def any_style(rng: np.random.Generator) -> Style:
         handle_thick_m=rng.uniform(0.006, 0.022),
         handle_off_m=rng.uniform(0.02, 0.11),
         gloss=float(rng.choice([0.0, rng.uniform(0.05, 0.5)], p=[0.55, 0.45])),
+    )
+
+
+def _gap_light(rng: np.random.Generator) -> float:
+    return float(rng.choice([rng.uniform(0.03, 0.4), rng.uniform(0.4, 0.93), rng.uniform(1.08, 2.2)], p=[0.58, 0.32, 0.1]))
+
+
+def _face_frame(rng: np.random.Generator) -> FaceFrame:
+    stile = rng.uniform(0.008, 0.055)
+    return FaceFrame(
+        top_m=rng.uniform(0.0, 0.09) if rng.random() < 0.7 else stile,
+        bottom_m=rng.uniform(0.0, 0.09) if rng.random() < 0.7 else stile,
+        between_m=rng.uniform(0.008, 0.06),
+        stile_m=stile,
+        mullion_m=rng.uniform(0.015, 0.06) if rng.random() < 0.2 else 0.0,
+        light=np.ones(3) if rng.random() < 0.85 else rng.uniform(0.4, 1.4, 3),
+        behind_m=rng.uniform(0.015, 0.022) if rng.random() < 0.12 else 0.0,
+        joint_light=rng.uniform(0.5, 0.97) if rng.random() < 0.3 else 1.0,
     )
 
 

@@ -2,7 +2,9 @@
 
 | room       | method                                                                                                      |
 |------------|-------------------------------------------------------------------------------------------------------------|
-| runs       | a vertical plane as an orthomosaic: line evidence, recursive XY-cut into panels, relief, handles            |
+| mosaics    | a vertical plane as an orthomosaic: line evidence, relief, the odds of networks, edges, handles            |
+| runs       | its partition into panels by a recursive XY-cut; face frames, stiles                                        |
+| motion     | a leaf against its unit: the joint it hangs on and its state in every frame, from depth                     |
 | fronts     | the panel under the clicks as a rectangle on its plane; drawers and doors that stand open                   |
 | things     | free-standing things: min-cut of the fused surface; small ones by visual hull                               |
 | appliances | an upright box behind a front                                                                               |

@@ -10,9 +10,9 @@ import numpy as np
 from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.elevation import Elevation, Lines
+from r2c2r_core.segment.mosaics.lines import Evidence
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.prepared import PreparedCapture
-from r2c2r_core.segment.runs.lines import Evidence
-from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 
 _LEAST_SIDE_M = 0.3  # of a plane that is shown: a single front is as large

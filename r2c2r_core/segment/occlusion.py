@@ -17,6 +17,7 @@ class Params:
     """Which occluders are near."""
 
     near_m: float = param(0.08, "m", "before the object, from where an occluder is near")
+    confirm_m: float = param(0.03, "m", "off a side of a carcass beyond the noise, within which depth confirms it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +73,7 @@ def _shown(
     model = _plane_depth(frame, frame.rgb_camera, box, facet.corners_world[0], facet.normal)
     sensor, seen = _crop_depths(scene, frame, box)
     if facet.confirm:
-        return inside & _smoothed(scene.noise.agrees(seen, model, 0.03), scene, frame)
+        return inside & _smoothed(scene.noise.agrees(seen, model, tuned(Params).confirm_m), scene, frame)
     # Glass and gloss leave holes through which the fused surface shows what is behind: only the sensor may say "behind".
     behind = scene.noise.seen_through(sensor, model, tolerance.behind_m)
     hidden = scene.noise.occluded(seen if tolerance.fused else sensor, model, tolerance.front_m) | behind

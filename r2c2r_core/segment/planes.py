@@ -1,6 +1,6 @@
 """Vertical planes of the fused surface by Hough voting on yaw and offset: fronts of furniture runs, once, before any click."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -28,6 +28,36 @@ class Params:
     offset_bin_m: float = param(0.005, "m", "of offsets that are counted together", gt=0)
     thickness_m: float = param(0.025, "m", "points this near a plane belong to it")
     bridge_m: float = param(0.10, "m", "holes a thing in front leaves in a run")
+    adjoins_m: float = param(
+        0.04, "m", "of a gap in a plane, beyond which what lies on it is something else, where it was not one"
+    )
+    vertical_cos: float = param(0.3, "cosine", "with up, of faces that may be part of a vertical plane")
+    smooth_bins: tuple[float, float] = param(
+        (3.0, 2.0), "count", "of bins of yaw, and of offset, that histograms are smoothed by"
+    )
+    yaw_share: float = param(0.02, "share", "of the strongest yaw, for another one")
+    yaws: int = param(12, "count", "that planes are looked for in", ge=1)
+    apart_m: float = param(0.03, "m", "between parallel planes")
+    peak_m2: float = param(0.004, "m²", "at one offset, for a plane")
+    fit_m: float = param(0.008, "m", "off a plane, from where a face counts half in its fit")
+    fit_deg: float = param(12.0, "deg", "from its peak, that a fit may turn: a narrow sliver does not tell its yaw")
+    left_m: float = param(0.015, "m", "off a plane, within which a face is that plane's: what is left is looked at once more")
+    beside_m: float = param(0.02, "m", "from the seen part, within which it is")
+    twin_deg: float = param(25.0, "deg", "between planes that may be one: neighbouring yaws find the same run")
+    twin_share: float = param(0.6, "share", "of a plane that a larger one has, from where it is the same")
+    sunk_m: float = param(
+        0.035, "m", "behind a plane, of the panel of a frame", gt=0, source="boards of 16-22 mm with 10 mm of panel behind"
+    )
+    rim_m: tuple[float, float] = param(
+        (0.02, 0.045),
+        "m",
+        "around a panel, from where and up to where its frame is asked for: depth blurs, stiles are 5 cm wide and more",
+    )
+    rim_share: float = param(0.85, "share", "of that rim, and of each side of it, that is in the frame's plane", gt=0, le=1)
+    grazing_cos: float = param(0.15, "cosine", "of a ray with a plane, at least, for it to meet it")
+    large_m: float = param(
+        0.01, "m", "by which a plane may lie farther from a click for each square metre: noise must prefer no sliver"
+    )
     smallest_m2: float = param(0.015, "m²", "of a plane", source="the keypad of a microwave whose glass gives no depth")
 
 
@@ -86,11 +116,18 @@ def find_planes(surface: SceneSurface, camera_centres_world: Points) -> tuple[Pl
     rest = np.ones(len(centres), bool)
     for region in regions:
         off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
-        rest &= ~((off < 0.015) & (normals @ region.outward > params.normal_cos) & region.supports(centres, 0.02))
+        rest &= ~(
+            (off < params.left_m) & (normals @ region.outward > params.normal_cos) & region.supports(centres, params.beside_m)
+        )
     if rest.sum() > 50:
         regions += _regions(centres[rest], normals[rest], areas[rest])
     regions = [region for region in regions if _faces_cameras(region, camera_centres_world)]
-    return tuple(_without_twins(sorted(regions, key=lambda region: -region.area_m2)))
+    apart = _with_panels(_without_twins(_largest_first(regions)))
+    return tuple(_without_twins(_largest_first([_regrown(region, centres, normals, areas) for region in apart])))
+
+
+def _largest_first(regions: list[PlaneRegion]) -> list[PlaneRegion]:
+    return sorted(regions, key=lambda region: -region.area_m2)
 
 
 def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneRegion]:
@@ -101,8 +138,21 @@ def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneR
         aligned = normals @ outward > params.normal_cos
         for offset in _peaks(centres[aligned] @ outward, areas[aligned]):
             member = aligned & (np.abs(centres @ outward - offset) < params.thickness_m)
-            regions += _split(centres[member], areas[member], outward)
+            regions += _split(centres[member], areas[member], outward, params.bridge_m)
     return regions
+
+
+def _regrown(region: PlaneRegion, centres: Points, normals: Points, areas: np.ndarray) -> PlaneRegion:
+    """A region with what adjoins it on its plane as fitted: half a bin of yaw is more than a plane is thick over a long run."""
+    params, seen = tuned(Params), region.points
+    off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
+    near = np.flatnonzero((off < params.thickness_m) & (normals @ region.outward > params.normal_cos))
+    member = near[(off[near] < params.left_m) | region.supports(centres[near], 0.0)]
+    parts = _split(centres[member], areas[member], region.outward, params.adjoins_m)
+    if not parts:
+        return region
+    grown = max(parts, key=lambda part: part.supports(seen, params.beside_m).mean())
+    return replace(_filled(grown, region), area_m2=max(grown.area_m2, region.area_m2))
 
 
 def region_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06) -> PlaneRegion | None:
@@ -110,13 +160,21 @@ def region_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: f
     return next(iter(regions_at(regions, point_world, reach_m)), None)
 
 
-def regions_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06) -> list[PlaneRegion]:
-    """The regions that a world point may lie on, the likeliest first."""
+def regions_at(
+    regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06, beside_m: float | None = None
+) -> list[PlaneRegion]:
+    """The regions that a world point may lie on, the likeliest first.
+
+    It lies within `reach_m` of the plane, and within `beside_m` (as much, where not given) of what was seen of it.
+    """
+    beside_m = reach_m if beside_m is None else beside_m
     found: list[tuple[float, PlaneRegion]] = []
     for region in regions:
         distance = abs(float(region.world_from_plane.inverse.apply(point_world[None])[0, 1]))
-        if distance <= reach_m and region.supports(point_world[None], reach_m)[0]:
-            found.append((distance - 0.01 * min(region.area_m2, 1.0), region))  # centimetre noise must not prefer a sliver
+        if distance <= reach_m and region.supports(point_world[None], beside_m)[0]:
+            found.append(
+                (distance - tuned(Params).large_m * min(region.area_m2, 1.0), region)
+            )  # centimetre noise must not prefer a sliver
     return [region for _, region in sorted(found, key=lambda pair: pair[0])]
 
 
@@ -130,7 +188,7 @@ def region_along(
     best: tuple[float, PlaneRegion, Vector3] | None = None
     for region in regions:
         slope = float(ray_world @ region.outward)
-        if slope > -0.15:
+        if slope > -tuned(Params).grazing_cos:
             continue
         distance = float((region.world_from_plane.translation - origin_world) @ region.outward) / slope
         if not 0.2 < distance < farthest_m:
@@ -149,7 +207,7 @@ def region_along(
 
 def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
     centres, normals, areas = face_normals(surface.vertices_world, surface.faces)
-    vertical = np.abs(normals[:, 2]) < 0.3
+    vertical = np.abs(normals[:, 2]) < tuned(Params).vertical_cos
     flat = normals[vertical] * [1, 1, 0]
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
     return centres[vertical], flat, areas[vertical]
@@ -160,28 +218,29 @@ def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
     params = tuned(Params)
     yaw = np.arctan2(normals[:, 1], normals[:, 0]) % (2 * np.pi)
     bins = np.bincount((yaw / (2 * np.pi) * params.yaw_bins).astype(int) % params.yaw_bins, areas, params.yaw_bins)
-    smooth = ndimage.gaussian_filter1d(bins, 3.0, mode="wrap")
+    smooth = ndimage.gaussian_filter1d(bins, params.smooth_bins[0], mode="wrap")
     peaks = [i for i in range(params.yaw_bins) if smooth[i] == smooth[np.arange(i - 8, i + 9) % params.yaw_bins].max()]
-    enough = max(0.02 * smooth.max(), 1e-4)
-    return [(i + 0.5) / params.yaw_bins * 2 * np.pi for i in sorted(peaks, key=lambda i: -smooth[i]) if smooth[i] > enough][:12]
+    enough = max(params.yaw_share * smooth.max(), 1e-4)
+    strong = sorted((i for i in peaks if smooth[i] > enough), key=lambda i: -smooth[i])
+    return [(i + 0.5) / params.yaw_bins * 2 * np.pi for i in strong[: params.yaws]]
 
 
 def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
-    """Offsets along a normal where area piles up, at least 3 cm apart."""
+    """Offsets along a normal where area piles up, far enough apart."""
     params = tuned(Params)
     if len(offsets) == 0:
         return []
     low = offsets.min() - 0.05
     bins = np.bincount(((offsets - low) / params.offset_bin_m).astype(int), areas)
-    smooth = ndimage.gaussian_filter1d(np.pad(bins, 12), 2.0)
-    radius = round(0.03 / params.offset_bin_m)
+    smooth = ndimage.gaussian_filter1d(np.pad(bins, 12), params.smooth_bins[1])
+    radius = round(params.apart_m / params.offset_bin_m)
     highest = ndimage.maximum_filter1d(smooth, 2 * radius + 1)
-    peaks = np.flatnonzero((smooth == highest) & (smooth > 0.004))
+    peaks = np.flatnonzero((smooth == highest) & (smooth > params.peak_m2))
     return [low + (i - 12 + 0.5) * params.offset_bin_m for i in peaks]
 
 
-def _split(centres: Points, areas: np.ndarray, outward: Vector3) -> list[PlaneRegion]:
-    """Connected parts of one plane."""
+def _split(centres: Points, areas: np.ndarray, outward: Vector3, bridge_m: float) -> list[PlaneRegion]:
+    """Connected parts of one plane, holes so wide bridged."""
     params = tuned(Params)
     rotation = front_rotation(outward)
     u, z = centres @ rotation[:, 0], centres[:, 2]
@@ -189,7 +248,7 @@ def _split(centres: Points, areas: np.ndarray, outward: Vector3) -> list[PlaneRe
     column, row = ((u - u0) / params.cell_m).astype(int), ((z - z0) / params.cell_m).astype(int)
     occupied = np.zeros((row.max() + 3, column.max() + 3), np.uint8)
     occupied[row, column] = 1
-    bridged = cv2.morphologyEx(np.pad(occupied, 8), cv2.MORPH_CLOSE, _disk(params.bridge_m / params.cell_m / 2))[8:-8, 8:-8]
+    bridged = cv2.morphologyEx(np.pad(occupied, 8), cv2.MORPH_CLOSE, _disk(bridge_m / params.cell_m / 2))[8:-8, 8:-8]
     count, labels = cv2.connectedComponents(bridged, connectivity=4)
     regions = []
     for label in range(1, count):
@@ -221,7 +280,7 @@ def _region(centres: Points, areas: np.ndarray, outward: Vector3) -> PlaneRegion
 
 def _fit(centres: Points, areas: np.ndarray, outward: Vector3) -> tuple[Vector3, Vector3]:
     """Trimmed total least squares in plan: a vertical plane's normal and a point on it."""
-    weights = areas.copy()
+    params, weights = tuned(Params), areas.copy()
     plan = centres[:, :2]
     normal = outward[:2]
     for _ in range(4):
@@ -229,10 +288,10 @@ def _fit(centres: Points, areas: np.ndarray, outward: Vector3) -> tuple[Vector3,
         spread = plan - middle
         _, vectors = np.linalg.eigh((spread * weights[:, None]).T @ spread)
         normal = vectors[:, 0] * np.sign(vectors[:, 0] @ outward[:2])
-        if normal @ outward[:2] < np.cos(np.radians(12)):  # too narrow a sliver to measure its yaw
+        if normal @ outward[:2] < np.cos(np.radians(params.fit_deg)):  # too narrow a sliver to measure its yaw
             normal = outward[:2]
         distance = np.abs(spread @ normal)
-        weights = areas / (1 + (distance / 0.008) ** 2)
+        weights = areas / (1 + (distance / params.fit_m) ** 2)
     middle = np.average(plan, axis=0, weights=weights)
     return np.array([normal[0], normal[1], 0.0]), np.array([middle[0], middle[1], centres[:, 2].mean()])
 
@@ -249,14 +308,53 @@ def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
         points = region.points
         twin = False
         for other in kept:
-            if other.outward @ region.outward < np.cos(np.radians(25)):
+            if other.outward @ region.outward < np.cos(np.radians(params.twin_deg)):
                 continue
             local = other.world_from_plane.inverse.apply(points)
-            inside = other.supports(points, 0.02) & (np.abs(local[:, 1]) < 0.8 * params.thickness_m)
-            twin = twin or bool(inside.mean() > 0.6)
+            inside = other.supports(points, params.beside_m) & (np.abs(local[:, 1]) < 0.8 * params.thickness_m)
+            twin = twin or bool(inside.mean() > params.twin_share)
         if not twin:
             kept.append(region)
     return kept
+
+
+def _with_panels(regions: list[PlaneRegion]) -> list[PlaneRegion]:
+    """The regions, those that are a panel sunk in a frame made a part of the frame's: a click on either means the front."""
+    found = list(regions)
+    for panel in reversed(regions):  # small ones first
+        frame = next((other for other in found if other is not panel and _is_sunk_in(panel, other)), None)
+        if frame is not None:
+            found = [_filled(other, panel) if other is frame else other for other in found if other is not panel]
+    return found
+
+
+def _is_sunk_in(panel: PlaneRegion, frame: PlaneRegion) -> bool:
+    """Whether a region lies a little behind another one that goes on at all four sides of it."""
+    params = tuned(Params)
+    behind = frame.world_from_plane.inverse.apply(panel.points)[:, 1]
+    if frame.outward @ panel.outward < np.cos(np.radians(params.fit_deg)) or not 0 < np.median(behind) < params.sunk_m:
+        return False
+    near, far = (params.rim_m[k] for k in (0, 1))
+    margin = int(np.ceil(far / panel.cell_m)) + 1
+    area = cv2.morphologyEx(np.pad(panel.support.astype(np.uint8), margin), cv2.MORPH_CLOSE, _disk(margin))
+    rim = cv2.dilate(area, _disk(far / panel.cell_m)) - cv2.dilate(area, _disk(near / panel.cell_m))
+    row, column = np.nonzero(rim)
+    x = (column - margin + 0.5) * panel.cell_m - panel.width_m / 2
+    z = panel.height_m / 2 - (row - margin + 0.5) * panel.cell_m
+    points = panel.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
+    on = frame.supports(points, params.cell_m / 2)
+    right, up = np.abs(x) > panel.width_m / 2, np.abs(z) > panel.height_m / 2
+    sides = (right & (x > 0), right & (x < 0), up & (z > 0), up & (z < 0))
+    return all(on[side].mean() > params.rim_share if side.any() else False for side in sides)
+
+
+def _filled(region: PlaneRegion, panel: PlaneRegion) -> PlaneRegion:
+    """A region that was seen where a panel was, too."""
+    local, support = region.world_from_plane.inverse.apply(panel.points), region.support.copy()
+    row = ((region.height_m / 2 - local[:, 2]) / region.cell_m).astype(int).clip(0, support.shape[0] - 1)
+    column = ((local[:, 0] + region.width_m / 2) / region.cell_m).astype(int).clip(0, support.shape[1] - 1)
+    support[row, column] = True
+    return replace(region, support=support, area_m2=region.area_m2 + panel.area_m2)
 
 
 def _disk(radius: float) -> np.ndarray:

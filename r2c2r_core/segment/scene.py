@@ -18,10 +18,25 @@ from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, parts_of
 from r2c2r_core.threads import in_threads
+from r2c2r_core.tuning import param, tuned
 
 T = TypeVar("T", Image, DepthMetres)
 
 _IMAGE_CACHE_BYTES = 500_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What sensors mistrust beside a step of the depth."""
+
+    step_px: float = param(
+        6.0,
+        "px",
+        "of the depth image to the nearest that has depth: farther off is what returns no light",
+        gt=0,
+        source="phones drop 2-5 pixels at either side of a step",
+    )
+    step_m: float = param(0.08, "m", "between the depths of its two sides", gt=0, source="handles stand out by up to 5 cm")
 
 
 @dataclass(slots=True, eq=False)
@@ -41,6 +56,11 @@ class Scene:
     def noise(self) -> DepthNoise:
         """How much the recording's depth errs."""
         return self.capture.depth_noise
+
+    @property
+    def floor_m(self) -> float | None:
+        """Height of the floor (world z); None where none was found."""
+        return 0.0 if self.capture.room.floor_found else None
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -108,6 +128,25 @@ class Scene:
         row, column = int(y_px * depth.shape[0] / camera.height), int(x_px * depth.shape[1] / camera.width)
         return bool((depth[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] > 0).any())
 
+    def depth_at_step(self, frame_index: int, x_px: float, y_px: float) -> float | None:
+        """Depth at a pixel of the colour image that the sensor mistrusts beside a step: that of the nearer side; else None.
+
+        The surface fused from other frames ends short of such edges.
+        """
+        params, depth, camera = tuned(Params), self.depth(frame_index), self.frame(frame_index).rgb_camera
+        x, y = x_px * depth.shape[1] / camera.width, y_px * depth.shape[0] / camera.height
+        column, row = min(int(x), depth.shape[1] - 1), min(int(y), depth.shape[0] - 1)
+        if depth[row, column] > 0:
+            return None
+        reach = int(2 * params.step_px)
+        top, left = max(row - reach, 0), max(column - reach, 0)
+        patch = depth[top : row + reach + 1, left : column + reach + 1]
+        down, right = np.nonzero(patch > 0)
+        away, known = np.hypot(down + top + 0.5 - y, right + left + 0.5 - x), patch[down, right]
+        if away.min(initial=np.inf) > params.step_px or np.diff(np.sort(known)).max(initial=0.0) < params.step_m:
+            return None
+        return float(known[np.argmin(away)])
+
     def _sensor_depth(self, frame_index: int) -> DepthMetres:
         depth = self.capture.images.depth(frame_index)
         return np.where(depth.valid, depth.metres, 0).astype(np.float32)
@@ -119,6 +158,9 @@ class Scene:
 
     def _depth_near(self, frame_index: int, x_px: float, y_px: float) -> float | None:
         camera = self.frame(frame_index).rgb_camera
+        beside = self.depth_at_step(frame_index, x_px, y_px)
+        if beside is not None:
+            return beside
         for image, reach in ((self.depth(frame_index), 1), (self.surface_depth(frame_index, drawn_size(camera)), 1)):
             height, width = image.shape
             column = min(int(x_px * width / camera.width), width - 1)

@@ -16,11 +16,12 @@ __all__ = ["SEGMENTERS", "SegmentConfig", "find_disputed", "open_session", "trac
 SEGMENTERS: Registry[Segmenter] = Registry(
     "segmenter",
     group="r2c2r.segmenters",
+    protocol=Segmenter,
     own=(
         Backend(
             name="geometric",
             target="r2c2r_core.segment.geometric.session:GeometricSegmenter",
-            summary="weight-free: fronts cut on an orthomosaic, things cut from the fused surface",
+            summary="no weights: fronts are found on a straightened picture of each furniture run, things in the fused surface",
         ),
         Backend(
             name="sam2",

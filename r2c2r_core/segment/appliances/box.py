@@ -12,9 +12,9 @@ from r2c2r_core.kitchen.category import Params as SizeParams
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.track import ThingBox
 from r2c2r_core.segment.fronts.front import Front, front_corners, side_corners, side_faces
+from r2c2r_core.segment.mosaics.lines import Evidence
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
-from r2c2r_core.segment.runs.lines import Evidence
-from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned

@@ -12,11 +12,11 @@ from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, near_plane, nudged
+from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
+from r2c2r_core.segment.mosaics.handles import find_handle
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.prepared import PreparedCapture
-from r2c2r_core.segment.runs.edges import panel_edges, surface_of
-from r2c2r_core.segment.runs.handles import find_handle
-from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
@@ -31,6 +31,9 @@ class Params:
     off_front_m: float = param(0.04, "m", "behind its plane: a side or the top")
     own_width: float = param(1.3, "ratio", "to the greatest width of a plane that is the appliance's front")
     in_a_run: float = param(2.5, "ratio", "to the greatest width of a plane that its front is part of")
+    unlikelier: float = param(
+        1.0, "log", "by which a plane's size may be less likely than the clicked one's, for it to be the front of that side"
+    )
     prepared_margin_m: float = param(
         0.45,
         "m",
@@ -64,14 +67,14 @@ def appliance_front(
     if run is None:
         return None
     on = run.grid.cells_of(np.array([point, *_on_plane(prepared, region, clicks[1:])]))
-    off = run.grid.cells_of(near_plane(run, negatives))
+    off = run.grid.cells_of(near_plane(run.grid, negatives))
     past = looked_past(run, prepared.scene, on[0], kind)
-    beside = run.grid.cells_of(near_plane(run, others))
+    beside = run.grid.cells_of(near_plane(run.grid, others))
     cell = _rectangle(run, on, off, beside, kind, past, _support_row(prepared, run, point, kind))
     if cell is None:
         return None
-    surface = surface_of(run.mosaic, run.relief, np.ones_like(run.seen))
-    cell = panel_edges(cell, surface, run.grid.cell_m)
+    surface = surface_of(run.mosaic, run.relief, run.seams)
+    cell = panel_edges(cell, surface, run.grid.cell_m).panel
     handle = None if glimpse else find_handle(run.odds, run.relief, cell)
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_behind(front, prepared.scene.capture.room, kind).wall_m
@@ -140,7 +143,7 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
     if scene.has_depth(click.frame, click.x, click.y) and point is not None:
         region = _region_at(prepared, point, kind)
         front = _front_before(prepared, point, kind)
-        if front is not None and (region is None or _faced(scene, front, point) > _faced(scene, region, point) + 0.2):
+        if front is not None and (region is None or _is_front_of(scene, front, region, point, kind)):
             return front, _support_near(front, point)
         if region is not None:
             return region, point
@@ -152,6 +155,16 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
         if met is not None:
             return met
     return None
+
+
+def _is_front_of(scene: Scene, front: PlaneRegion, clicked: PlaneRegion, point: Vector3, kind: Category) -> bool:
+    """Whether a plane before a clicked one is rather the front: looked at more squarely, and about as likely of that size."""
+    likelier = _size_likelihood(clicked, kind) - _size_likelihood(front, kind)
+    return likelier < tuned(Params).unlikelier and _faced(scene, front, point) > _faced(scene, clicked, point) + 0.2
+
+
+def _size_likelihood(plane: PlaneRegion, kind: Category) -> float:
+    return kind.width.log_likelihood(plane.width_m) + kind.height.log_likelihood(plane.height_m)
 
 
 def _region_at(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:

@@ -32,7 +32,7 @@ from r2c2r_core.segment.appliances.edges import (
 )
 from r2c2r_core.segment.appliances.faces import Patches, patches_on
 from r2c2r_core.segment.fronts.front import Front, front_middle
-from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
 from r2c2r_core.segment.viewpoints import best_views

@@ -7,6 +7,7 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
+from r2c2r_core.segment.appliances.seams import drawer_seams
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
 from r2c2r_core.segment.fronts.front import Front, front_corners, front_leaf, front_panel
@@ -35,7 +36,10 @@ class FoundAppliance:
     _leaves: FilmedLeaves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene))
+        seams_m = drawer_seams(self.front) if self.category.over_drawer is not None else ()
+        object.__setattr__(
+            self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene, self.front.depth_m, seams_m)
+        )
 
     def see(self, frame: Frame) -> View:
         """Its pixels: its box, and its doors where they stand open."""

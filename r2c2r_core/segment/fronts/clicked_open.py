@@ -10,8 +10,9 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.fronts.front import Front, front_leaf
 from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
 from r2c2r_core.segment.motion.leaf import Leaf
-from r2c2r_core.segment.motion.leaf import Params as LeafParams
-from r2c2r_core.segment.motion.likelihood import closed_counts, evidence, lay_out
+from r2c2r_core.segment.motion.likelihood import evidence, lay_out
+from r2c2r_core.segment.motion.track import Params as TrackParams
+from r2c2r_core.segment.planes import regions_at
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -21,30 +22,48 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """When a click is on something that moved."""
 
-    past_share: float = param(0.3, "share", "of the frames that look there, that must look past what was clicked")
+    past_share: float = param(0.25, "share", "of the frames that look there, that must look past what was clicked")
     least_frames: int = param(3, "count", "frames that must look past it", ge=1)
     past_m: float = param(0.06, "m", "behind it, from where they do")
     reach_m: float = param(1.0, "m", "from a click to the middle of a front that may have been swung or drawn there")
+    least_m: float = param(0.1, "m", "side of a leaf: what is narrower is a frame's", source="makers' narrowest fronts: 150 mm")
     off_m: float = param(0.03, "m", "of a click off a leaf in one of the states that are tried")
     gain: float = param(20.0, "log", "by which the clicked frame must show the leaf there rather than in its place")
+    near_steps: int = param(2, "count", "of states beside the likeliest under a click, that are as good as it", ge=0)
+    least: float = param(7.0, "log", "that it must show the leaf there at all: the rest may be that its place is empty")
+    row: float = param(
+        1.5, "ratio", "of a plane's width or height to a leaf's, from which others than that leaf are closed in it"
+    )
+    unknown: float = param(0.1, "share", "of the frames of which nothing is known: hands, gloss, a place of the camera's own")
 
 
 def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int) -> Vector3:
-    """Where a clicked point (world) of an open front lies when it is closed; the point itself where nothing moved there."""
-    scene = prepared.scene
+    """Where a clicked point (world) of an open front lies when it is closed; the point itself where nothing moved there.
+
+    What a front uncovers, the sides and the back of its unit, are boards too, a drawer held open is one in the room, and a
+    front may be filmed open for longer than closed: all frames weigh whether what was clicked was opened there by a leaf near
+    it, or is closed there and was opened itself, or never moved.
+    """
+    params, scene = tuned(Params), prepared.scene
     if not _moved(point, scene):
         return point
-    best, place = tuned(Params).gain, point
-    leaves = _leaves_near(prepared, point)
-    if any(_holds(leaf, point) and _stands_there(leaf, scene) for leaf in leaves):
-        return point
+    frame, leaves = scene.frame(frame_index), _leaves_near(prepared, point)
+    opened: list[tuple[Leaf, Hypothesis, int, Vector3]] = []
     for leaf in leaves:
-        for hypothesis in hypotheses(leaf):
-            if hypothesis.lateral:
-                continue
-            gain, closed = _as_opened(leaf, hypothesis, point, scene, scene.frame(frame_index))
-            if gain > best:
-                best, place = gain, closed
+        if _in_a_row(prepared, point, leaf):
+            continue
+        for hypothesis in _ways(leaf):
+            there, elsewhere, shut, state, closed_point = _as_opened(leaf, hypothesis, point, scene, frame)
+            if there - max(elsewhere, 0.0) > params.least and there - shut > params.gain:
+                opened.append((leaf, hypothesis, state, closed_point))
+    if not opened:
+        return point
+    held = [_opens_by(_in_all(leaf, each, scene)) for leaf in leaves if _holds(leaf, point) for each in _ways(leaf)]
+    best, place = max([*held, tuned(TrackParams).gain]), point
+    for leaf, hypothesis, state, closed_point in opened:
+        log = _in_all(leaf, hypothesis, scene)
+        if _opens_by(log) > best and _is_free(log, state):
+            best, place = _opens_by(log), closed_point
     return place
 
 
@@ -60,15 +79,16 @@ def _moved(point: Vector3, scene: Scene) -> bool:
 
 
 def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
-    """The panels of the runs that it stands before."""
+    """The panels of the runs that it stands before or on."""
     found = []
     for region in prepared.planes:
         local = region.world_from_plane.inverse.apply(point[None])[0]
         reach = tuned(Params).reach_m
-        if not -reach < local[1] < 0 or abs(local[0]) > region.width_m / 2 + reach:
+        if not -reach < local[1] < tuned(Params).off_m or abs(local[0]) > region.width_m / 2 + reach:
             continue
         run = prepared.run_of(region)
         leaves = [] if run is None else [front_leaf(Front(run, cell, None, 0.0)) for cell in run.cells]
+        leaves = [leaf for leaf in leaves if min(leaf.width_m, leaf.height_m) > tuned(Params).least_m]
         found += [leaf for leaf in leaves if np.linalg.norm(leaf.world_from_front.translation - point) < reach]
     return found
 
@@ -79,23 +99,56 @@ def _holds(leaf: Leaf, point: Vector3) -> bool:
     return bool(abs(local[1]) < tuned(Params).off_m and abs(local[0]) < leaf.half_m[0] and abs(local[2]) < leaf.half_m[1])
 
 
-def _stands_there(leaf: Leaf, scene: Scene) -> bool:
-    """Whether frames see a board in its closed place more often than they look past it: of one held open, the scan has both."""
-    agrees, through, _ = closed_counts(leaf, scene.frames, scene).sum(axis=0)
-    return bool(agrees > through)
+def _in_a_row(prepared: PreparedCapture, point: Vector3, leaf: Leaf) -> bool:
+    """Whether what was clicked lies flush with more than a leaf: fronts stand in a row where they are closed."""
+    row = tuned(Params).row
+    return any(
+        region.width_m > row * leaf.width_m or region.height_m > row * leaf.height_m
+        for region in regions_at(prepared.planes, point)
+    )
 
 
-def _as_opened(leaf: Leaf, hypothesis: Hypothesis, point: Vector3, scene: Scene, frame: Frame) -> tuple[float, Vector3]:
-    """How much likelier a frame makes the state that brings the leaf under a click than the closed one, and the click there."""
+def _ways(leaf: Leaf) -> list[Hypothesis]:
+    """The joints that take a leaf out of its plane."""
+    return [each for each in hypotheses(leaf) if not each.lateral]
+
+
+def _in_all(leaf: Leaf, hypothesis: Hypothesis, scene: Scene) -> np.ndarray:
+    """Of each frame and state (frames, states) how much likelier it is than that nothing is known there, as a logarithm."""
+    states, unknown = lay_out(leaf, hypothesis), tuned(Params).unknown
+    log = np.stack([evidence(states, scene, frame) for frame in scene.frames])
+    return np.logaddexp(np.log(unknown), np.log1p(-unknown) + log)
+
+
+def _opens_by(log: np.ndarray) -> float:
+    """How much likelier all frames make it that a leaf was opened by a joint than that it never moved."""
+    return float((log.max(axis=1) - log[:, 0]).sum())
+
+
+def _is_free(log: np.ndarray, state: int) -> bool:
+    """Whether nothing stands where a leaf is in a state, in the frames that show it closed: another front would."""
+    closed = log.argmax(axis=1) == 0
+    return bool(log[closed, state].sum() < 0)
+
+
+def _as_opened(
+    leaf: Leaf, hypothesis: Hypothesis, point: Vector3, scene: Scene, frame: Frame
+) -> tuple[float, float, float, int, Vector3]:
+    """How likely the likeliest state that brings the leaf under a click is, any other, and the closed one; that state; and the
+    click where the leaf is closed.
+
+    By one frame, as logarithms, to knowing nothing of what stands there.
+    """
     front = leaf.world_from_front.inverse.apply(point[None])
     local = np.concatenate([hypothesis.pose(float(state)).inverse.apply(front) for state in hypothesis.states])
     half_w, half_h = leaf.half_m
-    off = np.minimum(np.abs(local[:, 1]), np.abs(local[:, 1] - tuned(LeafParams).thickness_m))
+    off = np.minimum(np.abs(local[:, 1]), np.abs(local[:, 1] - leaf.thickness_m))
     on = (off < tuned(Params).off_m) & (np.abs(local[:, 0]) < half_w) & (np.abs(local[:, 2]) < half_h)
     on[0] = False
     if not on.any():
-        return 0.0, point
+        return 0.0, 0.0, 0.0, 0, point
     log = evidence(lay_out(leaf, hypothesis), scene, frame)
     best = int(np.argmax(np.where(on, log, -np.inf)))
     closed = leaf.world_from_front.apply(np.array([[local[best, 0], 0.0, local[best, 2]]]))[0]
-    return float(log[best] - max(log[0], 0.0)), closed
+    near = np.abs(np.arange(len(log)) - best) <= tuned(Params).near_steps
+    return float(log[best]), float(log[~near & ~on].max(initial=-np.inf)), float(log[0]), best, closed

@@ -11,12 +11,12 @@ from r2c2r_core.model.inputs import DrawnFront, DrawnHandle
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, front_panel
+from r2c2r_core.segment.mosaics.handles import GridHandle
+from r2c2r_core.segment.mosaics.lines import gather, scored
+from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, choose_frames, frame_quality, make_tile
+from r2c2r_core.segment.mosaics.relief import measure_relief
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
-from r2c2r_core.segment.runs.handles import GridHandle
-from r2c2r_core.segment.runs.lines import gather, scored
-from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid, choose_frames, frame_quality, make_tile
-from r2c2r_core.segment.runs.relief import measure_relief
 from r2c2r_core.segment.runs.run import Run, run_on
 from r2c2r_core.segment.scene import Scene
 

@@ -40,7 +40,7 @@ class FoundFront:
     _leaves: FilmedLeaves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene))
+        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene, self.front.depth_m))
 
     def see(self, frame: Frame) -> View:
         """Its pixels where its leaves stand in the frame."""

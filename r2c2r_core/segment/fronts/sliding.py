@@ -10,9 +10,9 @@ import numpy as np
 
 from r2c2r_core.calibration import probability
 from r2c2r_core.segment.fronts.front import Front, front_middle
+from r2c2r_core.segment.mosaics.edges import as_lab
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.edges import as_lab
-from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.tuning import param, tuned
 
 _GUESS = "a guess, stated as one"

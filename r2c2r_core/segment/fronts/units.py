@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.calibration import probability
 from r2c2r_core.kitchen.category import Category
-from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.tuning import param, tuned
 
@@ -26,6 +27,11 @@ class Params:
     )
     row_m: float = param(0.015, "m", "how exactly the fronts of a row line up")
     tall_m: float = param(0.35, "m", "height from which a front is one of a row upright")
+    lit_share: float = param(
+        0.125, "share", "of the rows of black glass that return light, on average", gt=0, source="ovens: a strip of controls"
+    )
+    lit_row: float = param(0.9, "share", "of a row seen by depth, from where it is none of black glass")
+    about_m: float = param(0.02, "m", "about a click, within which depth tells black glass")
 
 
 def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
@@ -46,7 +52,8 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
         for bottom in bottoms
         if unit.height.holds((bottom - top) * cell_m)
     ]
-    rated = [(_worth(run, cell, unit), cell) for cell in options]
+    lit_worth = 0.0 if _returns_light(run, column, row) else -1 / params.lit_share
+    rated = [(_worth(run, cell, unit) + lit_worth * _lit(run, cell), cell) for cell in options]
     best = max((worth for worth, _ in rated), default=-np.inf)
     equal = [(worth, cell) for worth, cell in rated if worth > best - params.nested_worth]
     largest = max((cell.width * cell.height for _, cell in equal), default=0.0)
@@ -54,14 +61,20 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
     return max(outer, key=lambda option: option[0])[1] if outer else None
 
 
-def edge_odds(run: Run, cell: Cell) -> tuple[float, ...]:
-    """Mean log-odds of each edge of a rectangle: left, right, top, bottom."""
-    return (
-        run.odds.along(0, cell.left, cell.top, cell.bottom),
-        run.odds.along(0, cell.right, cell.top, cell.bottom),
-        run.odds.along(1, cell.top, cell.left, cell.right),
-        run.odds.along(1, cell.bottom, cell.left, cell.right),
-    )
+def _returns_light(run: Run, column: float, row: float) -> bool:
+    """Whether most of what is round a click has depth."""
+    reach = tuned(Params).about_m / run.grid.cell_m
+    return _seen(run, Cell(column - reach, row - reach, column + reach, row + reach)).mean() > 0.5
+
+
+def _lit(run: Run, cell: Cell) -> float:
+    """The share of a rectangle's rows that return light from end to end."""
+    return float((_seen(run, cell).mean(axis=1) > tuned(Params).lit_row).mean())
+
+
+def _seen(run: Run, cell: Cell) -> Mask:
+    rows, columns = (slice(max(round(a), 0), round(b) + 1) for a, b in ((cell.top, cell.bottom), (cell.left, cell.right)))
+    return run.seen[rows, columns]
 
 
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
@@ -69,7 +82,7 @@ def _worth(run: Run, cell: Cell, unit: Category) -> float:
     params = tuned(Params)
     cell_m = run.grid.cell_m
     off = np.array([unit.width.deviation(cell.width * cell_m), unit.height.deviation(cell.height * cell_m)])
-    edges = params.edge_weight * sum(edge_odds(run, cell)) + params.seam_worth * _seam_inside(run, cell)
+    edges = params.edge_weight * sum(run.odds.of_edges(cell)) + params.seam_worth * _seam_inside(run, cell)
     return edges - 0.5 * float(off @ off) + params.row_worth * _in_row(run, cell)
 
 
@@ -77,7 +90,7 @@ def _seam_inside(run: Run, cell: Cell) -> float:
     """The probability of the likeliest of the run's upright lines that would part a rectangle from top to bottom."""
     slack = tuned(Params).row_m / run.grid.cell_m
     inside = {other.left for other in run.cells if cell.left + slack < other.left < cell.right - slack}
-    odds = max((run.odds.along(0, at, cell.top, cell.bottom) for at in inside), default=-np.inf)
+    odds = max((float(run.odds.along(0, at, cell.top, cell.bottom).mean()) for at in inside), default=-np.inf)
     return probability(odds)
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from r2c2r_core.codec import decode_noun, encode_noun
+from r2c2r_core.segment.mosaics.handles import GridHandle
+from r2c2r_core.segment.mosaics.lines import Evidence
+from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.handles import GridHandle
-from r2c2r_core.segment.runs.lines import Evidence
-from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid
-from r2c2r_core.segment.runs.panel_net import PanelOdds
-from r2c2r_core.segment.runs.relief import Relief
 from r2c2r_core.segment.runs.run import Run
 
 T = TypeVar("T")

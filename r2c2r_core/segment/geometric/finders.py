@@ -7,10 +7,11 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.kitchen.category import Category
-from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt
+from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
+from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
 from r2c2r_core.segment.fronts.clicked_open import closed_place
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
@@ -43,7 +44,9 @@ def find_object(
     """
     if category.kind == "front":
         closed = [closed_place(prepared, p, c.frame) for p, c in zip(positives.points, positives.clicks, strict=True)]
-        found = _front(prepared, category, np.array(closed), negatives.points, others)
+        first = positives.clicks[0]
+        glass = None if dark_place(prepared.scene, prepared.planes, first) is None else first
+        found = _front(prepared, category, np.array(closed), negatives.points, others, glass)
         if found is not None:
             return found
     if category.kind == "appliance":
@@ -91,12 +94,21 @@ def glimpse_object(
 
 
 def _front(
-    prepared: PreparedCapture, category: Category, positives: Points, negatives: Points, others: Points
+    prepared: PreparedCapture,
+    category: Category,
+    positives: Points,
+    negatives: Points,
+    others: Points,
+    glass: PromptPoint | None = None,
 ) -> FoundFront | None:
-    """On the nearest plane where it is as large as its category is, else on the nearest: at a corner, two are near."""
+    """On the nearest plane where it is as large as its category is, else on the nearest: at a corner, two are near.
+
+    `glass` is the first click where it has no depth: it is in nothing that was seen of its plane, then, which may go on there.
+    """
     best: Front | None = None
-    for region in regions_at(prepared.planes, positives[0]):
-        run = prepared.run_of(region)
+    for region in regions_at(prepared.planes, positives[0], beside_m=None if glass is None else category.longest_m):
+        dark_m = 0.0 if glass is None else dark_beyond(prepared.scene, region, glass, positives[0], category)
+        run = prepared.run_of(region, margin_m=dark_m)
         front = None
         if run is not None:
             front = find_front(run, positives, negatives, pair=category.may_be_pair, kind=category, others=others)

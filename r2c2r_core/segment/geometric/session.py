@@ -27,9 +27,12 @@ from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.cropped import cropped, world_crop
 from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
+from r2c2r_core.segment.fronts.clicked_dark import dark_place
 from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.fronts.front import holds
 from r2c2r_core.segment.geometric.cache import kept
 from r2c2r_core.segment.geometric.finders import find_drawn, find_object, glimpse_object
+from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import Hits
 from r2c2r_core.segment.prompts import check_prompt
@@ -181,11 +184,23 @@ class GeometricSession:
         for prompt in prompts:
             if category_of(prompt.category).kind == "thing" or prompt.front is not None:
                 continue
-            with contextlib.suppress(R2C2RError):  # what is not found is told by `track`
-                own = self.find(prompt)
-                within = [click for other, click, point in hits if other is not prompt and _is_on(own, point)]
+            if (front := self._front_of(prompt)) is not None:
+                within = [click for other, click, point in hits if other is not prompt and holds(*front, point)]
                 found |= {prompt.name: tuple(within)} if within else {}
         return found
+
+    def _front_of(self, prompt: ObjectPrompt) -> tuple[PlaneGrid, Cell] | None:
+        """Where the front of an object lies, if it has one; kept, for whenever other clicks change it is asked again."""
+
+        def where() -> tuple[PlaneGrid, Cell] | None:
+            with contextlib.suppress(R2C2RError):  # what is not found is told by `track`
+                found = self.find(prompt)
+                if isinstance(found, FoundFront | FoundAppliance):
+                    return found.front.run.grid, found.front.cell
+            return None
+
+        key = hashlib.sha256(repr(prompt).encode()).hexdigest()[:16]
+        return kept(self.folder / f"front-{key}.noun", where)
 
     def _hit(self, click: PromptPoint) -> Vector3 | None:
         known = any(frame.index == click.frame for frame in self.scene.frames)
@@ -205,7 +220,7 @@ class GeometricSession:
         tasks = [(region, 0.0) for region in self.planes]
         tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
         for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
-            progress.at(done / len(tasks), f"cutting furniture runs {done}/{len(tasks)}")
+            progress.at(done / len(tasks), f"looking for fronts: {done} of {len(tasks)} furniture runs")
 
     def _views(self, prompt: ObjectPrompt) -> Iterator[tuple[int, View]]:
         """Frames that show it, the one clicked last first, then outwards both ways."""
@@ -223,33 +238,30 @@ class GeometricSession:
         """Its category, and what was clicked on it and off it."""
         check_prompt(self.scene.capture, prompt)
         category = category_of(prompt.category)
-        positives = self._hits(prompt, 1, must_hit=category.kind != "appliance")
-        return category, positives, self._hits(prompt, 0, must_hit=False)
+        return category, self._hits(prompt, 1, category), self._hits(prompt, 0, category)
 
-    def _hits(self, prompt: ObjectPrompt, label: int, *, must_hit: bool) -> Hits:
-        """What the clicks of one label hit; raises PromptError where the first must hit a surface and does not.
+    def _hits(self, prompt: ObjectPrompt, label: int, category: Category) -> Hits:
+        """What the clicks of one label hit; raises PromptError where the first on what is no appliance hits nothing.
 
         A later one on what has no depth (glass, gloss, a far wall) counts where its ray passes nearest to the first.
         """
         clicks: list[PromptPoint] = []
         points: list[Vector3] = []
         for click in (click for click in prompt.points if click.label == label):
-            point = self.scene.pick(click.frame, click.x, click.y)
+            point = dark_place(self.scene, self.planes, click) if category.kind == "front" else None
+            if point is None:
+                point = self.scene.pick(click.frame, click.x, click.y)
             if point is None and points and label == 1:
                 origin, ray = self.scene.ray(click.frame, click.x, click.y)
                 point = origin + ray * float((points[0] - origin) @ ray)
             if point is not None:
                 clicks.append(click)
                 points.append(point)
-            elif must_hit:
+            elif label == 1 and category.kind != "appliance":
                 raise PromptError(
                     _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
                 )
         return Hits(tuple(clicks), np.array(points).reshape(-1, 3))
-
-
-def _is_on(found: Found, point: Vector3) -> bool:
-    return isinstance(found, FoundFront | FoundAppliance) and found.front.holds(point)
 
 
 def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.camera import pixel_centres, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.motion.leaf import OpenLeaf, behind, corners
+from r2c2r_core.segment.motion.leaf import OpenLeaf, corners
 from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -25,8 +26,11 @@ class Params:
     rear_m: float = param(0.03, "m", "behind the face of a drawer's rear board, within which it ends")
     shade: float = param(2.2, "ratio", "darker or lighter than the leaf usually is, from where it is no shade on it", gt=1)
     hue_lab: float = param(18.0, "grey", "off the leaf's hue in that shade, from where it is no part of it")
+    touches_m: float = param(0.015, "m", "before its face, within which depth is the leaf's: more may be a hand on its handle")
+    hole_px: float = param(3.0, "px", "of the depth image, of a hole between two surfaces on either side", gt=0)
     hand_m: float = param(0.03, "m", "width of what may be a hand or a sleeve: handles are narrower")
-    told_share: float = param(0.25, "share", "of a leaf's pixels that need depth, for its usual colour to be known")
+    told_share: float = param(0.1, "share", "of a leaf's pixels that need depth, for its usual colour to be known")
+    hand_share: float = param(0.5, "share", "of a leaf that a hand covers, at most: black glass has depth on its rim alone")
 
 
 def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float]:
@@ -36,19 +40,35 @@ def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float
         front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m, fused=False
     )  # a leaf that slides passes others a track away
     mask, share = visible_mask(_faces(opened, frame), scene, frame, near)
-    mask = mask & ~_dark_before(mask, opened, scene, frame)
-    return (mask | _drawn_out(opened, scene, frame) if opened.way == "out" else mask), share
+    seen = _seen(opened, scene, frame)
+    mask = mask & ~_hand_before(mask, opened, seen, scene, frame)
+    return (mask | _drawn_out(opened, seen, frame) if opened.way == "out" else mask), share
 
 
-def _dark_before(mask: Mask, opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
-    """Pixels of the mask without depth, in a patch as wide as a hand that is coloured as the leaf is not.
+def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
+    """What depth saw, in the leaf's frame (h, w, 3); NaN where nothing was measured nearby.
 
-    Skin in shade, gloves and sleeves return no light to a phone's LiDAR: depth alone does not tell them from the leaf.
+    Between two surfaces depth has a thin line of holes: each of its pixels is of what is nearest to it.
+    """
+    camera, depth = frame.depth_camera, scene.depth(frame.index)
+    away, nearest = distance_transform_edt(depth == 0, return_indices=True)
+    filled = np.where(away <= tuned(Params).hole_px, depth[tuple(nearest)], np.nan)
+    leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
+    return leaf_from_camera.apply(unproject(pixel_centres(camera), filled, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
+
+
+def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, frame: Frame) -> Mask:
+    """Pixels of the mask that depth does not see on the leaf, in a patch as wide as a hand that is coloured as the leaf is not.
+
+    A hand on a handle stands little before its leaf, and skin in shade, gloves and sleeves return no light to a phone's LiDAR:
+    depth alone does not tell them from the leaf.
     """
     params = tuned(Params)
     size = (mask.shape[1], mask.shape[0])
-    known = cv2.resize((scene.depth(frame.index) > 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-    told = mask & known
+    from_behind = float(opened.world_from_leaf.inverse.apply(frame.world_from_camera.translation[None])[0, 1]) > 0
+    before = seen[..., 1] - opened.leaf.thickness_m if from_behind else -seen[..., 1]
+    on_leaf = (scene.depth(frame.index) > 0) & (before < params.touches_m)
+    told = mask & (cv2.resize(on_leaf.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
     if np.count_nonzero(told) < max(params.told_share * np.count_nonzero(mask), 1):
         return np.zeros_like(mask)
     lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB).astype(np.float32)
@@ -60,13 +80,15 @@ def _dark_before(mask: Mask, opened: OpenLeaf, scene: Scene, frame: Frame) -> Ma
     width = max(int(params.hand_m * frame.rgb_camera.fx / max(away, 0.3)), 3)
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     patch = cv2.morphologyEx((unlike & ~told).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return cv2.morphologyEx(patch, cv2.MORPH_OPEN, element) > 0
+    hand = cv2.morphologyEx(patch, cv2.MORPH_OPEN, element) > 0
+    covers = np.count_nonzero(hand & mask) < params.hand_share * np.count_nonzero(mask)
+    return hand if covers else np.zeros_like(mask)
 
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:
     """The sides of the board that face the camera."""
     face = corners(opened.leaf)
-    back = face + behind()
+    back = face + opened.leaf.behind
     quads = [face, back[::-1], *(np.stack([face[k], back[k], back[k - 1], face[k - 1]]) for k in range(4))]
     facets = [Facet(opened.world_from_leaf.apply(quad)) for quad in quads]
     camera = frame.world_from_camera.translation
@@ -78,19 +100,15 @@ def _side(facet: Facet, point: np.ndarray) -> float:
     return float((point - facet.corners_world[0]) @ facet.normal)
 
 
-def _drawn_out(opened: OpenLeaf, scene: Scene, frame: Frame) -> Mask:
+def _drawn_out(opened: OpenLeaf, seen: np.ndarray, frame: Frame) -> Mask:
     """Pixels whose depth lies behind a drawer's front: its box, and what is in it.
 
     Of a box whose rear was not seen, what has come out of the unit.
     """
-    camera, depth = frame.depth_camera, scene.depth(frame.index)
-    leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
-    local = leaf_from_camera.apply(unproject(pixel_centres(camera), depth, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
     out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
     if opened.rear_m is not None:
         out = max(out, opened.rear_m + tuned(Params).rear_m)
     half_w, half_h = opened.leaf.half_m
-    inside = (depth > 0) & (np.abs(local[..., 0]) < half_w) & (np.abs(local[..., 2]) < half_h)
-    inside &= (local[..., 1] > 0) & (local[..., 1] < out)
+    inside = (np.abs(seen[..., 0]) < half_w) & (np.abs(seen[..., 2]) < half_h) & (seen[..., 1] > 0) & (seen[..., 1] < out)
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
     return np.asarray(cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5)

@@ -1,6 +1,6 @@
 """The leaves of one object as they were filmed: the motions they were seen to make, found once, and where they stand open."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -9,11 +9,10 @@ import numpy as np
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category, Opening
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.motion import DOOR, DRAWER, JointMotion
 from r2c2r_core.segment.motion.hypotheses import Way, moved
-from r2c2r_core.segment.motion.inside import measure_inside
+from r2c2r_core.segment.motion.inside import front_thickness, measure_inside
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
-from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.motion.track import find_motion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -30,6 +29,7 @@ class Params:
         source="few frames overrule it: each is worth up to 80",
     )
     ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "that a door stands open, from where one sees behind it")
+    beyond_m: float = param(0.05, "m", "that a unit may be deeper than is known: usual depths differ by as much")
     ajar_m: float = param(0.08, "m", "that what slides stands open, from where one sees behind it")
 
 
@@ -48,6 +48,8 @@ class FilmedLeaves:
     whole: Leaf
     category: Category
     scene: Scene
+    depth_m: float  # of its unit: to the wall behind it, or the usual depth
+    seams_m: tuple[float, ...] = ()  # heights in the front frame at which a drawer below its doors may end, likeliest first
     _filmed: tuple[tuple[Leaf, JointMotion | None], ...] | None = field(default=None, init=False, repr=False)
 
     @property
@@ -69,13 +71,33 @@ class FilmedLeaves:
 
     def _all(self) -> tuple[tuple[Leaf, JointMotion | None], ...]:
         if self._filmed is None:
-            usual = tuned(Params).usual
-            found = [
-                (leaf, find_motion(leaf, self.scene, dict.fromkeys(ways, usual), part, only=bool(part)))
-                for part, leaf, ways in _leaves(self.whole, self.category)
-            ]
-            self._filmed = tuple((leaf, motion and _with_inside(leaf, motion, self.scene)) for leaf, motion in found)
+            found = self._over_drawer() or [self._looked_for(*leaf) for leaf in _leaves(self.whole, self.category)]
+            self._filmed = tuple(
+                (leaf, motion and _with_inside(leaf, motion, self.scene, self.depth_m)) for leaf, motion in found
+            )
         return self._filmed
+
+    def _over_drawer(self) -> list[tuple[Leaf, JointMotion | None]]:
+        """A drawer that was filmed below its doors, and those; none where nothing below a seam was drawn out."""
+        for seam_m in self.seams_m:
+            below, above = _parted(self.whole, seam_m)
+            drawer = self._looked_for(DRAWER, below, _USUAL["drawer"])
+            if drawer[1] is not None:
+                return [
+                    drawer,
+                    *(self._looked_for(part or DOOR, leaf, ways) for part, leaf, ways in _leaves(above, self.category)),
+                ]
+        return []
+
+    def _looked_for(self, part: str, leaf: Leaf, ways: tuple[Way, ...]) -> tuple[Leaf, JointMotion | None]:
+        """A leaf with its motion; one that shows itself thicker than a board is looked for again as thick."""
+        usual = dict.fromkeys(ways, tuned(Params).usual)
+        motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
+        thickness_m = motion and front_thickness(leaf, _places(leaf, motion), self.scene)
+        if not thickness_m:
+            return leaf, motion
+        thick = replace(leaf, thickness_m=thickness_m)
+        return thick, find_motion(thick, self.scene, usual, part, only=bool(part))
 
 
 def _state(motion: JointMotion, frame_index: int) -> float:
@@ -83,19 +105,30 @@ def _state(motion: JointMotion, frame_index: int) -> float:
     return 0.0 if state is None or state.value is None else state.value
 
 
-def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene) -> JointMotion:
+def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) -> JointMotion:
     """The motion with what the frames show behind the leaf, where it stands open far enough to be looked behind."""
+    params, places = tuned(Params), _places(leaf, motion)
+    drawn_out = _way(motion, leaf) == "out"
+    inside = measure_inside(
+        leaf,
+        places if drawn_out else lambda frame: leaf.world_from_front if places(frame) is not None else None,
+        scene,
+        drawn_out_m=motion.largest if drawn_out else 0.0,
+        deepest_m=depth_m + params.beyond_m,
+    )
+    return replace(motion, inside=inside)
+
+
+def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]:
+    """Where a leaf stands (world_from_leaf) in frames in which it is open far enough to be looked behind; None in others."""
     params = tuned(Params)
     ajar = params.ajar_rad if motion.kind == "revolute" else params.ajar_m
-    drawn_out = _way(motion, leaf) == "out"
 
     def place(frame: Frame) -> Rigid3 | None:
         state = _state(motion, frame.index)
-        if state < ajar:
-            return None
-        return _opened(leaf, motion, state).world_from_leaf if drawn_out else leaf.world_from_front
+        return _opened(leaf, motion, state).world_from_leaf if state >= ajar else None
 
-    return replace(motion, inside=measure_inside(leaf, place, scene, drawn_out_m=motion.largest if drawn_out else 0.0))
+    return place
 
 
 def _way(motion: JointMotion, leaf: Leaf) -> Literal["hinge", "out", "along"]:
@@ -110,7 +143,7 @@ def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     assert motion.pivot_world is not None
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
     depth_m = None if motion.inside is None else motion.inside.depth_m
-    rear_m = None if depth_m is None else depth_m + tuned(LeafParams).thickness_m
+    rear_m = None if depth_m is None else depth_m + leaf.thickness_m
     return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=_way(motion, leaf), rear_m=rear_m)
 
 
@@ -122,6 +155,17 @@ def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way,
         return [("", whole, _USUAL[category.opens])]
     half = whole.width_m / 2
     return [("left", _part(whole, -half / 2, half), ("left",)), ("right", _part(whole, half / 2, half), ("right",))]
+
+
+def _parted(whole: Leaf, seam_m: float) -> tuple[Leaf, Leaf]:
+    """What of a front lies below a height and above it."""
+    half = whole.height_m / 2
+    return _band(whole, -half, seam_m), _band(whole, seam_m, half)
+
+
+def _band(whole: Leaf, low_m: float, high_m: float) -> Leaf:
+    place = whole.world_from_front @ Rigid3(np.eye(3), np.array([0.0, 0.0, (low_m + high_m) / 2]))
+    return Leaf(world_from_front=place, width_m=whole.width_m, height_m=high_m - low_m)
 
 
 def _part(whole: Leaf, x_m: float, width_m: float) -> Leaf:

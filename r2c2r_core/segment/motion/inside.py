@@ -11,7 +11,6 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import Inside
 from r2c2r_core.segment.motion.leaf import Leaf
-from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -33,6 +32,15 @@ class Params:
     shows: float = param(0.15, "share", "of the points of the clearest level, that a shelf has: less is what lies on one", gt=0)
     boards_m: tuple[float, ...] = param((0.01, 0.06), "m", "of a unit's boards and a machine's walls, thinnest and thickest")
     apart_m: float = param(0.08, "m", "between two shelves, at least")
+    edge_m: float = param(0.02, "m", "of a front's outline that shows its edge: depth errs there by as much", gt=0)
+    thin_m: tuple[float, float] = param((0.01, 0.02), "m", "behind the outer face, where every board has its edge")
+    thick_m: float = param(0.035, "m", "from where a front is thicker than a board: depth blurs its edges by a pixel")
+    thickest_m: float = param(0.1, "m", "of a front: what goes on behind it is a side of what it brings out")
+    free: float = param(0.99, "ratio", "of the way of what moves freely to that of its leaf's middle", gt=0)
+    ends: float = param(0.15, "share", "of the points of so thin an edge, from which it has ended", gt=0)
+    beyond: float = param(
+        0.05, "ratio", "of points behind a rear board to those on it, at most: a row of jars is looked past", gt=0
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,48 +49,89 @@ class _Cloud:
 
     points: Points
     frame: np.ndarray
+    rest_y: np.ndarray  # from the outer face where the front is closed
 
     def where(self, keep: np.ndarray) -> "_Cloud":
-        return _Cloud(self.points[keep], self.frame[keep])
+        return _Cloud(self.points[keep], self.frame[keep], self.rest_y[keep])
 
 
 def measure_inside(
-    leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, *, drawn_out_m: float = 0.0
+    leaf: Leaf,
+    place: Callable[[Frame], Rigid3 | None],
+    scene: Scene,
+    *,
+    drawn_out_m: float = 0.0,
+    deepest_m: float = np.inf,
 ) -> Inside | None:
     """The compartment that a front closes, or the drawer that it pulls out; None where none of its boards were seen.
 
     `place` is world_from_front of what is measured in the frames that show its inside, None in others: a drawer's box moves
-    with its front, a carcass stays. `drawn_out_m` is how far a drawer came out at most: its rear board stays in the unit,
-    whose own face would else look like one.
+    with its front, a carcass stays. `drawn_out_m` is how far a drawer came out at most: its rear board stays in the unit.
+    Beyond `deepest_m` behind the front its unit has ended.
     """
     params, half = tuned(Params), np.array(leaf.half_m)
-    cloud = _behind(leaf, place, scene)
+    cloud = _behind(leaf, place, scene, min(deepest_m, params.deepest_m))
     within = (np.abs(cloud.points[:, 0]) < half[0] - params.rim_m) & (np.abs(cloud.points[:, 2]) < half[1] - params.rim_m)
-    rear = _rear(cloud.where(within), leaf, max(params.shallowest_m, drawn_out_m + params.rim_m))
-    if rear is None:
-        return None
-    front = tuned(LeafParams).thickness_m
-    before = cloud.where((cloud.points[:, 1] > front + params.rim_m) & (cloud.points[:, 1] < rear - params.rim_m))
+    rear = _rear(cloud.where(within), leaf, drawn_out_m)
+    front = leaf.thickness_m
+    depth_m = None if rear is None else rear - front
+    before = cloud.where((cloud.points[:, 1] > front + params.rim_m) & (cloud.points[:, 1] < (rear or np.inf) - params.rim_m))
     if drawn_out_m > 0:
-        return Inside(depth_m=rear - front)
+        return None if depth_m is None else Inside(depth_m=depth_m)
     sides = _ends([at for at, _ in _faces(before, 0, across=1, least_span_m=params.rim_m)], leaf.half_m[0])
     levels = _faces(before, 2, across=0, least_span_m=params.spans * leaf.width_m)
     most = max((count for _, count in levels), default=0)
     level = sorted(at for at, count in levels if count > params.shows * most)
     bottom, top = _ends(level, leaf.half_m[1])
-    return Inside(
-        depth_m=rear - front,
+    found = Inside(
+        depth_m=depth_m,
         width_m=_between(*sides),
         height_m=_between(bottom, top),
         shelves_m=()
         if bottom is None
         else tuple(at - bottom for at in level if bottom + params.apart_m < at < (top or np.inf)),
     )
+    return None if found == Inside() else found
 
 
-def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> _Cloud:
+def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> float | None:
+    """How thick a front is, by how far its free edges reach behind its outer face; None where none is thicker than a board.
+
+    `place` is world_from_leaf in the frames that show it open. At its hinge, and on from there, its unit stands behind it.
+    """
     params, (half_w, half_h) = tuned(Params), leaf.half_m
-    found, numbers = [np.zeros((0, 3))], [np.zeros(0, int)]
+    cloud = _behind(leaf, place, scene, params.thickest_m + params.edge_m)
+    free = cloud.where(_free(cloud, leaf, place, scene))
+    x, y, z = free.points.T
+    found = []
+    for along, half in ((x, half_w), (-x, half_w), (z, half_h), (-z, half_h)):
+        edges = np.arange(params.thin_m[0], params.thickest_m + params.bin_m, params.bin_m)
+        count, _ = np.histogram(y[along > half - params.edge_m], edges)
+        thin = count[edges[:-1] < params.thin_m[1]]
+        ended = np.flatnonzero(count < params.ends * thin.mean())
+        if thin.sum() >= params.least_points and len(ended) > 0 and edges[ended[0]] > params.thick_m:
+            found.append((int(thin.sum()), float(edges[ended[0]])))
+    return max(found)[1] if found else None
+
+
+def _free(cloud: _Cloud, leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> np.ndarray:
+    """Which points lie on the part of a leaf (n,) that goes farther than its middle, or as far."""
+    moved = {}
+    for frame in scene.frames:
+        world_from_leaf = place(frame)
+        if world_from_leaf is not None:
+            turn = leaf.world_from_front.inverse @ world_from_leaf
+            moved[frame.index] = (turn.rotation - np.eye(3), turn.translation)
+    if not len(cloud.frame):
+        return np.zeros(0, bool)
+    turned, shifted = (np.stack([moved[int(n)][k] for n in cloud.frame]) for k in (0, 1))
+    way = np.linalg.norm(np.einsum("nij,nj->ni", turned, cloud.points) + shifted, axis=1)
+    return np.asarray(way > tuned(Params).free * np.linalg.norm(shifted, axis=1))
+
+
+def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, deepest_m: float) -> _Cloud:
+    half_w, half_h = leaf.half_m
+    found, numbers, rest = [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
     for frame in scene.frames:
         world_from_front = place(frame)
         if world_from_front is None:
@@ -91,16 +140,38 @@ def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -
         seen = depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64)
         local = (world_from_front.inverse @ frame.world_from_camera).apply(seen)
         keep = (np.abs(local[:, 0]) < half_w) & (np.abs(local[:, 2]) < half_h)
-        keep &= (local[:, 1] > 0) & (local[:, 1] < params.deepest_m)
+        keep &= (local[:, 1] > 0) & (local[:, 1] < deepest_m)
         found.append(local[keep])
         numbers.append(np.full(int(keep.sum()), frame.index))
-    return _Cloud(np.concatenate(found), np.concatenate(numbers))
+        rest.append(leaf.world_from_front.inverse.apply(world_from_front.apply(local[keep]))[:, 1])
+    return _Cloud(np.concatenate(found), np.concatenate(numbers), np.concatenate(rest))
 
 
-def _rear(cloud: _Cloud, leaf: Leaf, least_m: float) -> float | None:
-    """Where the rear board's face stands: the furthest face square to the depth, behind what stands on the shelves."""
-    faces = _faces(cloud, 1, across=0, least_span_m=tuned(Params).spans * leaf.width_m)
-    return max((at for at, _ in faces if at > least_m), default=None)
+def _rear(cloud: _Cloud, leaf: Leaf, drawn_out_m: float) -> float | None:
+    """Where the rear board's face stands: the furthest face square to the depth; None where one sees past that.
+
+    Past a drawer's rear board one sees into the unit, which stays where it is while the drawer moves.
+    """
+    params = tuned(Params)
+    faces = _faces(cloud, 1, across=0, least_span_m=params.spans * leaf.width_m)
+    if drawn_out_m > 0:
+        faces = [(at, count) for at, count in faces if _comes_along(cloud, at, count, drawn_out_m)]
+    rear, count = max(((at, count) for at, count in faces if at > params.shallowest_m), default=(None, 0))
+    if rear is None or drawn_out_m > 0:
+        return rear
+    beyond = np.count_nonzero(cloud.points[:, 1] > rear + params.beside_m)
+    return rear if beyond < params.beyond * count else None
+
+
+def _comes_along(cloud: _Cloud, at: float, count: int, drawn_out_m: float) -> bool:
+    """Whether more points lie in a face that moves with its drawer than in one that stands where the drawer comes from.
+
+    Where the drawer stood still the two are one: then only what lies in the unit even so is taken for a rear board.
+    """
+    spread_m = tuned(Params).spread_m
+    stands_at = np.median(cloud.rest_y[np.abs(cloud.points[:, 1] - at) < spread_m])
+    stays = np.count_nonzero(np.abs(cloud.rest_y - stands_at) < spread_m)
+    return bool(count > stays or (count == stays and at > drawn_out_m + tuned(Params).rim_m))
 
 
 def _ends(faces: list[float], half_m: float) -> tuple[float | None, float | None]:

@@ -1,6 +1,6 @@
 """A leaf that may move: the rectangle of a closed front, and points on it and around it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,7 +14,9 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """Where a leaf is looked at."""
 
-    thickness_m: float = param(0.019, "m", "of a front's board", source="European lists: fronts of 16-22 mm")
+    thickness_m: float = param(
+        0.019, "m", "of a front's board, where no more is seen of it", source="European lists: fronts of 16-22 mm"
+    )
     across: int = param(9, "count", "points along each side of the grid on a leaf", ge=3)
     inside: float = param(0.9, "share", "of a leaf's half width and height that the grid spans: its rim is half a depth pixel")
     rim_m: tuple[float, float] = param((0.03, 0.05), "m", "beyond a leaf's edges, where it must have ended")
@@ -27,6 +29,7 @@ class Leaf:
     world_from_front: Rigid3
     width_m: float
     height_m: float
+    thickness_m: float = field(default_factory=lambda: tuned(Params).thickness_m)
 
     @property
     def outward(self) -> Vector3:
@@ -36,6 +39,11 @@ class Leaf:
     def at(self, front_from_leaf: Rigid3) -> "Leaf":
         """The same board where it stands open."""
         return replace(self, world_from_front=self.world_from_front @ front_from_leaf)
+
+    @property
+    def behind(self) -> Vector3:
+        """From the outer face to the back, in the front frame."""
+        return np.array([0.0, self.thickness_m, 0.0])
 
     @property
     def half_m(self) -> tuple[float, float]:
@@ -51,11 +59,6 @@ class OpenLeaf:
     world_from_leaf: Rigid3  # of its outer face, as `front`
     way: Literal["hinge", "out", "along"]  # how it was moved there
     rear_m: float | None = None  # from its outer face to the rear board of what it brings along, where that was seen
-
-
-def behind() -> Vector3:
-    """From the outer face to the back, in the front frame."""
-    return np.array([0.0, tuned(Params).thickness_m, 0.0])
 
 
 def face_points(leaf: Leaf) -> Points:
@@ -88,7 +91,7 @@ def edge_points(leaf: Leaf, fixed: str | None) -> list[tuple[Points, Vector3, fl
     params = tuned(Params)
     steps = np.linspace(-params.inside, params.inside, params.across)
     half_w, half_h = leaf.half_m
-    level = np.full_like(steps, params.thickness_m / 2)
+    level = np.full_like(steps, leaf.thickness_m / 2)
     faces = []
     for side, sign in (("left", -1.0), ("right", 1.0), ("bottom", -1.0), ("top", 1.0)):
         upright = side in ("left", "right")
@@ -98,7 +101,7 @@ def edge_points(leaf: Leaf, fixed: str | None) -> list[tuple[Points, Vector3, fl
             else (steps * half_w, np.full_like(steps, sign * half_h))
         )
         normal = np.array([sign, 0.0, 0.0] if upright else [0.0, 0.0, sign])
-        area = (leaf.height_m if upright else leaf.width_m) * params.thickness_m / params.across
+        area = (leaf.height_m if upright else leaf.width_m) * leaf.thickness_m / params.across
         if side != fixed:
             faces.append((np.stack([x, level, z], axis=1), normal, area))
     return faces

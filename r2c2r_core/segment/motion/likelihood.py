@@ -14,7 +14,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.hypotheses import Hypothesis
-from r2c2r_core.segment.motion.leaf import Leaf, behind, edge_points, face_points, rim_points
+from r2c2r_core.segment.motion.leaf import Leaf, edge_points, face_points, rim_points
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -32,7 +32,7 @@ class Params:
     floor_m: float = param(0.006, "m", "standard deviation of a front's place: poses, warp, profile", gt=0)
     same: float = param(2.0, "σ", "within which what lies beyond an edge is of the same surface")
     rim_cost: float = param(1.5, "log", "for a point beyond a free edge that the leaf should have ended at")
-    rim_free_m: float = param(0.06, "m", "from the closed plane, within which neighbours explain what lies beyond an edge")
+    rim_free_m: float = param(0.06, "m", "from the closed plane, within which neighbours explain what lies beyond its edges")
     seen_past: float = param(-1.0, "log", "of a reading below which what is behind the leaf's place was seen", ge=-10, le=0)
     told_apart: float = param(0.25, "share", "of a frame's readings that count: their errors go together", gt=0)
     flattest: float = param(0.12, "cosine", "of the angle from which a leaf is seen")
@@ -44,8 +44,10 @@ class Samples:
 
     points: np.ndarray
     outward: np.ndarray  # (q, 3) unit normal of their face
-    spread_m: np.ndarray  # (q, n) by which a point may lie off along the normal between two states that are tried
+    spread_m: np.ndarray  # (n,) by which a point may lie off along the normal between two states that are tried
     area_m2: float  # of the face about each point
+    on_plane: np.ndarray  # (q, n) bool: so near the closed plane that the fronts beside the leaf explain what is seen there
+    beside: np.ndarray  # (q, n) bool: beyond the closed leaf's outline, as a person facing it sees them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +72,7 @@ def lay_out(leaf: Leaf, hypothesis: Hypothesis) -> States:
     return States(
         leaf=leaf,
         hypothesis=hypothesis,
-        faces=(_moved(leaf, hypothesis, face, outward, area), _moved(leaf, hypothesis, face + behind(), outward, area)),
+        faces=(_moved(leaf, hypothesis, face, outward, area), _moved(leaf, hypothesis, face + leaf.behind, outward, area)),
         edges=tuple(_moved(leaf, hypothesis, *edge) for edge in edge_points(leaf, fixed)),
         rim=_moved(leaf, hypothesis, rim, outward, area),
         covered=np.abs(along) < leaf.half_m[0],
@@ -79,30 +81,31 @@ def lay_out(leaf: Leaf, hypothesis: Hypothesis) -> States:
 
 def _moved(leaf: Leaf, hypothesis: Hypothesis, points: Points, outward: Vector3, area_m2: float) -> Samples:
     """Points of the closed leaf (front frame) in every state."""
-    place, states = leaf.world_from_front, hypothesis.states
-    poses = [hypothesis.pose(float(state)) for state in states]
-    step = float(states[1] - states[0]) / np.sqrt(12)
-    if hypothesis.turns:
-        velocity = np.cross(hypothesis.axis, points - hypothesis.pivot)
-    else:
-        velocity = np.tile(hypothesis.axis, (len(points), 1))
+    place, (half_w, half_h) = leaf.world_from_front, leaf.half_m
+    rotations, shifts = hypothesis.poses()
+    step = float(hypothesis.states[1] - hypothesis.states[0]) / np.sqrt(12)
+    velocity = np.cross(hypothesis.axis, points - hypothesis.pivot) if hypothesis.turns else hypothesis.axis[None]
+    local = points @ rotations.transpose(0, 2, 1) + shifts[:, None]
     return Samples(
-        points=np.stack([place.apply(pose.apply(points)) for pose in poses]),
-        outward=np.stack([place.turn(pose.turn(outward[None]))[0] for pose in poses]),
-        spread_m=np.tile(np.abs(velocity @ outward) * step, (len(states), 1)),
+        points=place.apply(local.reshape(-1, 3)).reshape(local.shape),
+        outward=place.turn(rotations @ outward),
+        spread_m=np.broadcast_to(np.abs(velocity @ outward) * step, len(points)),
         area_m2=area_m2,
+        on_plane=np.abs(local[..., 1]) < tuned(Params).rim_free_m,
+        beside=(np.abs(local[..., 0]) > half_w) | (np.abs(local[..., 2]) > half_h),
     )
 
 
 def closed_counts(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> np.ndarray:
-    """Of the closed leaf's points, how many (frames, 3) depth agrees with, sees through, and sees something before."""
+    """Of the closed leaf's points, how many (frames, 4) depth agrees with, looks past, sees hidden, and is silent of."""
     points = leaf.world_from_front.apply(face_points(leaf))
     looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in frames]
     z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
     margin = 2 * tuned(Params).floor_m
     agrees = scene.noise.agrees(seen, z, margin)
     through = scene.noise.seen_through(seen, z, margin)
-    return np.stack([agrees, through, (seen > 0) & ~agrees & ~through]).sum(axis=2).T
+    silent = np.stack([look.inside for look in looks]) & (seen == 0)
+    return np.stack([agrees, through, (seen > 0) & ~agrees & ~through, silent]).sum(axis=2).T
 
 
 def in_view(leaf: Leaf, pose: Rigid3, scene: Scene, frame: Frame) -> bool:
@@ -120,30 +123,31 @@ def evidence(states: States, scene: Scene, frame: Frame, *, edges: bool = False)
     params = tuned(Params)
     if states.hypothesis.lateral:
         return _lateral(states, scene, frame)
-    front, back = states.faces
-    from_back = ((frame.world_from_camera.translation - front.points[:, 0]) * front.outward).sum(axis=1) < 0
-    seen = replace(front, points=np.where(from_back[:, None, None], back.points, front.points))
-    face = _readings(seen, scene, frame)
-    rim = _readings(states.rim, scene, frame)
-    place = states.leaf.world_from_front
-    off = np.abs((states.rim.points - place.translation) @ place.rotation[:, 1]) > params.rim_free_m
-    total = (face.ratio * face.weight).sum(axis=1) - params.rim_cost * (rim.agrees * off * rim.weight).sum(axis=1)
+    seen = _towards(frame.world_from_camera.translation, *states.faces)
+    face, rim = _readings(seen, scene, frame), _readings(states.rim, scene, frame)
+    told = np.where(seen.on_plane & seen.beside, np.minimum(face.ratio, 0.0), face.ratio)
+    total = (told * face.weight).sum(axis=1) - params.rim_cost * (rim.agrees * ~states.rim.on_plane * rim.weight).sum(axis=1)
     for edge in states.edges if edges else ():
         read = _readings(edge, scene, frame, facing=True)
         total = total + (read.ratio * read.weight).sum(axis=1)
     return np.asarray(params.told_apart * total)
 
 
+def _towards(camera: Vector3, front: Samples, back: Samples) -> Samples:
+    """Of each state the face that a camera sees."""
+    is_back = ((camera - front.points[:, 0]) * front.outward).sum(axis=1)[:, None] < 0
+    return replace(
+        front,
+        points=np.where(is_back[..., None], back.points, front.points),
+        on_plane=np.where(is_back, back.on_plane, front.on_plane),
+        beside=np.where(is_back, back.beside, front.beside),
+    )
+
+
 def _lateral(states: States, scene: Scene, frame: Frame) -> np.ndarray:
     """By the closed place alone: what is covered still agrees, what is vacated is seen through; beside it others may stand."""
     params, front = tuned(Params), states.faces[0]
-    closed = Samples(
-        points=states.leaf.world_from_front.apply(face_points(states.leaf))[None],
-        outward=states.leaf.outward[None],
-        spread_m=np.zeros((1, front.points.shape[1])),
-        area_m2=front.area_m2,
-    )
-    read = _readings(closed, scene, frame)
+    read = _readings(replace(front, points=front.points[:1], outward=front.outward[:1]), scene, frame)
     vacated = np.where(read.agrees, np.log(params.wild), np.where(read.ratio < params.seen_past, -np.log(params.hit), 0.0))
     each = np.where(states.covered, read.ratio, vacated) * read.weight
     return np.asarray(params.told_apart * each.sum(axis=1))
@@ -159,21 +163,23 @@ class _Readings(NamedTuple):
 
 def _readings(samples: Samples, scene: Scene, frame: Frame, *, facing: bool = False) -> _Readings:
     """Depth at the samples' pixels, by how far it lies from their face along its normal."""
-    params = tuned(Params)
-    count, each = samples.points.shape[:2]
-    flat: Points = samples.points.reshape(-1, 3)
+    params, camera = tuned(Params), frame.world_from_camera.translation
+    shape, flat = samples.points.shape[:2], samples.points.reshape(-1, 3)
     z, seen, _ = look_up(flat, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-    z, seen = np.maximum(z, 1e-3).reshape(count, each), seen.reshape(count, each)
-    ray = samples.points - frame.world_from_camera.translation
-    towards = -(ray * samples.outward[:, None]).sum(axis=2)
-    height = np.abs(towards)  # of the camera over the face
-    cosine = height / np.maximum(np.linalg.norm(ray, axis=2), 1e-6)
+    known = np.flatnonzero(seen > 0)  # most frames show few of the places where a leaf may stand
+    state, point = np.divmod(known, shape[1])
+    z, seen, ray = z[known], seen[known], flat[known] - camera
+    towards = ((camera - samples.points[:, 0]) * samples.outward).sum(axis=1)  # one a state: a face is flat
+    height = np.abs(towards)[state]  # of the camera over the face
+    cosine = height / np.sqrt(np.einsum("ij,ij->i", ray, ray))
     behind_m = (seen / z - 1) * height
-    sigma = np.sqrt((scene.noise.sigma(z) * height / z) ** 2 + params.floor_m**2 + samples.spread_m**2)
-    known = (seen > 0) & (cosine > params.flattest) & ((towards > 0) | (not facing))
+    sigma = np.sqrt((scene.noise.sigma(z) * height / z) ** 2 + params.floor_m**2 + samples.spread_m[point] ** 2)
+    shows = (cosine > params.flattest) & ((towards[state] > 0) | (not facing))
     density = np.exp(-0.5 * (behind_m / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma) * params.range_m * height / z
     ratio = np.log(params.hit * density + params.before * (behind_m < 0) + params.wild)
     # Readings are pixels: a leaf seen flatly or from far has fewer than it has points.
     pixels = samples.area_m2 * frame.depth_camera.fx * frame.depth_camera.fy * cosine / z**2
-    weight = np.where(known, np.minimum(pixels, 1.0), 0.0)
-    return _Readings(np.where(known, ratio, 0.0), known & (np.abs(behind_m) < params.same * sigma), weight)
+    found = _Readings(np.zeros(shape), np.zeros(shape, bool), np.zeros(shape))
+    for grid, values in zip(found, (ratio, np.abs(behind_m) < params.same * sigma, np.minimum(pixels, 1.0)), strict=True):
+        grid.reshape(-1)[known] = np.where(shows, values, 0)
+    return found

@@ -9,7 +9,6 @@ from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.leaf import Leaf, corners
-from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -48,7 +47,7 @@ def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> Plane
     world_from_leaf = leaf.world_from_front @ expected
     local, sigma = _points_near(leaf, world_from_leaf, scene, frame)
     is_back = bool(world_from_leaf.inverse.apply(frame.world_from_camera.translation[None])[0, 1] > 0)
-    y = local[:, 1] - (tuned(LeafParams).thickness_m if is_back else 0.0)
+    y = local[:, 1] - (leaf.thickness_m if is_back else 0.0)
     design = np.stack([np.ones(len(local)), local[:, 0], local[:, 2]], axis=1)
     plane = np.zeros(3)
     information = np.eye(3)
@@ -57,12 +56,12 @@ def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> Plane
         near = np.abs(off) < gate
         if near.sum() < params.least_points:
             return None
+        held, towards, scale_2 = y[near], design[near], params.scale_m**2 + sigma[near] ** 2
         for _ in range(5):
-            off = y[near] - design[near] @ plane
-            scale = np.hypot(params.scale_m, sigma[near])
-            weight = (1 / (1 + (off / scale) ** 2) ** 2) / scale**2
-            information = design[near].T @ (design[near] * weight[:, None])
-            plane = np.linalg.solve(information + 1e-9 * np.eye(3), design[near].T @ (weight * y[near]))
+            off = held - towards @ plane
+            weighted = towards.T / (scale_2 * (1 + off**2 / scale_2) ** 2)
+            information = weighted @ towards
+            plane = np.linalg.solve(information + 1e-9 * np.eye(3), weighted @ held)
     spans = np.ptp(np.quantile(local[near][:, [0, 2]], [0.03, 0.97], axis=0), axis=0)
     far = abs(plane[0]) > params.near_m or (np.abs(plane[1:]) > params.near_rad).any()
     if far or (spans < params.spans * np.array([leaf.width_m, leaf.height_m])).any():

@@ -5,12 +5,13 @@ course explains the depth best is taken, where it explains it better than a leaf
 of weighs as a prior that a few frames overrule.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import JointMotion, State
 from r2c2r_core.segment.motion.bundle import FittedJoint, as_supposed, fit_joint
 from r2c2r_core.segment.motion.hypotheses import Hypothesis, Way, hypotheses
@@ -32,6 +33,7 @@ class Params:
     closed_share: float = param(0.7, "share", "of them that agree, from which it is closed")
     least_known: int = param(20, "count", "readings towards it that a frame must have", ge=1)
     least_closed: int = param(5, "count", "of them that tell whether it is filled, where few are in view", ge=1)
+    silent_cost: float = param(2.0, "log", "against every other state where black glass is silent as when it is closed")
     least_frames: int = param(3, "count", "frames that must show it so, and that must show the leaf elsewhere", ge=1)
     free_share: float = param(0.5, "share", "of the readings towards where it stands open, that must lie behind there before")
     closed_cost: float = param(60.0, "log", "against every other state where it is closed")
@@ -73,14 +75,18 @@ def find_motion(
     """
     params = tuned(Params)
     counts = closed_counts(leaf, scene.frames, scene)
-    known = counts.sum(axis=1)
+    known = counts[:, :3].sum(axis=1)
     agrees = counts[:, 0] / np.maximum(known, 1)
     if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
         return None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
+    silent = (counts[:, 3] > params.closed_share * counts.sum(axis=1)) & (counts.sum(axis=1) >= params.least_known)
+    silent &= closed.sum() < params.least_frames  # black glass, which never shows its closed face
     through = counts[:, 1] >= params.least_closed
-    tried = [each for each in hypotheses(leaf) if not each.lateral or closed.sum() >= params.least_frames]
-    courses = [_course(lay_out(leaf, each), scene, closed, prior.get(each.way, 0.0)) for each in tried]
+    tried = [each for each in hypotheses(leaf, scene.floor_m) if not each.lateral or closed.sum() >= params.least_frames]
+    if through.sum() < params.least_frames:  # hidden, and never seen into: by what it is itself, drawn out, or by others
+        tried = [each for each in tried if each.way == "out"]
+    courses = [_course(lay_out(leaf, each), scene, closed, silent, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
@@ -88,17 +94,18 @@ def find_motion(
         empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
         if course.hypothesis.way == "out":  # a drawer hides its own place: it stands where one looked through before
             empty |= _was_free(leaf, course, scene, closed)
-        motion = _measured(leaf, course, scene, part) if empty and course.support > params.support else None
+        motion = _measured(leaf, course, scene, closed, silent, part) if empty and course.support > params.support else None
         if motion is not None:
             return None if only and course.hypothesis.way not in prior else motion
     return None
 
 
-def _course(states: States, scene: Scene, closed: np.ndarray, prior: float) -> Course:
+def _course(states: States, scene: Scene, closed: np.ndarray, silent: np.ndarray, prior: float) -> Course:
     """The likeliest course under a hypothesis."""
-    values = states.hypothesis.states
-    shut = np.where(np.arange(len(values)) > 0, -tuned(Params).closed_cost, 0.0)
+    params, values = tuned(Params), states.hypothesis.states
+    shut = np.where(np.arange(len(values)) > 0, -params.closed_cost, 0.0)
     log = np.stack([shut if is_shut else evidence(states, scene, f) for is_shut, f in zip(closed, scene.frames, strict=True)])
+    log[silent, 1:] -= params.silent_cost
     path, total = best_path(log)
     own = log[np.arange(len(path)), path]
     gain = total - float(log[:, 0].sum()) + prior
@@ -113,13 +120,22 @@ def _was_free(leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray) -> b
     if len(frames) < params.least_frames or len(opened) == 0:
         return False
     counts = closed_counts(leaf.at(course.hypothesis.pose(float(np.median(opened)))), frames, scene)
-    return bool((counts[:, 1] > params.free_share * counts.sum(axis=1)).sum() > len(frames) / 2)
+    return bool((counts[:, 1] > params.free_share * counts[:, :3].sum(axis=1)).sum() > len(frames) / 2)
 
 
-def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotion | None:
+def _filled(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> bool:
+    """Whether frames that look where a leaf stands see something there or before it, most of them."""
+    counts = closed_counts(leaf, frames, scene).sum(axis=0) if frames else np.zeros(4)
+    return bool(counts[1] < tuned(Params).free_share * counts[:3].sum())
+
+
+def _measured(
+    leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray, silent: np.ndarray, part: str
+) -> JointMotion | None:
     """The joint fitted to the frames that show the leaf; None where too few of them have it in one piece."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     joint, seen = _fitted(leaf, course, scene)
+    seen |= {int(k): (0.0, params.closed_rad) for k in np.flatnonzero(silent & (course.values == 0)) if k not in seen}
     opened = [value for k, (value, _) in seen.items() if course.values[k] > 0]
     shut = sum(course.values[k] == 0 for k in seen)
     # What never changes is how things are, not a motion: a rectangle that was drawn too wide looks like a leaf half slid away.
@@ -127,7 +143,7 @@ def _measured(leaf: Leaf, course: Course, scene: Scene, part: str) -> JointMotio
     if len(opened) < params.least_frames or not moves:
         return None
     turns = course.hypothesis.turns
-    states = _states(leaf, course, joint, seen, scene)
+    states = _states(leaf, course, joint, seen, scene, closed)
     values = np.array([state.value for state in states.values()], dtype=np.float64)
     largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)
     times = [scene.frames[k].timestamp_s for k in states]
@@ -163,23 +179,41 @@ def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen
     return joint, {k: (float(states[n]), float(sigmas[n])) for n, k in enumerate(fixes)}
 
 
-def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene) -> dict[int, State]:
-    """The state in every frame that shows the leaf: as fitted, else as the likeliest near the fitted ones beside it."""
+def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, closed: np.ndarray) -> dict[int, State]:
+    """The state in every frame that shows the leaf: as fitted, else as the likeliest near the fitted ones beside it.
+
+    A floor or a wall beside an open leaf shows where the leaf would stand, and is there while the leaf is closed.
+    """
     states: dict[int, State] = {}
+    shut_frames = [frame for frame, is_closed in zip(scene.frames, closed, strict=True) if is_closed]
+    shut = np.pad(course.values == 0, 1, mode="edge")
+    rests = shut[:-2] & shut[1:-1] & shut[2:]  # what moves is past the first step that is tried within a frame or two
     for k, frame in enumerate(scene.frames):
-        value, sigma = seen[k] if k in seen else _likeliest(leaf, course, joint, seen, scene, k)
-        value = _opening(value, joint)
+        if k in seen:
+            value, sigma = seen[k]
+        else:
+            strays = course.values[k] > 0 and _filled(leaf.at(joint.pose(float(course.values[k]))), shut_frames, scene)
+            value, sigma = _likeliest(leaf, course, joint, seen, scene, k, strays=strays)
+            if strays and _filled(leaf.at(joint.pose(value)), shut_frames, scene):
+                continue
+        value = _opening(value, joint, float(course.hypothesis.states[1]) if rests[k] else 0.0)
         if k in seen or in_view(leaf, joint.pose(value), scene, frame):
             states[k] = State(value=value, sigma=sigma)
     return states
 
 
-def _likeliest(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int) -> tuple[float, float]:
-    """The state of a frame that has no fit of its own: it may show the leaf edge on, or a part of it."""
+def _likeliest(
+    leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int, *, strays: bool
+) -> tuple[float, float]:
+    """The state of a frame that has no fit of its own: it may show the leaf edge on, or a part of it.
+
+    With `strays` its course is where other things stand: it is asked for between the fits beside it alone.
+    """
     params, step = tuned(Params), float(course.hypothesis.states[1])
     beside = [max((j for j in seen if j < k), default=None), min((j for j in seen if j > k), default=None)]
-    near = [seen[j][0] for j in beside if j is not None] if course.log[k] < params.sure else []
-    low, high = (min([float(course.values[k]), *near]), max([float(course.values[k]), *near]))
+    near = [seen[j][0] for j in beside if j is not None] if strays or course.log[k] < params.sure else []
+    near += [] if strays and near else [float(course.values[k])]
+    low, high = min(near), max(near)
     fine = step / params.finer
     tried = np.arange(max(low - params.around_steps * step, 0.0), high + params.around_steps * step + fine, fine)
     log = evidence(
@@ -193,7 +227,7 @@ def _likeliest(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene
     return mean, float(np.sqrt(weight @ (tried - mean) ** 2 / weight.sum() + fine**2))
 
 
-def _opening(value: float, joint: FittedJoint) -> float:
-    """A state, 0 where it cannot be told from closed."""
+def _opening(value: float, joint: FittedJoint, rest: float) -> float:
+    """A state, 0 where it cannot be told from closed, or up to `rest`."""
     params = tuned(Params)
-    return value if value > (params.closed_rad if joint.turns else params.closed_m) else 0.0
+    return value if value > max(params.closed_rad if joint.turns else params.closed_m, rest) else 0.0

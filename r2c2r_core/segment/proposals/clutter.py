@@ -24,6 +24,21 @@ class Params:
     stands_m: float = param(0.06, "m", "above its support, within which the seen part of a thing starts")
     off_plane_m: float = param(0.03, "m", "from an upright plane, beyond which surface is free of it")
     structure_m2: float = param(0.12, "m²", "of an upright plane: smaller ones may be the face of a box")
+    beside_plane_m: float = param(0.04, "m", "from the seen part of an upright plane, within which surface is its")
+    bin_m: float = param(0.01, "m", "of heights that are counted together", gt=0)
+    level_m: float = param(0.02, "m", "off a level surface's height, within which surface is its")
+    reach_m: float = param(1.3, "m", "above its support, up to which a thing is looked for")
+    apart_m: float = param(0.05, "m", "between the middles of two things")
+    shown: float = param(0.5, "ratio", "of seen surface to half a thing's box, from where it is as sure as it gets")
+    sure_height_m: float = param(0.08, "m", "of a thing, from where it is as sure as it gets")
+    surest: float = param(0.9, "score", "of a thing that is")
+    on_floor_m: float = param(0.15, "m", "up to which a support is the floor")
+    floor_most_m: tuple[float, float] = param(
+        (1.2, 1.3), "m", "across, and high, of a thing on the floor: larger ones are built in"
+    )
+    table_most_m: tuple[float, float] = param((0.6, 0.6), "m", "across, and high, of a thing on a worktop, likewise")
+    least_m: tuple[float, float] = param((0.15, 0.04), "m", "height of a thing on the floor, and elsewhere: less is noise")
+    least_across_m: float = param(0.04, "m", "across a thing")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +69,7 @@ def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump
     for plane in planes:
         if plane.area_m2 > params.structure_m2:
             off = np.abs((centres - plane.world_from_plane.translation) @ plane.outward)
-            free &= ~((off < params.off_plane_m) & plane.supports(centres, 0.04))
+            free &= ~((off < params.off_plane_m) & plane.supports(centres, params.beside_plane_m))
     found = []
     for height, mask, origin in levels:
         found += _standing_on(height, mask, origin, centres[free], turned[free], areas[free])
@@ -62,7 +77,7 @@ def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump
     kept: list[Clump] = []
     for clump in found:
         middle = clump.points.mean(axis=0)
-        if all(np.linalg.norm(middle - other.points.mean(axis=0)) > 0.05 for other in kept):
+        if all(np.linalg.norm(middle - other.points.mean(axis=0)) > params.apart_m for other in kept):
             kept.append(clump)
     return kept
 
@@ -75,15 +90,15 @@ def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[flo
         return []
     heights = points[level, 2]
     low = heights.min()
-    profile = np.bincount(((heights - low) / 0.01).astype(int), areas[level])
+    profile = np.bincount(((heights - low) / params.bin_m).astype(int), areas[level])
     smooth = ndimage.uniform_filter1d(np.pad(profile, 3), 3) * 3
     highest = ndimage.maximum_filter1d(smooth, 7)
     origin = points[:, :2].min(axis=0)
     shape = tuple(((points[:, :2].max(axis=0) - origin) / params.map_m).astype(int) + 2)
     found = []
     for peak in np.flatnonzero((smooth == highest) & (smooth > params.least_level_m2)):
-        height = low + (peak - 3 + 0.5) * 0.01
-        near = level & (np.abs(points[:, 2] - height) < 0.02)
+        height = low + (peak - 3 + 0.5) * params.bin_m
+        near = level & (np.abs(points[:, 2] - height) < params.level_m)
         cells = ((points[near, :2] - origin) / params.map_m).astype(int)
         seen = np.zeros(shape, bool)
         seen[cells[:, 0], cells[:, 1]] = True
@@ -97,7 +112,8 @@ def _standing_on(
 ) -> list[Clump]:
     params = tuned(Params)
     cells = ((turned[:, :2] - origin) / params.map_m).astype(int)
-    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + params.clearance_m) & (turned[:, 2] < height + 1.3)
+    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + params.clearance_m)
+    above &= turned[:, 2] < height + params.reach_m
     if above.sum() < 10:
         return []
     points, local, area = centres[above], turned[above], areas[above]
@@ -119,14 +135,16 @@ def _standing_on(
             continue
         # Half of a thing is seen at best: its surface compared with half that of its box.
         shown = float(area[member].sum() / max(extent[0] * extent[1] / 2 + extent[2] * (extent[0] + extent[1]), 1e-4))
-        confidence = float(np.clip(shown / 0.5, 0.1, 1) * np.clip(extent[2] / 0.08, 0.3, 1) * 0.9)
+        tall = np.clip(extent[2] / params.sure_height_m, 0.3, 1)
+        confidence = float(np.clip(shown / params.shown, 0.1, 1) * tall * params.surest)
         found.append(Clump(points[member], extent, height, confidence))
     return found
 
 
 def _thing_sized(extent: np.ndarray, height: float) -> bool:
     """Larger than a lump of noise, smaller than furniture that is built in."""
-    on_floor = height < 0.15
-    most_across, most_high = (1.2, 1.3) if on_floor else (0.6, 0.6)
-    least = 0.15 if on_floor else 0.04
-    return bool(extent[2] > least and extent[:2].max() > 0.04 and extent[:2].max() < most_across and extent[2] < most_high)
+    params = tuned(Params)
+    on_floor, across = height < params.on_floor_m, float(extent[:2].max())
+    most_across, most_high = params.floor_most_m if on_floor else params.table_most_m
+    least = params.least_m[0] if on_floor else params.least_m[1]
+    return bool(least < extent[2] < most_high and params.least_across_m < across < most_across)

@@ -1,47 +1,39 @@
-"""Category suggestion from size, place and handle; a person may change it.
-
-Where it stands says which kinds it may be, and the category table how large those are: worktops end at 0.85-0.95 m, wall
-units hang from 1.25 m up, drawers are wider than high.
-"""
+"""Category suggestion from size, place, handle and glass: the likeliest of the category table; a person may change it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from r2c2r_core.kitchen.categories import every_category
+from r2c2r_core.kitchen.category import Category, Place
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.segment.runs.handles import GridHandle
+from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.tuning import param, tuned
-
-_TALL, _HUNG = "refrigerator", "wall_cabinet"
-_FLOOR_THINGS, _TABLE_THINGS = ("chair", "bin"), ("bottle", "mug")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a front is called by size and place."""
+    """How much a front's look says of what it is."""
 
-    wall_unit_m: float = param(
-        1.15,
-        "m",
-        "lower edge, from which it hangs",
-        source="worktops end at 0.95, and nothing hangs closer above them than this",
-    )
-    worktop_m: float = param(
-        0.95,
-        "m",
-        "greatest upper edge of what is below a worktop",
-        source="EN 1116: working heights of 850 and 900 mm; tall people ask for more",
-    )
-    longest: float = param(6.0, "ratio", "of width to height of a drawer", source="the edges of worktops and tables are longer")
     long: float = param(1.8, "ratio", "of the sides of a bar handle")
-    dark_glass: float = param(0.45, "share", "of a front that is dark, from where it is an oven's")
-    wide: float = param(1.3, "ratio", "of width to height of a drawer")
-    wide_lying: float = param(0.8, "ratio", "of width to height of a drawer whose handle lies")
-    beyond: float = param(0.1, "ratio", "beyond a bound, at which little of a name is left", gt=0)
-    on_floor_m: float = param(0.15, "m", "above the floor, within which a thing stands on it")
-    tall_m: float = param(1.2, "m", "height from which a front is a refrigerator's")
-    stands_m: float = param(0.5, "m", "above the floor, within which an appliance stands on it")
-    plinth_m: float = param(0.1, "m", "height of a plinth")
+    as_usual: float = param(
+        0.85,
+        "share",
+        "of bars that lie as on most fronts of their kind",
+        source="own estimate: doors with level bars are sold",
+    )
+    dark_share: float = param(0.45, "share", "of a front that is dark, from where it is dark glass")
+    glass: float = param(
+        0.8, "share", "of ovens' fronts that are darker than that, and of others that are not", source="own estimate"
+    )
+    bare: float = param(
+        0.3,
+        "ratio",
+        "of ovens and dishwashers on which no handle is seen, to other fronts on which none is",
+        source="own estimate: kitchens without handles have machines with them",
+    )
+    plinth_m: float = param(0.1, "m", "from the floor to a front where no floor was found", source="plinths of 6-20 cm")
+    worktop_m: float = param(0.9, "m", "from the floor to a thing where no floor was found", source="EN 1116")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,53 +48,58 @@ class FrontLook:
     pair: bool = False  # two doors that open away from each other
 
 
-def name_front(look: FrontLook) -> tuple[str, float]:
-    """Category, and how usual its size is (0..1) where it is."""
-    params = tuned(Params)
-    bottom = look.bottom_m if look.bottom_m is not None else params.plinth_m
-    name = _front_there(look, bottom)
-    category = category_of(name)
-    usual = category.width.fit(look.width_m) * category.height.fit(look.height_m)
-    if name not in (_TALL, _HUNG):  # in the run below the worktop
-        usual *= _below(bottom + look.height_m, params.worktop_m) * _below(look.width_m / look.height_m, params.longest)
-    return name, usual
-
-
-def _front_there(look: FrontLook, bottom_m: float) -> str:
-    """What a panel at a height above the floor is, by its handle, its shape and its glass."""
-    params = tuned(Params)
-    if look.height_m > params.tall_m and bottom_m < params.stands_m:
-        return _TALL
-    if bottom_m > params.wall_unit_m:
-        return _HUNG
-    if look.pair:
-        return "double_door_cabinet"
-    lying = look.handle is not None and look.handle.width > params.long * look.handle.height
-    upright = look.handle is not None and look.handle.height > params.long * look.handle.width
-    aspect = look.width_m / look.height_m
-    if (
-        category_of("drawer").height.holds(look.height_m)
-        and not upright
-        and (aspect > params.wide or (lying and aspect > params.wide_lying))
-    ):
-        return "drawer"
-    machine = category_of("dishwasher")
-    if lying and machine.width.holds(look.width_m) and machine.height.holds(look.height_m):
-        return "oven" if look.dark > params.dark_glass else "dishwasher"
-    return "cabinet"
+def name_front(look: FrontLook, *, machines: bool = True) -> tuple[str, float]:
+    """The likeliest category, of machines or without them, and how usual its size is (0..1) where it is."""
+    fronts = [
+        kind
+        for kind, place in _proposed()
+        if (kind.kind == "front" or (kind.kind == "appliance" and place.holds(0.0)))  # what stands on a worktop is in no run
+        if (kind.opens == "pair") == look.pair
+    ]
+    kinds = [kind for kind in fronts if machines or not kind.one_front]
+    best = max(kinds, key=lambda kind: _log_posterior(kind, look))
+    return best.name, best.width.fit(look.width_m) * best.height.fit(look.height_m) * _place_fit(best, look)
 
 
 def name_thing(extent_m: np.ndarray, base_m: float | None) -> str:
     """Category of a free-standing thing of this width, depth and height, standing at this height above the floor."""
-    params = tuned(Params)
     across, height = float(extent_m[:2].max()), float(extent_m[2])
-    for name in _FLOOR_THINGS if base_m is not None and base_m < params.on_floor_m else _TABLE_THINGS:
-        category = category_of(name)
-        if category.width.holds(across) and category.depth.holds(float(extent_m[:2].min())) and category.height.holds(height):
-            return name
-    return category_of("object").name
+    base_m = tuned(Params).worktop_m if base_m is None else base_m
+    fitting = [
+        kind
+        for kind, place in _proposed()
+        if kind.kind == "thing" and place.holds(base_m)
+        if kind.width.holds(across) and kind.depth.holds(float(extent_m[:2].min())) and kind.height.holds(height)
+    ]
+    if not fitting:
+        return category_of("object").name
+    return max(fitting, key=lambda kind: kind.width.log_likelihood(across) + kind.height.log_likelihood(height)).name
 
 
-def _below(value: float, most: float) -> float:
-    """1 up to a value, falling smoothly to 0 over about a fifth of it beyond."""
-    return float(np.exp(-((max(value / most - 1.0, 0.0) / tuned(Params).beyond) ** 2)))
+def _proposed() -> list[tuple[Category, Place]]:
+    return [(kind, kind.place) for kind in every_category() if kind.place is not None]
+
+
+def _log_posterior(kind: Category, look: FrontLook) -> float:
+    """Log of how often a kitchen has such a front, times the likelihoods of its sizes, place, handle and glass."""
+    params = tuned(Params)
+    assert kind.place is not None  # of what is proposed
+    known = np.log(kind.place.per_kitchen) + kind.width.log_likelihood(look.width_m) + kind.height.log_likelihood(look.height_m)
+    bar = look.handle is not None and max(look.handle.width, look.handle.height) > params.long * min(
+        look.handle.width, look.handle.height
+    )
+    lies = look.handle is not None and look.handle.width > look.handle.height
+    said = np.log(_share(lies == kind.handle_lies, params.as_usual)) if bar else 0.0
+    bare = np.log(params.bare) if look.handle is None and kind.one_front else 0.0
+    dark = np.log(_share((look.dark > params.dark_share) == kind.dark, params.glass))
+    return float(known + said + bare + dark + np.log(max(_place_fit(kind, look), 1e-9)))
+
+
+def _place_fit(kind: Category, look: FrontLook) -> float:
+    bottom = look.bottom_m if look.bottom_m is not None else tuned(Params).plinth_m
+    assert kind.place is not None
+    return kind.place.fit(bottom, bottom + look.height_m)
+
+
+def _share(usual: bool, probability: float) -> float:
+    return probability if usual else 1 - probability

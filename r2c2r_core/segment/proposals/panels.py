@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Room
 from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front, front_corners
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front
-from r2c2r_core.segment.runs.orthomosaic import Cell
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.tuning import param, tuned
 
@@ -57,6 +59,7 @@ class Panel:
     category: str
     confidence: float
     usual: float = 1.0  # 0..1: how usual its size is where it is; part of the confidence
+    plain: str | None = None  # of a machine that only its handle tells: what it is among fronts that carry the same
 
     @property
     def run(self) -> Run:
@@ -91,12 +94,16 @@ def find_panels(run: Run, room: Room) -> list[Panel]:
             continue
         panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=False), room)
         mate = _mate(run, cell)
-        if panel is not None and panel.category == "cabinet" and mate is not None:
+        if panel is not None and mate is not None and _is_door(category_of(panel.category)):
             panel = _judge(find_front(run, _middle(run, cell), _NO_POINTS, pair=True), room, pair=True)
             mates.append(mate)
         if panel is not None:
             found.append(panel)
     return [_beside(panel, [other for other in found if other is not panel]) for panel in found]
+
+
+def _is_door(category: Category) -> bool:
+    return category.kind == "front" and category.opens == "side"
 
 
 def without_sides(panels: list[Panel]) -> list[Panel]:
@@ -129,7 +136,9 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
         pair=pair,
     )
     category, usual = name_front(look)
-    return Panel(front, category, usual * _evidence(front, area, room), usual)
+    by_handle = category_of(category).one_front and not category_of(category).dark
+    plain = name_front(look, machines=False)[0] if by_handle else None
+    return Panel(front, category, usual * _evidence(front, area, room), usual, plain)
 
 
 def _beside(panel: Panel, others: list[Panel]) -> Panel:
@@ -141,9 +150,7 @@ def _beside(panel: Panel, others: list[Panel]) -> Panel:
         for other in others
         if other.confidence > params.least_mate and _aligned(panel.front.cell, other.front.cell, slack)
     ]
-    category = panel.category
-    if category == "dishwasher" and not _odd_one_out(mates):
-        category = "cabinet"
+    category = panel.category if panel.plain is None or _odd_one_out(mates) else panel.plain
     if mates:
         best = max(other.confidence for other in mates)
         unsure = (1 - panel.confidence / max(panel.usual, 1e-6)) * (1 - params.mate_worth * best)
@@ -160,7 +167,7 @@ def _aligned(a: Cell, b: Cell, slack: float) -> bool:
 
 def _odd_one_out(mates: list[Panel]) -> bool:
     """Whether the doors beside a lying handle carry upright ones: a machine among cupboards."""
-    handles = [mate.front.handle for mate in mates if mate.category in ("cabinet", "dishwasher")]
+    handles = [mate.front.handle for mate in mates if category_of(mate.category).opens in ("side", "bottom")]
     upright = tuned(Params).upright
     return bool(handles) and all(handle is not None and handle.height > upright * handle.width for handle in handles)
 

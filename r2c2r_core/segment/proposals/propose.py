@@ -9,6 +9,8 @@ from r2c2r_core.arrays import Mask, Vector3
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.geometry.masks import pack_mask
+from r2c2r_core.kitchen.categories import every_category
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
@@ -49,8 +51,6 @@ class Params:
     odd_size: float = param(8.0, "ratio", "of squared deviations from the usual size by which confidence falls to 1/e", gt=0)
     taken_share: float = param(0.4, "share", "of an outline that other proposals may cover")
     tall_m: float = param(1.25, "m", "height of a refrigerator's front, at least")
-    foot_m: float = param(0.4, "m", "from the floor to a refrigerator's front, at most")
-    on_worktop_m: tuple[float, float] = param((0.7, 1.5), "m", "least and most height of a microwave's front")
     least_seen_m: float = param(0.12, "m", "side of a microwave's front, of which glass may leave little")
 
 
@@ -140,6 +140,19 @@ def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
 # Boxes: refrigerators of several doors, microwaves
 
 
+def _machine(width_m: float, height_m: float, bottom_m: float) -> Category | None:
+    """The kind of appliance that a plane could be the front of: all of one from the floor up, what glass left of another."""
+    params = tuned(Params)
+    for kind in every_category():
+        if kind.kind != "appliance" or kind.place is None or not kind.place.holds(bottom_m):
+            continue
+        whole = kind.width.holds(width_m) and params.tall_m < height_m < kind.height.high
+        part = params.least_seen_m < width_m < kind.width.high and params.least_seen_m < height_m < kind.height.high
+        if part if kind.dark else whole:
+            return kind
+    return None
+
+
 def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     """The appliance whose front a whole plane could be."""
     params = tuned(Params)
@@ -147,17 +160,8 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     if not room.floor_found:
         return []
     middle = plane.world_from_plane.translation
-    bottom = float(middle[2]) - plane.height_m / 2
-    tall, small = category_of("refrigerator"), category_of("microwave")
-    if tall.width.holds(plane.width_m) and params.tall_m < plane.height_m < tall.height.high and bottom < params.foot_m:
-        kind = tall
-    elif (
-        params.least_seen_m < plane.width_m < small.width.high
-        and params.least_seen_m < plane.height_m < small.height.high
-        and params.on_worktop_m[0] < bottom < params.on_worktop_m[1]
-    ):
-        kind = small
-    else:
+    kind = _machine(plane.width_m, plane.height_m, float(middle[2]) - plane.height_m / 2)
+    if kind is None:
         return []
     found = _confirmed(prepared, kind.name, click_on(prepared.scene, middle, plane.outward))
     if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, params.shallowest_box_m):

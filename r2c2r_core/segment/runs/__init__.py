@@ -1,1 +1,1 @@
-"""A furniture run: orthomosaic -> line evidence -> XY-cut into panels -> handles; `run` puts them together, once a plane."""
+"""A furniture run: its orthomosaic cut into panels (XY-cut), face frames and stiles told apart; `run` puts it together."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.runs.xy_cut import Line, LineField, across, cut_alone, halves
 from r2c2r_core.tuning import param, tuned
 

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image
-from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.edge_odds import edge_odds
-from r2c2r_core.segment.runs.handles import GridHandle, find_handle
-from r2c2r_core.segment.runs.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
-from r2c2r_core.segment.runs.orthomosaic import (
+from r2c2r_core.segment.mosaics.edge_odds import edge_odds, seam_odds
+from r2c2r_core.segment.mosaics.edges import as_lab
+from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
+from r2c2r_core.segment.mosaics.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
+from r2c2r_core.segment.mosaics.orthomosaic import (
     STEP,
     Cell,
     PlaneGrid,
@@ -22,9 +22,12 @@ from r2c2r_core.segment.runs.orthomosaic import (
     make_tile,
     support_on,
 )
-from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief, measure_relief
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.runs.contrast import Contrast
+from r2c2r_core.segment.runs.face_frames import inset_fronts
 from r2c2r_core.segment.runs.panels import cut_panels
-from r2c2r_core.segment.runs.relief import Relief, measure_relief
 from r2c2r_core.segment.runs.stiles import whole_frames
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -52,7 +55,8 @@ class Run:
     horizontal: Evidence
     mosaic: Image
     relief: Relief
-    odds: PanelOdds
+    seams: PanelOdds  # what the network sees
+    odds: PanelOdds  # with lines and what depth shows
     seen: np.ndarray  # grid cells the scan has depth for
     cells: tuple[Cell, ...]
     handles: tuple[GridHandle | None, ...]  # one a cell
@@ -95,8 +99,7 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     if not tiles:
         return None
     relief = measure_relief(grid, scene, views.chosen(params.relief_frames))
-    lines = tuple(_with_edges(found, relief, axis, grid) for axis, found in enumerate(views.evidence(frame_count)))
-    return run_on(region, grid, roll, tiles, relief, lines, frame_count)
+    return run_on(region, grid, roll, tiles, relief, views.evidence(frame_count), frame_count)
 
 
 def run_on(
@@ -105,29 +108,33 @@ def run_on(
     roll_rad: float,
     tiles: list[Tile],
     relief: Relief,
-    lines: tuple[Evidence, ...],
+    lines: tuple[Evidence, Evidence],
     frame_count: int,
     cells: tuple[Cell, ...] | None = None,
 ) -> Run:
-    """What is known of a plane from its tiles, its relief and its vertical and horizontal lines; cut where no panels are given.
+    """What is known of a plane from its tiles, its relief and colours' upright and level lines; cut where no panels are given.
 
     Where the poses agree, the tiles lie where they are.
     """
-    vertical, horizontal = lines
     poses_agree = bool(np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles]) <= STEADY_CELLS)
     if poses_agree:
         for tile in tiles:
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles, max(frame_count // 2, 8))
-    odds = edge_odds(mosaic, relief, vertical, horizontal)
+    seams = seam_odds(mosaic, relief)
+    odds = edge_odds(seams, mosaic, relief, *lines)
+    vertical, horizontal = (_with_edges(found, relief, axis, grid) for axis, found in enumerate(lines))
     if cells is None:
         cut = cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m)
-        cells = tuple(whole_frames(odds, cut, grid.cell_m, (vertical, horizontal)))
+        contrast = Contrast(as_lab(mosaic)[0][..., 0])
+        inset = inset_fronts(contrast, relief, odds, cut, grid.cell_m)
+        cells = tuple(whole_frames(odds, inset, grid.cell_m, (vertical, horizontal), contrast, relief))
     seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
     handles = tuple(find_handle(odds, relief, cell) for cell in cells)
     slides = {tile.frame_index: tile.shift for tile in tiles}
     seen = seen[: grid.rows, : grid.columns]
-    return Run(region, grid, roll_rad, vertical, horizontal, mosaic, relief, odds, seen, cells, handles, poses_agree, slides)
+    levels = vertical, horizontal
+    return Run(region, grid, roll_rad, *levels, mosaic, relief, seams, odds, seen, cells, handles, poses_agree, slides)
 
 
 class _Views:
@@ -162,6 +169,6 @@ class _Views:
 
 def _with_edges(evidence: Evidence, relief: Relief, axis: int, grid: PlaneGrid) -> Evidence:
     """Colour evidence, and the plane's own ends as depth shows them."""
-    edges = relief.edge_evidence(axis, evidence.block, grid.columns, grid.rows)[: len(evidence.score)]
+    edges = np.maximum(*relief.edge_evidence(axis, evidence.block, grid.columns, grid.rows))[: len(evidence.score)]
     score = np.where(edges > 1, np.maximum(evidence.score, edges), evidence.score)
     return Evidence(score, evidence.known | (edges > 2), evidence.block, edges)

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.segment.runs.lines import Evidence
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell, joined
-from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.edges import Refined
+from r2c2r_core.segment.mosaics.lines import Evidence
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, joined
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
+from r2c2r_core.segment.runs.contrast import CORNER, SIDES, Contrast
+from r2c2r_core.segment.runs.face_frames import is_rail, lines_beside, shows
 from r2c2r_core.segment.runs.xy_cut import LineField, across
 from r2c2r_core.tuning import param, tuned
 
@@ -22,23 +26,90 @@ class Params:
     in_line_m: float = param(0.015, "m", "by which a strip may be longer or shorter than its front")
     panel_line: float = param(0.7, "σ", "of a line around a panel, from where it shows", source="lines of development kitchens")
     none_share: float = param(0.5, "share", "of that, of what shows where there is no line")
+    sunk_m: float = param(
+        0.003,
+        "m",
+        "behind its frame, of a panel at least",
+        gt=0,
+        source="6-12 mm are usual; a strip's mean depth is known to 1 mm",
+    )
+    beside_m: tuple[float, float] = param((0.005, 0.025), "m", "from a line, from where and up to where depth beside it counts")
     edge: float = param(-1.0, "log", "odds of a frame's outer edge, at least")
+    even_m: float = param(
+        0.01, "m", "by which rails and stiles of one front may differ", gt=0, source="as exactly as their lines are placed"
+    )
     middle: float = param(0.6, "share", "of a side, over whose middle lines count: corners have others")
 
 
-def whole_frames(odds: PanelOdds, cells: Sequence[Cell], cell_m: float, lines: tuple[Evidence, Evidence]) -> list[Cell]:
-    """The cells, strips of frames joined to their panels; `lines` are evidence of upright and of level ones."""
+def whole_frames(
+    odds: PanelOdds,
+    cells: Sequence[Cell],
+    cell_m: float,
+    lines: tuple[Evidence, Evidence],
+    contrast: Contrast,
+    relief: Relief,
+) -> list[Cell]:
+    """The cells, strips of frames joined to their panels; `lines` are evidence of upright and of level ones.
+
+    Where the gaps at a front's other sides end, what follows is no part of it: a rail of the face frame that it is inset in.
+    """
     field, found = LineField(odds, cell_m), list(cells)
     for front in filter(field.is_front, cells):
         grown = front
         for axis, end in ((0, 0), (0, 1), (1, 0), (1, 1)):
             strip = _strip_beside(field, found, grown, axis, end)
-            if grown in found and strip is not None and _is_stile(field, grown, strip, lines, axis, end):
+            if grown not in found or strip is None or is_rail(contrast, grown, strip, axis):
+                continue
+            if _is_parted(contrast, grown, axis, end, cell_m):
+                continue
+            sunk = _is_sunk(contrast, relief, grown, axis, end, cell_m)
+            if _is_stile(field, grown, strip, lines, axis, end, sunk):
                 found.remove(grown)
                 found = [part for other in found for part in _without(other, strip)]
                 grown = joined([grown, strip])
                 found.append(grown)
     return found
+
+
+def evenly_framed(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
+    """A panel whose upper edge lies in a shadow, that edge as far over its sunk panel as the others are beside it.
+
+    The shadow of a worktop lies on a front as on the rail of a face frame over it, and hides the gap between them.
+    """
+    params, panel = tuned(Params), refined.panel
+    left, right, top, bottom = (_frame_width(contrast, relief, panel, side, cell_m) for side in SIDES)
+    others = [width for width in (left, right, bottom) if width is not None]
+    if top is None or len(others) < 2 or max(others) - min(others) > params.even_m / cell_m:
+        return panel
+    even = panel.top + top - float(np.mean(others))
+    if abs(even - refined.lit_top) >= abs(even - panel.top):
+        return panel
+    return Cell(panel.left, even, panel.right, panel.bottom)
+
+
+def _frame_width(contrast: Contrast, relief: Relief, panel: Cell, side: tuple[int, int], cell_m: float) -> float | None:
+    """How far inside one edge of a front its sunk panel begins, in grid cells: at a line, or else as depth shows; else None."""
+    params, (axis, end) = tuned(Params), side
+    edge, away = across(panel, axis)[end], -1 if end else 1
+    lines = lines_beside(contrast, panel, side, cell_m)
+    if lines:
+        return abs(lines[0] - edge)
+    widths = np.arange(params.narrowest_m / cell_m, params.widest_m / cell_m, STEP)
+    steps = [_step_at(relief, panel, axis, edge + away * width, away, cell_m) for width in widths]
+    best = int(np.argmax(steps))
+    return float(widths[best]) if steps[best] > params.sunk_m else None
+
+
+def _step_at(relief: Relief, front: Cell, axis: int, at: float, away: int, cell_m: float) -> float:
+    """By how much depth lies farther back beyond a position, along the middle of a front's span, than before it, in metres."""
+    params, (low, high) = tuned(Params), across(front, 1 - axis)
+    margin, level = (high - low) * (1 - params.middle) / 2, []
+    for side in (-away, away):
+        start, stop = sorted(at + side * size / cell_m for size in params.beside_m)
+        span = (start, low + margin, stop, high - margin) if axis == 0 else (low + margin, start, high - margin, stop)
+        points, total = relief.levels_over(Cell(*span))
+        level.append(total / max(points, 1.0))
+    return float(level[0] - level[1])
 
 
 def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: int, end: int) -> Cell | None:
@@ -64,8 +135,33 @@ def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: in
     return None
 
 
-def _is_stile(field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence, Evidence], axis: int, end: int) -> bool:
-    """Whether lines at a front's other three sides stand as far in as the strip is wide, and none inside its own side."""
+def _is_parted(contrast: Contrast, front: Cell, axis: int, end: int, cell_m: float) -> bool:
+    """Whether the line at one end of a front reaches its other sides, as a gap does: around a panel it ends at the stiles."""
+    params, at, (low, high) = tuned(Params), across(front, axis)[end], across(front, 1 - axis)
+    corner = params.narrowest_m / cell_m
+    inner = float(np.median(contrast.along(axis, at, low + corner, high - corner)))
+    corners = [
+        float(np.median(contrast.along(axis, at, *span)))
+        for span in ((low + CORNER, low + corner), (high - corner, high - CORNER))
+    ]
+    return min(corners) > params.none_share * inner
+
+
+def _is_sunk(contrast: Contrast, relief: Relief, front: Cell, axis: int, end: int, cell_m: float) -> bool:
+    """Whether depth shows a front behind what is beside one end of it, at a line."""
+    params, at, (low, high) = tuned(Params), across(front, axis)[end], across(front, 1 - axis)
+    margin, out = (high - low) * (1 - params.middle) / 2, 1 if end else -1
+    step = _step_at(relief, front, axis, at, -out, cell_m)
+    return step > params.sunk_m and shows(contrast, axis, at, low + margin, high - margin)
+
+
+def _is_stile(
+    field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence, Evidence], axis: int, end: int, sunk: bool
+) -> bool:
+    """Whether lines at a front's other three sides stand as far in as the strip is wide, and none inside its own side.
+
+    Where depth shows the panel sunk, light may hide one of them.
+    """
     params, cell_m = tuned(Params), field.cell_m / STEP
     (low, high), beside = across(front, axis), across(front, 1 - axis)
     near, away = (high, -1) if end else (low, 1)  # inwards
@@ -79,11 +175,12 @@ def _is_stile(field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence,
         return _clearest(lines[of], span, min(positions), max(positions))
 
     least = max(width - alike, narrowest), min(width + alike, widest)
-    shown = min(
+    around = (
         clearest(axis, beside, *(opposite - away * offset for offset in least)),
         clearest(1 - axis, (low, high), beside[0] + narrowest, beside[0] + widest),
         clearest(1 - axis, (low, high), beside[1] - widest, beside[1] - narrowest),
     )
+    shown = sorted(around)[int(sunk)]
     inside = clearest(axis, beside, near + away * narrowest, near + away * widest)
     return shown > params.panel_line and inside < params.none_share * shown
 

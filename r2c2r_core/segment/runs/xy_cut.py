@@ -6,8 +6,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.tuning import param, tuned
 
 
@@ -22,6 +22,13 @@ class Params:
     shortest_m: float = param(0.06, "m", "of a line's span along fronts", gt=0)
     block_m: float = param(0.03, "m", "along a line, over which its odds are pooled and it stays at one place", gt=0)
     step: float = param(0.5, "log", "of a block, that a line's step aside by one cell costs: poses and lenses bend lines")
+    bend_m: float = param(
+        0.03,
+        "m",
+        "from its middle, to which a line bends: beyond, it is another stack's seam",
+        gt=0,
+        source="a real kitchen's poses bend its lines by more than 2 cm",
+    )
     usual_width_m: float = param(0.5, "m", "of a front, median", gt=0, source="units sold are 0.3 to 0.6 m wide")
     usual_height_m: float = param(0.45, "m", "of a front, median", gt=0, source="drawers 0.14 m, doors 0.72 m, tall doors 2 m")
     width_spread: float = param(0.5, "log", "standard deviation of the logarithm of fronts' widths", gt=0)
@@ -41,8 +48,13 @@ class Params:
 
 
 class Line(NamedTuple):
-    """A cut. `total` is the sum of log-odds along it, over cells of the odds that are beside a front."""
+    """A cut. `total` is the sum of log-odds along it, over cells of the odds that are beside a front.
 
+    In the order to cut along them, the last first: a line that is no edge along a part of its span, however likely it is in
+    all, would cut a front there that others part from the rest.
+    """
+
+    unbroken: bool  # an edge is possible all along
     total: float
     axis: int  # 0 upright, 1 level
     position: float  # in grid cells
@@ -139,18 +151,22 @@ class LineField:
         line = self.best_between(cell, axis, border - STEP, border + STEP)
         return line.odds if line is not None and line.odds > 0 else -np.inf
 
-    def best_between(self, cell: Cell, axis: int, start: float, stop: float) -> Line | None:
-        """The likeliest line over the span of a cell with its position from `start` to `stop`, however unlikely."""
+    def best_between(self, cell: Cell, axis: int, start: float, stop: float, *, sized: bool = False) -> Line | None:
+        """The likeliest line over the span of a cell with its position from `start` to `stop`, however unlikely.
+
+        `sized`: by what sizes and handles of both parts say, too, which its total counts; its odds are of what is seen.
+        """
         first = max(int(start // STEP), 0)
         last = min(max(round(stop / STEP), first + 1), self.odds[axis].shape[1])
         paths = self._paths(cell, axis, first, last)
         if paths is None:
             return None
-        best = int(np.argmax(paths.score))
+        prior = self._prior(cell, axis, first, last) if sized else np.zeros(last - first)
+        best = int(np.argmax(paths.score + len(paths.at) * prior))
         mean = float(paths.odds[:, best].mean())
-        span = self._span(cell, axis)
+        span, unbroken = self._span(cell, axis), bool(self._unbroken(cell, axis, paths)[best])
         position = self._centre(cell, axis, first + paths.at[:, best], np.ones(len(paths.at), bool))
-        return Line(mean * (span.stop - span.start), axis, position * STEP, mean)
+        return Line(unbroken, (mean + float(prior[best])) * (span.stop - span.start), axis, position * STEP, mean)
 
     def evidence(self, cell: Cell, axis: int) -> LineEvidence | None:
         """What speaks for a line at each position within a cell; None where none fits."""
@@ -182,6 +198,11 @@ class LineField:
         best = int(np.argmax(odds))
         return (first + best + 0.5) * STEP, float(odds[best])
 
+    def is_possible(self, cell: Cell, axis: int, position: float) -> bool:
+        """Whether a straight line at about a position over the span of a cell may be an edge by what is seen."""
+        found = self.likeliest(cell, axis, position - STEP, position + STEP)
+        return found is not None and found[1] > self.params.possible
+
     def best_uncut(self, cell: Cell, inset_m: float) -> float:
         """Log-odds, sizes and handles in mind, of the likeliest line this far within a cell; -inf where none fits."""
         inset, best = inset_m / self.cell_m, -np.inf
@@ -210,11 +231,19 @@ class LineField:
         legal = (count * block * self.cell_m >= params.shortest_m) & (least > 0) & (total > 0)
         if not legal.any():
             return None
-        best = int(np.argmax(np.where(legal, total, -np.inf)))
+        unbroken = legal & self._unbroken(cell, axis, paths)
+        best = int(np.argmax(np.where(unbroken if unbroken.any() else legal, total, -np.inf)))
         position = self._centre(cell, axis, start + paths.at[:, best], paths.beside[:, best])
         if not low + STEP <= position * STEP <= high - STEP:
             return None
-        return Line(float(total[best] * block), axis, position * STEP, float(total[best] / count[best]))
+        return Line(bool(unbroken[best]), float(total[best] * block), axis, position * STEP, float(total[best] / count[best]))
+
+    def _unbroken(self, cell: Cell, axis: int, paths: Paths) -> np.ndarray:
+        """Which lines are possible all along fronts, but for as much as a handle hides."""
+        span = self._span(cell, axis)
+        block_m = (span.stop - span.start) / len(paths.at) * self.cell_m
+        broken = (paths.beside & (paths.odds < self.params.possible)).sum(axis=0)
+        return np.asarray(broken * block_m < self.params.shortest_m)
 
     def _paths(self, cell: Cell, axis: int, start: int, stop: int) -> Paths | None:
         """Through the span of a cell, at positions from `start` up to `stop`, by dynamic programming."""
@@ -225,7 +254,8 @@ class LineField:
         if not odds.size:
             return None
         odds, beside = self._pooled(odds), self._pooled(beside.astype(np.float32)) > 0.5
-        step, worth = self.params.step, np.where(beside, odds, 0)
+        params = self.params
+        step, worth = params.step, np.where(beside, odds, 0)
         score, came = worth[0], []
         for row in worth[1:]:
             beyond = np.pad(score, 1, constant_values=-np.inf)
@@ -237,6 +267,9 @@ class LineField:
         for moves in reversed(came):
             path.append(path[-1] + moves[path[-1]])
         at = np.stack(path[::-1])
+        bend, middle = round(params.bend_m / self.cell_m), np.median(at, axis=0).astype(int)
+        at = np.clip(at, middle - bend, middle + bend)
+        score = np.take_along_axis(worth, at, axis=1).sum(axis=0) - params.step * np.abs(np.diff(at, axis=0)).sum(axis=0)
         return Paths(at, np.take_along_axis(odds, at, axis=1), np.take_along_axis(beside, at, axis=1), score)
 
     def _pooled(self, values: np.ndarray) -> np.ndarray:

@@ -22,28 +22,43 @@ class Params:
         "how far a small thing wanders between frames",
         source="seen between frames of recordings whose poses disagree",
     )
+    width: float = param(1.2, "ratio", "of a thing's width to its radius, where its name tells no width")
+    height: float = param(1.5, "ratio", "of a thing's height to its radius, at least")
+    clicked_at: float = param(
+        0.45, "ratio", "of how far its middle lies behind a click to its width: clicks meet the near side"
+    )
+    growth: tuple[float, float] = param((0.6, 1.5), "ratio", "by which an outline may correct its size, in each round")
+    rounds: int = param(2, "count", "in which outlines correct it", ge=1)
+    drawn_m: tuple[float, float] = param(
+        (0.012, 0.015), "m", "how far an outline may be off where colours are learned, and drawn"
+    )
+    border_m: float = param(0.010, "m", "how far the last outline may be off")
+    shown: float = param(0.9, "share", "of it that nothing hides, for an outline to tell its size")
 
 
 def upright_shape(
     scene: Scene, positives: Points, views: list[Frame], config: ThingConfig, support: float | None
 ) -> Thing | None:
     """A cylinder of the usual size at the click, then of the size its outlines have: masks are found frame by frame."""
+    params = tuned(Params)
     base = support if support is not None else float(positives[:, 2].min()) - 0.5 * config.radius_m
-    width = config.width_m or 1.2 * config.radius_m
-    height = max(1.5 * config.radius_m, float(positives[:, 2].max()) - base + 0.01)
+    width = config.width_m or params.width * config.radius_m
+    height = max(params.height * config.radius_m, float(positives[:, 2].max()) - base + 0.01)
     nearest = min(views, key=lambda frame: float(np.linalg.norm(frame.world_from_camera.translation - positives[0])))
     away = (positives.mean(axis=0) - nearest.world_from_camera.translation) * [1, 1, 0]
-    centre = positives.mean(axis=0) + 0.45 * width * away / max(float(np.linalg.norm(away)), 1e-6)
+    centre = positives.mean(axis=0) + params.clicked_at * width * away / max(float(np.linalg.norm(away)), 1e-6)
     thing = _cylinder(centre, base, width, height, support)
-    for _ in range(2):
+    for _ in range(params.rounds):
         outlines = [outline for frame in views if (outline := _outline(thing, scene, frame)) is not None]
         if not outlines:
             break
         across, tall, east, north = (float(value) for value in np.median(np.array(outlines), axis=0))
-        width, height = float(np.clip(across, 0.6 * width, 1.5 * width)), float(np.clip(tall, 0.6 * height, 1.5 * height))
+        low, high = params.growth
+        width = float(np.clip(across, low * width, high * width))
+        height = float(np.clip(tall, low * height, high * height))
         centre = centre + np.array([east, north, 0.0])  # the click was beside its middle
         thing = _cylinder(centre, base, width, height, support)
-        thing = replace(thing, colours=colours_of(thing, scene, views, 0.012))
+        thing = replace(thing, colours=colours_of(thing, scene, views, params.drawn_m[0]))
     return thing
 
 
@@ -61,13 +76,14 @@ def _cylinder(centre: Vector3, base: float, width: float, height: float, support
     polar = np.array(side + lids)
     vertices = np.stack([polar[:, 0] * np.cos(polar[:, 1]), polar[:, 0] * np.sin(polar[:, 1]), polar[:, 2]], axis=1)
     placed = vertices + np.array([centre[0], centre[1], base])
-    return Thing(placed, np.zeros((0, 3), np.int64), support, spacing, pose_error_m=tuned(Params).wanders_m, border_m=0.010)
+    no_faces, params = np.zeros((0, 3), np.int64), tuned(Params)
+    return Thing(placed, no_faces, support, spacing, pose_error_m=params.wanders_m, border_m=params.border_m)
 
 
 def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
     """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
-    crop, mask, share = crop_outline(thing, scene, frame, 0.015)
-    if crop is None or share < 0.9 or not mask.any():
+    crop, mask, share = crop_outline(thing, scene, frame, tuned(Params).drawn_m[1])
+    if crop is None or share < tuned(Params).shown or not mask.any():
         return None
     found, drawn = np.argwhere(mask), np.argwhere(crop.hull)
     if found.min() < 2 or (found.max(axis=0) > np.array(mask.shape) - 3).any():

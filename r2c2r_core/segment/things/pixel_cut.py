@@ -43,6 +43,12 @@ def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
     return ColourModel(np.clip(odds, -params.most_odds, params.most_odds).astype(np.float32))
 
 
+def unmixed(odds: np.ndarray) -> np.ndarray:
+    """Log-odds (h, w) by colour that all neighbours share, else nought: a pixel on a border mixes the colours of its sides."""
+    around = np.ones((3, 3), np.uint8)
+    return np.asarray(np.maximum(cv2.erode(odds, around), 0) + np.minimum(cv2.dilate(odds, around), 0))
+
+
 def cut_pixels(rgb: Image, odds: np.ndarray, largest_px: int | None = None) -> Mask:
     """The mask of least cost: log-odds of being the thing (h, w) for each pixel, and borders that prefer colour edges."""
     height, width = odds.shape

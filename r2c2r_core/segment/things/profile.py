@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.segment.things.pixel_cut import ColourModel, learn_colours
+from r2c2r_core.segment.things.pixel_cut import ColourModel, learn_colours, unmixed
 from r2c2r_core.segment.things.strips import Strips
 from r2c2r_core.tuning import param, tuned
 
@@ -20,6 +20,14 @@ class Params:
         "of what colours say of a body to what they say of a pixel: a cap's were not seen on it, a shadow's were",
         source="by 1.0, of 24 bottles of two generators, one takes in a wall in shadow; another lost its cap by dearer borders",
     )
+    one_colour: float = param(
+        6.0,
+        "grey",
+        "CIELAB units a channel by which one place of a surface differs between views: noise, blur and shading",
+        gt=0,
+    )
+    most_odds: float = param(3.0, "log", "of a view's colour by the others', at most", gt=0)
+    beside: float = param(2 / 3, "share", "of the radii looked at, beyond which only what is behind shows", gt=0, lt=1)
     sure_odds: float = param(3.0, "log", "against it where all depth about a place is such: colours there are another's")
     border: float = param(
         12.0,
@@ -52,8 +60,10 @@ class Profile(NamedTuple):
 def profile_evidence(strips: Strips, colours: Colours) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean over views and sides (levels, cells): log-odds of being the thing, colour steps to the cell within and below."""
     params = tuned(Params)
-    odds = np.where(strips.another, -params.sure_odds, strips.depth_odds + params.colour * colours.odds(strips))
+    coloured = np.stack([unmixed(view) for view in colours.odds(strips)])
     lab = strips.lab.astype(np.float32)
+    coloured = np.logaddexp(coloured, _by_other_views(lab, strips.shown)) - np.log(2)
+    odds = np.where(strips.another, -params.sure_odds, strips.depth_odds + params.colour * coloured)
     half = lab.shape[2] // 2
     across = np.pad(np.linalg.norm(np.diff(lab, axis=2), axis=3), ((0, 0), (0, 0), (0, 1)))
     across = np.concatenate([across[:, :, :half], np.roll(across, 1, axis=2)[:, :, half:]], axis=2)
@@ -61,9 +71,30 @@ def profile_evidence(strips: Strips, colours: Colours) -> tuple[np.ndarray, np.n
     return _folded(odds, strips.shown), _folded(across, strips.shown), _folded(along, strips.shown)
 
 
+def _by_other_views(lab: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Log-odds (views, levels, columns) that a colour is that of one surface seen from all sides, over any that is behind.
+
+    Photo-consistency (Kutulakos and Seitz 2000): what stands at the axis has one colour there in all views and on both sides,
+    whatever colour; what is behind lies at another place in each.
+    """
+    params, half = tuned(Params), lab.shape[2] // 2
+    mean = _folded(lab, shown)
+    mean = np.concatenate([mean[:, ::-1], mean], axis=1)
+    beside = np.abs(np.arange(2 * half) - half + 0.5) > params.beside * half
+    at, known = lab[:, :, beside], shown[:, :, beside, None]
+    count = np.maximum(known.sum(axis=(0, 2)), 1)
+    behind = np.where(known, at, 0.0).sum(axis=(0, 2)) / count
+    spread = np.where(known, (at - behind[:, None]) ** 2, 0.0).sum(axis=(0, 2)) / count
+    own = params.one_colour**2
+    other = np.maximum(spread.mean(axis=1), own)[:, None]
+    on = -((lab - mean) ** 2).sum(axis=3) / (2 * own) - 1.5 * np.log(own)
+    off = -((lab - behind[:, None]) ** 2).sum(axis=3) / (2 * other) - 1.5 * np.log(other)
+    return np.asarray(np.clip(on - off, -params.most_odds, params.most_odds))
+
+
 def _folded(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Mean over views and both sides of the axis."""
-    half = values.shape[2] // 2
+    """Mean over views and both sides of the axis; of vectors too."""
+    half, shown = values.shape[2] // 2, shown.reshape(shown.shape + (1,) * (values.ndim - 3))
     total, count = np.where(shown, values, 0.0).sum(axis=0), shown.sum(axis=0)
     total, count = (sides[:, half:] + sides[:, :half][:, ::-1] for sides in (total, count))
     return np.asarray(total / np.maximum(count, 1))

@@ -34,6 +34,7 @@ class Params:
     )
     reach_m: float = param(0.04, "m", "about its voxels and the floor under them, where more of it may be")
     far_odds: float = param(6.0, "log", "of a pixel farther off")
+    before_m: float = param(0.05, "m", "nearer than all of the thing beyond the noise, from where a pixel lies on an occluder")
     model_frames: int = param(12, "count", "that colours are learned from", ge=1)
 
 
@@ -143,7 +144,7 @@ def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsic
     world = raised(frame.world_from_camera.apply(depth_points(depth, frame.depth_camera).reshape(-1, 3)), -lift)
     label = np.where(depth.ravel() > 0, found.label_of(world), UNKNOWN).reshape(depth.shape).astype(np.uint8)
     nearest = float(np.quantile(frame.world_from_camera.inverse.apply(found.thing.vertices)[:, 2], 0.02))
-    nearer = (label == OFF) & scene.noise.occluded(depth, nearest, 0.05)
+    nearer = (label == OFF) & scene.noise.occluded(depth, nearest, tuned(Params).before_m)
     if found.top_z_m is not None:
         nearer |= (label == OFF) & (world[:, 2] > found.top_z_m).reshape(depth.shape)
     label, inside = sample_through(label, frame.depth_camera, camera)

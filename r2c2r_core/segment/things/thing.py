@@ -34,6 +34,21 @@ class Params:
     )
     furniture_gap_m: float = param(0.08, "m", "that a thing on the floor may be parted by: legs and seats are lost in part")
     level_cos: float = param(0.92, "cosine", "with up, of a support")
+    level_area_m2: float = param(0.0005, "m²", "of level surface in a direction, for a support to go on there")
+    support_m2: float = param(0.005, "m²", "of level surface at one height, for a support")
+    support_share: float = param(0.15, "ratio", "of that surface to what a thing of the usual size covers, likewise")
+    surface_reach: float = param(2.2, "ratio", "of the surface about the clicks that is looked at to the thing's radius")
+    surface_margin_m: float = param(0.15, "m", "of that surface beyond it")
+    seed_m: float = param(0.12, "m", "from a click to the surface it means, at most")
+    cell: float = param(0.125, "ratio", "of a cell of the cut to the thing's radius", gt=0)
+    cells_m: tuple[float, float] = param((0.006, 0.025), "m", "least and most of a cell of the cut")
+    flat_cos: float = param(0.93, "cosine", "with up, of large level parts")
+    upright_cos: float = param(0.25, "cosine", "with up, of large upright parts")
+    parallel_cos: float = param(0.94, "cosine", "between neighbours on one flat part")
+    step_cells: float = param(0.35, "ratio", "of a step between neighbours on one flat part to a cell")
+    structure_m2: float = param(0.45, "m²", "of a flat part without a click, from where it is a wall, a worktop or a table top")
+    before_m: float = param(0.05, "m", "before its surface beyond the noise, from where something hides it")
+    depth_range_m: tuple[float, float] = param((0.25, 4.0), "m", "of views that its surface is fused from anew")
     farthest_m: float = param(1.0, "m", "from a click: of what is larger, as a worktop, that much is found")
 
 
@@ -88,7 +103,7 @@ def find_thing(
 ) -> Thing | None:
     """The surface that the clicks (world points) belong to; None when there is none within reach."""
     params = tuned(Params)
-    reach = 2.2 * config.radius_m + 0.15
+    reach = params.surface_reach * config.radius_m + params.surface_margin_m
     vertices, faces, colours = _local_surface(scene, positives, reach, voxel_m)
     if len(faces) < 20:
         return None
@@ -100,10 +115,10 @@ def find_thing(
     if keep.sum() < 10:
         return None
     faces = faces[keep]
-    size = max(0.006, min(0.025, config.radius_m / 8))
+    size = float(np.clip(params.cell * config.radius_m, *params.cells_m))
     graph = build_graph(vertices, faces, colours, size)
     seeds = [graph.nearest(point) for point in positives]
-    if np.linalg.norm(graph.positions[seeds] - positives, axis=1).min() > 0.12:
+    if np.linalg.norm(graph.positions[seeds] - positives, axis=1).min() > params.seed_m:
         return None
     refused = [graph.nearest(point) for point in negatives]
     refused = [voxel for voxel in refused if voxel not in seeds]
@@ -129,7 +144,7 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
     import cv2
 
     depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
-    hidden = projected & scene.noise.occluded(depth, model, 0.05)
+    hidden = projected & scene.noise.occluded(depth, model, tuned(Params).before_m)
     sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
     through = scene.noise.seen_through(sensor, model, tuned(Params).seen_through_m)  # between slats, which the surface closes
     shown = projected & ~hidden & ~through
@@ -177,10 +192,10 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     ring = distance > config.radius_m
     spread = np.zeros((height_bin.max() + 1, params.sectors))
     np.add.at(spread, (height_bin[ring], sector[ring]), areas[ring])
-    around = (_over_bins(spread) > 5e-4).mean(axis=1)
+    around = (_over_bins(spread) > params.level_area_m2).mean(axis=1)
     near = distance < params.support_reach_m + config.radius_m
     profile = _over_bins(np.bincount(height_bin[near], areas[near], len(spread))[:, None])[:, 0]
-    enough = max(0.005, 0.15 * np.pi * (0.7 * config.radius_m) ** 2)
+    enough = max(params.support_m2, params.support_share * np.pi * (0.7 * config.radius_m) ** 2)
     peaks = [i for i in range(len(profile)) if profile[i] > enough and profile[i] == profile[max(0, i - 4) : i + 5].max()]
     if not peaks:
         return None
@@ -207,12 +222,14 @@ def _over_bins(profile: np.ndarray) -> np.ndarray:
 
 def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
     """Voxels of large flat parts (walls, worktops, table tops) that hold no click."""
-    background = np.zeros(len(graph.positions), bool)
+    params, background = tuned(Params), np.zeros(len(graph.positions), bool)
     for axis in ("level", "upright"):
-        flat = np.abs(graph.normals[:, 2]) > 0.93 if axis == "level" else np.abs(graph.normals[:, 2]) < 0.25
+        upward = np.abs(graph.normals[:, 2])
+        flat = upward > params.flat_cos if axis == "level" else upward < params.upright_cos
         a, b = graph.edges.T
-        parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > 0.94
-        step = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a])) < 0.35 * graph.size_m
+        parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > params.parallel_cos
+        off = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a]))
+        step = off < params.step_cells * graph.size_m
         link = flat[a] & flat[b] & parallel & step
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -222,7 +239,7 @@ def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
             coo_matrix((np.ones(int(link.sum())), (a[link], b[link])), shape=(count, count)), directed=False
         )
         areas = np.bincount(labels, graph.area_m2)
-        large = areas[labels] > 0.45
+        large = areas[labels] > params.structure_m2
         background |= large & flat & ~np.isin(labels, labels[seeds])
     return background
 
@@ -236,7 +253,9 @@ def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: flo
         vertices, colours = surface.vertices_world, surface.colours
         faces = surface.faces[scene.parts.faces_near(centre, reach)]
     else:
-        fine = fuse_depth(_views_of(scene, centre, reach), voxel_m, depth_max_m=4.0, block_count=32_000)
+        fine = fuse_depth(
+            _views_of(scene, centre, reach), voxel_m, depth_max_m=tuned(Params).depth_range_m[1], block_count=32_000
+        )
         vertices, faces, colours = fine.vertices, fine.faces, fine.colours
     used, around = _renumbered(faces, len(vertices))
     near = np.linalg.norm(vertices[used] - centre, axis=1) < reach
@@ -253,11 +272,11 @@ def _renumbered(faces: Faces, count: int) -> tuple[np.ndarray, Faces]:
 
 def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> list[DepthView]:
     """The sharpest, nearest depth images that see a ball, everything outside it removed."""
-    rated = []
+    rated, (nearest, farthest) = [], tuned(Params).depth_range_m
     for frame in scene.frames:
         local = frame.world_from_camera.inverse.apply(centre[None])[0]
         camera = frame.depth_camera
-        if not 0.25 < local[2] < 4.0:
+        if not nearest < local[2] < farthest:
             continue
         u, v = project(local, camera)
         if -0.1 * camera.width < u < 1.1 * camera.width and -0.1 * camera.height < v < 1.1 * camera.height:

@@ -123,14 +123,23 @@ def test_a_front_on_the_bare_wall() -> None:
 def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about() -> None:
     door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
     assert door.front is not None
-    sure = replace(door, front=replace(door.front, edges=(0.9, 0.9, 0.6, 0.9), seam=0.1))
+    sure = replace(door, front=replace(door.front, edges=(0.9, 0.9, 0.6, 0.9), right=0.9, seam=0.1))
     assert found((sure, clicked)) == ()
-    faint = replace(door, front=replace(door.front, edges=(0.9, 0.1, 0.2, 0.9), seam=0.45))
+    faint = replace(door, front=replace(door.front, edges=(0.9, 0.1, 0.2, 0.9), right=0.5, seam=0.3))
     (doubt,) = found((faint, clicked))
     assert doubt.rule == "edge-unsure"
     assert (
-        "door_1 (50 x 70 cm): its right and upper edges hardly show, and there may be a seam inside it (45 %)" in doubt.message
+        "door_1 (50 x 70 cm) is 35 % sure: its right and upper edges hardly show, and there may be a seam inside it (30 %)"
+        in doubt.message
     )
+
+
+def test_a_front_that_may_end_elsewhere_is_asked_about_where_all_its_edges_show() -> None:
+    door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
+    assert door.front is not None
+    (doubt,) = found((replace(door, front=replace(door.front, edges=(0.9,) * 4, right=0.6)), clicked))
+    assert doubt.rule == "edge-unsure"
+    assert "is 60 % sure" in doubt.message
 
 
 def test_the_seam_between_two_doors_is_not_asked_about() -> None:

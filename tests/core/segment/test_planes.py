@@ -54,6 +54,14 @@ def test_a_rectangle_is_found_where_it_is_however_the_room_is_turned(yaw: float)
     assert region.area_m2 == pytest.approx(0.48, rel=1e-6)
 
 
+@pytest.mark.parametrize("yaw_deg", [0.5, 0.9, -0.6])
+def test_a_long_run_between_two_bins_of_yaw_is_one_region(yaw_deg: float) -> None:
+    turn = rotation_about_z(np.deg2rad(yaw_deg))
+    shown = front(x=-4.0, width=8.0)
+    region = only(find_planes(surface(shown.vertices_world @ turn.T, shown.faces), CAMERAS))
+    assert region.width_m == pytest.approx(8.0, abs=2 * CELL_M)
+
+
 def test_noise_of_the_surface_averages_out_in_the_plane() -> None:
     shown = front()
     noisy = shown.vertices_world + np.random.default_rng(3).normal(scale=[0, 0.003, 0], size=shown.vertices_world.shape)
@@ -71,6 +79,29 @@ def test_what_is_level_or_turned_away_from_every_camera_is_none() -> None:
 def test_fronts_eight_centimetres_apart_are_two_and_the_larger_is_first() -> None:
     regions = find_planes(together(front(width=0.5), front(x=0.7, y=0.08, width=0.9)), CAMERAS)
     assert [round(float(r.world_from_plane.translation[1]), 3) for r in regions] == [0.08, 0.0]
+
+
+def frame(stile: float, y: float = 0.0) -> SceneSurface:
+    """Rails and stiles of that width round 0.6 by 0.5 m; the opening's lower left corner is at (0, 0.3)."""
+    return together(
+        front(-stile, y, 0.3 - stile, 0.6 + 2 * stile, stile),
+        front(-stile, y, 0.8, 0.6 + 2 * stile, stile),
+        front(-stile, y, 0.3, stile, 0.5),
+        front(0.6, y, 0.3, stile, 0.5),
+    )
+
+
+def test_a_panel_sunk_deep_in_a_frame_is_of_the_frames_plane() -> None:
+    region = only(find_planes(together(frame(0.06), front(0.0, 0.032, 0.3, 0.6, 0.5)), CAMERAS))
+    assert abs(region.world_from_plane.translation[1]) < 0.004
+    assert region.supports(np.array([[0.3, 0.032, 0.55]]), 0.0)[0]  # a click in the middle of the panel
+
+
+@pytest.mark.parametrize("parts", [(frame(0.06), 0.07), (frame(0.02), 0.032), (front(-0.6, 0.0, 0.3, 0.6, 0.5), 0.032)])
+def test_what_lies_deeper_or_has_no_stiles_round_it_is_a_plane_of_its_own(parts: tuple[SceneSurface, float]) -> None:
+    around, behind_m = parts
+    regions = find_planes(together(around, front(0.0, behind_m, 0.3, 0.6, 0.5)), CAMERAS)
+    assert any(abs(region.world_from_plane.translation[1] - behind_m) < 0.004 for region in regions)
 
 
 def test_a_gap_that_a_thing_in_front_leaves_is_bridged_and_a_wide_one_is_not() -> None:

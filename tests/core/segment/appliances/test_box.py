@@ -5,7 +5,7 @@ import numpy as np
 
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.appliances.box import find_rectangle
-from r2c2r_core.segment.runs.lines import Evidence
+from r2c2r_core.segment.mosaics.lines import Evidence
 
 CELL_M, BLOCK = 0.005, 10
 LEFT, RIGHT, TOP, BOTTOM = 20, 140, 30, 370  # 0.6 x 1.7 m

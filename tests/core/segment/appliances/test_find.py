@@ -27,7 +27,9 @@ SIDE = plane((-0.32, 0.33, 0.87), (-1.0, 0.0), 0.60, 1.74)
 ROUNDED = plane((-0.30, 0.02, 0.87), (-0.5, -1.0), 0.06, 1.60)  # what fusion makes of the edge between them
 
 
-def asked_for(point: Vector3) -> PlaneRegion:
+def asked_for(
+    point: Vector3, kind: str = "refrigerator", planes: tuple[PlaneRegion, ...] = (FRONT, SIDE, ROUNDED)
+) -> PlaneRegion:
     """The plane whose run a click on a refrigerator at a world point asks for."""
     asked: list[PlaneRegion] = []
     camera = SimpleNamespace(world_from_camera=Rigid3(np.eye(3), np.array([-1.2, -1.6, 1.4])))
@@ -42,9 +44,9 @@ def asked_for(point: Vector3) -> PlaneRegion:
     def run_of(region: PlaneRegion, margin_m: float = 0.0) -> None:
         asked.append(region)
 
-    prepared = cast(PreparedCapture, cast(Any, SimpleNamespace(scene=scene, planes=(FRONT, SIDE, ROUNDED), run_of=run_of)))
-    prompt = ObjectPrompt(name="it", category="refrigerator", points=(PromptPoint(frame=0, x=1.0, y=1.0, label=1),))
-    assert appliance_front(prepared, prompt, category_of("refrigerator"), np.zeros((0, 3))) is None  # there is no run
+    prepared = cast(PreparedCapture, cast(Any, SimpleNamespace(scene=scene, planes=planes, run_of=run_of)))
+    prompt = ObjectPrompt(name="it", category=kind, points=(PromptPoint(frame=0, x=1.0, y=1.0, label=1),))
+    assert appliance_front(prepared, prompt, category_of(kind), np.zeros((0, 3))) is None  # there is no run
     return asked[0]
 
 
@@ -58,3 +60,10 @@ def test_a_click_on_its_side_means_the_front_before_it_and_not_the_rounded_edge(
 
 def test_a_click_on_its_rounded_edge_means_the_front() -> None:
     assert asked_for(np.array([-0.30, 0.02, 0.5])) is FRONT
+
+
+def test_a_side_looked_at_more_squarely_is_not_the_front_where_the_clicked_plane_is_as_wide_as_one() -> None:
+    wide = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.91, 1.74)
+    beside = plane((-0.46, 0.33, 0.87), (-1.0, 0.0), 0.68, 1.74)
+    clicked = np.array([-0.3, 0.0, 1.0])
+    assert asked_for(clicked, "french_door_refrigerator", (wide, beside)) is wide

@@ -1,4 +1,5 @@
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,13 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import own_handle
+from r2c2r_core.segment.fronts.front import edge_strengths, own_handle
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.runs.handles import GridHandle
-from r2c2r_core.segment.runs.orthomosaic import Cell, joined
+from r2c2r_core.segment.mosaics.edges import Refined
+from r2c2r_core.segment.mosaics.handles import GridHandle
+from r2c2r_core.segment.mosaics.orthomosaic import Cell, joined
+from r2c2r_core.segment.mosaics.relief import Relief
+from r2c2r_core.segment.runs.contrast import Contrast
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
@@ -32,6 +36,42 @@ def test_one_click_measures_a_door_within_3_mm(session: GeometricSession, boxes:
     assert panel.handle.is_vertical
     assert panel.handle.protrusion_m == pytest.approx(0.036, abs=6e-3)  # a rod two depth pixels wide
     assert np.sign(panel.handle.centre[0]) == (-1 if name == "door_b" else 1)
+
+
+def test_the_refined_edges_of_a_front_are_kept_clear_of_a_face_frame(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def halved(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
+        assert cut in cells
+        return Cell(panel.left, panel.top, panel.right, (panel.top + panel.bottom) / 2)
+
+    monkeypatch.setattr("r2c2r_core.segment.fronts.front.clear_of_rails", halved)
+    left, _ = DOORS["door_a"]
+    panel = session.find(prompt("half", "cabinet", click_on(boxes[0], (left + 0.31, FRONT_Y, 0.41), 60))).panel()
+    assert panel is not None
+    assert panel.height_m == pytest.approx((TOP_M - BOTTOM_M) / 2, abs=3e-3)
+
+
+def test_the_refined_upper_edge_of_a_front_is_as_far_from_its_sunk_panel_as_the_others(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lowered(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
+        return dataclasses.replace(refined.panel, top=refined.panel.top + 0.05 / cell_m)
+
+    monkeypatch.setattr("r2c2r_core.segment.fronts.front.evenly_framed", lowered)
+    left, _ = DOORS["door_a"]
+    panel = session.find(prompt("low", "cabinet", click_on(boxes[0], (left + 0.31, FRONT_Y, 0.4), 60))).panel()
+    assert panel is not None
+    assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M - 0.05, abs=3e-3)
+
+
+def test_an_edge_without_a_change_of_colour_is_unsure(session: GeometricSession, boxes: Boxes) -> None:
+    left, _ = DOORS["door_a"]
+    found = session.find(prompt("pale", "cabinet", click_on(boxes[0], (left + 0.3, FRONT_Y, 0.4), 60)))
+    assert isinstance(found, FoundFront)
+    assert min(edge_strengths(found.front)) > 0.5
+    pale = dataclasses.replace(found.front.run, mosaic=np.full_like(found.front.run.mosaic, 200))
+    assert max(edge_strengths(dataclasses.replace(found.front, run=pale))) < 0.3  # as the run asks about it
 
 
 @pytest.mark.parametrize("name", DRAWERS)
@@ -148,6 +188,20 @@ def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Pat
 
 def test_neighbours_that_are_apart_dispute_nothing(session: GeometricSession, boxes: Boxes) -> None:
     assert session.disputed(two_doors(boxes[0])) == {}
+
+
+def test_fronts_whose_clicks_stay_are_not_found_again(
+    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.disputed(two_doors(boxes[0]))
+    later = dataclasses.replace(session, _found={})
+    found: list[str] = []
+    find = GeometricSession.find
+    monkeypatch.setattr(GeometricSession, "find", lambda self, asked: found.append(asked.name) or find(self, asked))
+    changed, kept = two_doors(boxes[0])
+    point = dataclasses.replace(changed.points[0], x=changed.points[0].x + 1.0)
+    assert later.disputed([dataclasses.replace(changed, points=(point,)), kept]) == {}
+    assert found == [changed.name]
 
 
 def two_doors(capture: Capture) -> list[ObjectPrompt]:

@@ -55,3 +55,27 @@ def test_clicks_on_what_stands_open_mean_what_is_closed_there(tmp_path: Path) ->
     assert opened is not None
     np.testing.assert_allclose(opened.world_from_front.matrix, closed.world_from_front.matrix, atol=0.005)
     assert (opened.width_m, opened.height_m) == pytest.approx((closed.width_m, closed.height_m), abs=0.01)
+
+
+@pytest.mark.parametrize(("swung_deg", "frame"), [(0.0, 20), (60.0, 100)])
+def test_a_door_filmed_open_for_longer_than_closed_is_clicked_in_either(swung_deg: float, frame: int, tmp_path: Path) -> None:
+    capture, _ = kitchen(from_step=4, swung_rad=np.deg2rad(60.0))
+    x, width = DOORS["door_c"]
+    half = width / 2 * np.array([np.cos(np.deg2rad(swung_deg)), -np.sin(np.deg2rad(swung_deg))])
+    door = prompt("door_c", "cabinet", click_on(capture, (x + half[0], FRONT_Y + half[1], 0.5), frame))
+    track = open_session(capture, tmp_path).track(door)
+    assert track.front is not None
+    np.testing.assert_allclose(track.front.world_from_front.translation[:2], [x + width / 2, FRONT_Y], atol=0.01)
+    (motion,) = track.motions
+    assert motion.largest == pytest.approx(np.deg2rad(60.0), abs=np.deg2rad(1.0))
+
+
+def test_a_drawer_that_is_held_open_is_no_front_where_it_stands(tmp_path: Path) -> None:
+    """For half of the recording it is a board in the room, on a plane of its own."""
+    capture, _ = kitchen(OUT_M, from_step=10)
+    drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y - OUT_M, 0.5), 110))
+    track = open_session(capture, tmp_path).track(drawer)
+    assert track.front is not None
+    np.testing.assert_allclose(track.front.world_from_front.translation[1], FRONT_Y, atol=0.01)
+    (motion,) = track.motions
+    assert (motion.kind, motion.largest) == ("prismatic", pytest.approx(OUT_M, abs=0.006))

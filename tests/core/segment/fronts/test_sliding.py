@@ -9,9 +9,9 @@ import pytest
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.fronts.sliding import sliding_chance
+from r2c2r_core.segment.mosaics.handles import GridHandle
+from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.handles import GridHandle
-from r2c2r_core.segment.runs.orthomosaic import Cell, PlaneGrid
 
 WIDTH, HEIGHT, CELL_M = 0.5, 0.7, 0.0025
 OUTWARD = np.array([0.0, -1.0, 0.0])

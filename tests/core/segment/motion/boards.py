@@ -29,10 +29,19 @@ class Film:
 
     frames: tuple[Frame, ...]
     depths: dict[int, np.ndarray]
+    floor_m: float | None = None
     noise: DepthNoise = field(default_factory=lambda: DepthNoise(floor_m=0.002, per_m=0.002))
 
     def depth(self, frame_index: int) -> np.ndarray:
         return self.depths[frame_index]
+
+
+_HALF_W, _HALF_H = LEAF.half_m
+REAR: Solid = (
+    LEAF.world_from_front,
+    (-_HALF_W, THICKNESS_M + 0.45, -_HALF_H),
+    (_HALF_W, THICKNESS_M + 0.47, _HALF_H),
+)
 
 
 def joint(way: str) -> Hypothesis:
@@ -48,12 +57,17 @@ def filmed(
     other: Sequence[int] = (),
     pivot_off: tuple[float, float, float] = (0.0, 0.0, 0.0),
     niche: bool = False,
+    jars: bool = False,
+    glass: bool = False,
+    thickness_m: float = THICKNESS_M,
     seed: int = 0,
 ) -> Film:
     """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`.
 
     In frames `other` it is closed, and a board like it stands before it where it would be, hung on its left and opened by 0.9.
     With `niche` it is closed between two machines that reach into the room, and the cameras pass so far that they hide it.
+    With `jars` a row of them stands on a shelf behind it, and the unit's rear board returns no light. With `glass` its outer
+    face returns none.
     """
     rng = np.random.default_rng(seed)
     moving = joint(way)
@@ -69,7 +83,12 @@ def filmed(
         before = [_arm()] if number in hands else []
         before += [_board(LEAF.world_from_front @ joint("left").pose(0.9))] if number in other else []
         before += _niche() if niche else []
-        seen = cast_rays([*_unit(), _board(leaf), *before], pose)
+        before += _jars() if jars else []
+        seen = cast_rays([*_unit(), _board(leaf, thickness_m), *before], pose)
+        if jars:
+            seen[seen != cast_rays([*(one for one in _unit() if one is not REAR), _board(leaf), *before], pose)] = 0.0
+        if glass and leaf.inverse.apply(eye[None])[0, 1] < 0:
+            seen[seen != cast_rays([*_unit(), *before], pose)] = 0.0
         frames.append(
             Frame(
                 index=number,
@@ -100,20 +119,20 @@ def cast_rays(solids: Sequence[Solid], world_from_camera: Rigid3) -> np.ndarray:
     return np.where(np.isfinite(nearest), nearest, 0.0).reshape(CAMERA.height, CAMERA.width)
 
 
-def _board(world_from_leaf: Rigid3) -> Solid:
+def _board(world_from_leaf: Rigid3, thickness_m: float = THICKNESS_M) -> Solid:
     half_w, half_h = LEAF.half_m
-    return (world_from_leaf, (-half_w + 0.0015, 0.0, -half_h + 0.0015), (half_w - 0.0015, THICKNESS_M, half_h - 0.0015))
+    return (world_from_leaf, (-half_w + 0.0015, 0.0, -half_h + 0.0015), (half_w - 0.0015, thickness_m, half_h - 0.0015))
 
 
 def _unit() -> list[Solid]:
     """Boards round a hollow half a metre deep, neighbours beside and below, a wall behind and a floor."""
-    place, (w, h), t = LEAF.world_from_front, LEAF.half_m, THICKNESS_M
+    place, (w, h) = LEAF.world_from_front, LEAF.half_m
     return [
         (place, (-w - 0.6, 0.0, -h), (-w, 0.5, h)),
         (place, (w, 0.0, -h), (w + 0.6, 0.5, h)),
         (place, (-w - 0.6, 0.0, h), (w + 0.6, 0.5, h + 0.3)),
         (place, (-w - 0.6, 0.0, -h - 0.2), (w + 0.6, 0.5, -h)),
-        (place, (-w, t + 0.45, -h), (w, t + 0.47, h)),
+        REAR,
         (place, (-3.0, 0.5, -h - 0.5), (3.0, 0.6, 2.0)),
         (place, (-3.0, -3.0, -h - 0.3), (3.0, 0.5, -h - 0.2)),
     ]
@@ -123,6 +142,11 @@ def _niche() -> list[Solid]:
     w, h = LEAF.half_m
     deep, shallow = (-w - 0.6, -0.9, -h), (w - 0.017, -0.5, -h)
     return [(LEAF.world_from_front, deep, (-w, -0.02, h)), (LEAF.world_from_front, shallow, (w + 0.6, -0.02, h))]
+
+
+def _jars() -> list[Solid]:
+    jars = [(LEAF.world_from_front, (x, 0.25, 0.0), (x + 0.09, 0.32, 0.12)) for x in np.arange(-0.23, 0.2, 0.12)]
+    return [(LEAF.world_from_front, (-_HALF_W, 0.04, -0.016), (_HALF_W, THICKNESS_M + 0.45, 0.0)), *jars]
 
 
 def _arm() -> Solid:

@@ -3,6 +3,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.motion import DRAWER
+from r2c2r_core.segment.motion.filmed import FilmedLeaves
+from r2c2r_core.segment.motion.hypotheses import hypotheses
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.motion.track import find_motion
 from tests.core.segment.motion.boards import LEAF, filmed, joint
 
@@ -33,6 +39,19 @@ def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
     assert np.quantile(np.abs(values - states), 0.95) < (np.deg2rad(2) if way in RAD else 0.008)  # a depth pixel is 11 mm
     assert motion.largest == pytest.approx(states.max(), abs=np.deg2rad(1) if way in RAD else 0.006)
     assert motion.stop_seen
+
+
+def test_a_leaf_that_rests_almost_closed_is_closed() -> None:
+    """A pose or a frame's profile turns all depth of a closed leaf by more than a frame errs by itself."""
+    states = np.maximum(opened_and_held(np.deg2rad(75)), np.deg2rad(2.6))
+    motion = find_motion(LEAF, scene("left", states))
+    assert motion is not None
+    assert [motion.states[k].value for k in range(7)] == [0.0] * 7
+    assert motion.states[9].value == pytest.approx(states[9], abs=np.deg2rad(2))  # on its way it is where it was seen
+
+
+def test_a_flap_opens_no_further_than_its_stays_let_it() -> None:
+    assert max(joint(way).states.max() for way in ("top", "bottom")) <= np.deg2rad(120) < joint("left").states.max()
 
 
 @pytest.mark.parametrize("way", RAD)
@@ -118,3 +137,40 @@ def test_what_stands_open_when_the_film_begins_has_met_no_stop() -> None:
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
     assert not motion.stop_seen
+
+
+def test_black_glass_is_closed_where_it_is_silent() -> None:
+    """An oven's door: its outer face returns no light, its inner one does."""
+    states = opened_and_held(1.4)
+    motion = find_motion(LEAF, scene("bottom", states, glass=True))
+    assert motion is not None
+    assert [motion.states[k].value for k in range(8)] == [0.0] * 8
+    held = np.array([motion.states[k].value for k in range(20, 30)], dtype=float)
+    assert np.quantile(np.abs(held - 1.4), 0.9) < np.deg2rad(2)
+
+
+def test_a_drawer_below_a_door_is_a_leaf_of_its_own() -> None:
+    whole = Leaf(
+        world_from_front=LEAF.world_from_front @ Rigid3(np.eye(3), np.array([0.0, 0.0, 0.15])), width_m=0.5, height_m=0.9
+    )
+    film = scene("out", opened_and_held(0.3))
+    (drawer,) = FilmedLeaves(whole, category_of("refrigerator"), film, 0.6, (LEAF.half_m[1] - 0.15,)).motions
+    assert (drawer.part, drawer.kind) == (DRAWER, "prismatic")
+    assert drawer.pivot_world is not None
+    np.testing.assert_allclose(drawer.pivot_world, LEAF.world_from_front.translation, atol=1e-6)  # its own middle
+    assert drawer.largest == pytest.approx(0.3, abs=0.006)
+
+
+def test_a_door_that_swings_is_no_drawer_below_a_seam() -> None:
+    film = scene("left", opened_and_held(1.2))
+    (door,) = FilmedLeaves(LEAF, category_of("refrigerator"), film, 0.6, (-0.1,)).motions
+    assert (door.part, door.kind) == ("", "revolute")
+
+
+def test_a_leaf_opens_no_further_than_to_the_floor() -> None:
+    def widest(floor_m: float | None) -> float:
+        return float(next(one for one in hypotheses(LEAF, floor_m) if one.way == "bottom").states[-1])
+
+    assert widest(None) == pytest.approx(np.deg2rad(117.0))  # the last of the steps that are tried
+    bottom = float(LEAF.world_from_front.translation[2]) - LEAF.half_m[1]
+    assert np.pi / 2 < widest(bottom - 0.1) < widest(bottom - 0.2) < widest(None)

@@ -9,10 +9,10 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.geometric.session import GeometricSession
+from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.segment.proposals import panels
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front, name_thing
 from r2c2r_core.segment.proposals.propose import is_taken
-from r2c2r_core.segment.runs.handles import GridHandle
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import DOORS, DRAWERS
 
@@ -92,6 +92,13 @@ def bar(width: float, height: float) -> GridHandle:
         (FrontLook(width_m=0.6, height_m=1.7, bottom_m=0.05, handle=bar(8, 200)), "refrigerator"),
         (FrontLook(width_m=0.6, height_m=0.7, bottom_m=0.1, handle=bar(200, 8)), "dishwasher"),
         (FrontLook(width_m=0.6, height_m=0.6, bottom_m=0.1, handle=bar(200, 8), dark=0.7), "oven"),
+        (FrontLook(width_m=0.9, height_m=0.7, bottom_m=1.4, handle=bar(8, 80), pair=True), "double_door_wall_cabinet"),
+        (FrontLook(width_m=0.4, height_m=0.36, bottom_m=0.1, handle=None), "drawer"),
+        (
+            FrontLook(width_m=0.49, height_m=0.28, bottom_m=0.66, handle=None, dark=0.9),
+            "drawer",
+        ),  # a black kitchen without handles
+        (FrontLook(width_m=0.6, height_m=0.7, bottom_m=0.1, handle=None, dark=0.9), "cabinet"),
     ],
 )
 def test_size_place_and_handle_name_a_front(look: FrontLook, category: str) -> None:

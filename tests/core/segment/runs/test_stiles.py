@@ -1,15 +1,20 @@
 """Strips beside panels: stiles of their frames, or of the frame of the cupboard."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.runs.lines import Evidence
-from r2c2r_core.segment.runs.orthomosaic import Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
-from r2c2r_core.segment.runs.stiles import whole_frames
+from r2c2r_core.segment.mosaics.edges import Refined
+from r2c2r_core.segment.mosaics.lines import Evidence
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
+from r2c2r_core.segment.runs.contrast import Contrast
+from r2c2r_core.segment.runs.stiles import evenly_framed, whole_frames
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.scenes import kitchen
 
@@ -40,11 +45,13 @@ def door_of(cells: list[Cell]) -> Cell:
     return next(cell for cell in cells if cell.contains(200, 170))
 
 
+BLANK = Contrast(np.full((340, 320), 170, np.float32))
+FLAT = Relief(2 * CELL_M, np.full((170, 160), 10.0), *(np.zeros((170, 160)) for _ in range(3)))
 PANEL_LINES = ([PANEL.left, PANEL.right], [PANEL.top, PANEL.bottom])
 
 
 def test_a_strip_as_wide_as_the_opposite_stile_belongs_to_the_door() -> None:
-    cells = whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES))
+    cells = whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)
     door = door_of(cells)
     assert (door.left, door.top, door.right, door.bottom) == pytest.approx((80, 20, 280, 320), abs=2)
     assert sum(cell.width * cell.height for cell in cells) == pytest.approx(280 * 300)  # they tile what they did
@@ -60,18 +67,73 @@ def test_a_strip_as_wide_as_the_opposite_stile_belongs_to_the_door() -> None:
     ],
 )
 def test_a_strip_beside_a_whole_door_is_none_of_it(upright: list[float], level: list[float]) -> None:
-    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(upright, level))) == CUT
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(upright, level), BLANK, FLAT)) == CUT
+
+
+def test_a_strip_of_a_face_frame_is_no_stile() -> None:
+    gaps = np.full((340, 320), 170, np.float32)
+    cv2.rectangle(gaps, (round(CUT.left), round(CUT.top)), (round(CUT.right), round(CUT.bottom)), 90, 1)
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), Contrast(gaps), FLAT)) == CUT
+
+
+def test_what_is_beyond_a_line_from_corner_to_corner_is_no_stile() -> None:
+    """A gap parts it from the front; the line round a sunk panel ends at the stiles. Faint borders do not tell a rail."""
+    light = np.full((340, 320), 170, np.float32)
+    light[round(CUT.top) : round(CUT.bottom), round(CUT.left)] = 150
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), Contrast(light), FLAT)) == CUT
+    light[:], light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 170, 150
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), Contrast(light), FLAT)) != CUT
+
+
+@pytest.mark.parametrize(("sunk_m", "marked", "whole"), [(0.007, True, True), (0.007, False, False), (0.001, True, False)])
+def test_light_may_hide_a_line_around_a_panel_that_depth_shows_sunk(sunk_m: float, marked: bool, whole: bool) -> None:
+    """Nothing shows opposite the strip: depth and a line between them tell that it is a stile."""
+    light = np.full((340, 320), 170, np.float32)
+    light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150 if marked else 170
+    level = np.zeros((170, 160))
+    level[25:145, 55:125] = -sunk_m
+    relief = replace(FLAT, level_m=level)
+    cells = whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines([110], [50, 290]), Contrast(light), relief)
+    assert (door_of(cells) != CUT) == whole
+
+
+@pytest.mark.parametrize(("rail", "found"), [(30, 30), (15, 22)])
+def test_an_edge_in_a_shadow_is_as_far_from_the_sunk_panel_as_the_others(rail: int, found: float) -> None:
+    """The shadow ends at row 30; it was followed up to row 22. All other stiles and rails are 30 cells wide."""
+    sunk = Cell(110, 30 + rail, 250, 290)
+    light = np.full((340, 320), 170, np.float32)
+    cv2.rectangle(light, (round(sunk.left), round(sunk.top)), (round(sunk.right), round(sunk.bottom)), 120, 1)
+    followed = Refined(Cell(80, 22, 280, 320), lit_top=30)
+    contrast = Contrast(cv2.GaussianBlur(light, (0, 0), 0.8))
+    assert evenly_framed(contrast, FLAT, followed, CELL_M).top == pytest.approx(found, abs=2)
+
+
+@pytest.mark.parametrize(("sunk_m", "found"), [(0.007, 30), (0.0, 22)])
+def test_an_edge_in_a_shadow_is_as_far_from_a_panel_that_only_depth_shows_sunk(sunk_m: float, found: float) -> None:
+    """Light from above shows the upper line of the panel alone."""
+    light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
+    light[60, 110:250], level[30:145, 55:125] = 120, -sunk_m
+    followed = Refined(Cell(80, 22, 280, 320), lit_top=30)
+    contrast, relief = Contrast(cv2.GaussianBlur(light, (0, 0), 0.8)), replace(FLAT, level_m=level)
+    assert evenly_framed(contrast, relief, followed, CELL_M).top == pytest.approx(found, abs=3)
 
 
 def test_a_door_beside_a_door_is_no_stile() -> None:
-    assert door_of(whole_frames(odds(0), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES))) == CUT
+    assert door_of(whole_frames(odds(0), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)) == CUT
 
 
 def test_the_panels_of_a_run_are_whole_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[list[Cell]] = []
 
-    def noted(odds: PanelOdds, cells: Sequence[Cell], cell_m: float, lines: tuple[Evidence, Evidence]) -> list[Cell]:
-        made.append(whole_frames(odds, cells, cell_m, lines)[::-1])
+    def noted(
+        odds: PanelOdds,
+        cells: Sequence[Cell],
+        cell_m: float,
+        lines: tuple[Evidence, Evidence],
+        contrast: Contrast,
+        relief: Relief,
+    ) -> list[Cell]:
+        made.append(whole_frames(odds, cells, cell_m, lines, contrast, relief)[::-1])
         return made[-1]
 
     monkeypatch.setattr("r2c2r_core.segment.runs.run.whole_frames", noted)
@@ -80,3 +142,18 @@ def test_the_panels_of_a_run_are_whole_frames(tmp_path: Path, monkeypatch: pytes
     run = session.run_of(session.planes[0])
     assert run is not None
     assert list(run.cells) in made
+
+
+def test_the_panels_of_a_run_are_inset_before_they_are_made_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Cell] = []
+
+    def halved(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Sequence[Cell], cell_m: float) -> list[Cell]:
+        made.extend(part for cell in cells for part in (replace(cell, bottom=cell.top + 1), replace(cell, top=cell.top + 1)))
+        return list(made)
+
+    monkeypatch.setattr("r2c2r_core.segment.runs.run.inset_fronts", halved)
+    capture, _ = kitchen()
+    session = open_session(capture, tmp_path)
+    run = session.run_of(session.planes[0])
+    assert run is not None
+    assert set(run.cells) & set(made)

@@ -8,12 +8,13 @@ import pytest
 
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.fronts.units import unit_cell
-from r2c2r_core.segment.runs.orthomosaic import Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.runs.panels import cut_panels
 from r2c2r_core.segment.runs.xy_cut import LineField
 
 CELL_M = 0.0025
+SEEN = (400, 400)  # rows and columns of a grid that all of these fit in
 Line = tuple[int, int, int]  # position, and from where to where it runs, in cells
 
 
@@ -57,6 +58,13 @@ def test_handles_that_are_level_do_not_cut_two_units_at_once() -> None:
 def test_a_drawer_stack_is_cut_beside_a_door_that_goes_past_it() -> None:
     cells = cut(480, 288, [(240, 0, 288)], [(96, 0, 240), (192, 0, 240)])
     assert sorted((round(cell.left), round(cell.top)) for cell in cells) == [(0, 0), (0, 97), (0, 193), (241, 0)]
+
+
+def test_a_door_between_two_stacks_is_parted_from_them_before_their_seams_in_line_cut_it() -> None:
+    stacks = [(row, *span) for row in (96, 192) for span in ((0, 600), (760, 1400))]
+    cells = cut(1400, 288, [(600, 0, 288), (760, 0, 288)], stacks)
+    assert [(round(cell.left), round(cell.right)) for cell in cells if cell.height > 280] == [(601, 761)]
+    assert len(cells) == 7
 
 
 def test_a_seam_that_poses_bend_is_one_cut_at_its_mean() -> None:
@@ -111,7 +119,7 @@ def test_a_click_on_an_ovens_window_means_the_oven() -> None:
         [(0, 0, 288), (36, 96, 240), (204, 96, 240), (240, 0, 288)],
         [(0, 0, 240), (96, 36, 204), (240, 36, 204), (288, 0, 240)],
     )
-    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines)
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines, seen=np.ones(SEEN, bool))
     assert unit_cell(run, 120.0, 150.0, category_of("oven")) == frame
 
 
@@ -119,15 +127,25 @@ def test_a_range_reaches_up_to_its_own_edge_beside_a_door_that_ends_lower() -> N
     """Three clear edges, a usual size and a row do not make up for a fourth that nothing shows."""
     cells = (whole := Cell(0, 0, 240, 372), Cell(240, 0, 372, 108), Cell(240, 108, 372, 372))
     lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (108, 240, 372), (372, 0, 372)])
-    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines)
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines, seen=np.ones(SEEN, bool))
     assert unit_cell(run, 120.0, 300.0, category_of("range")) == whole
 
 
 def test_a_machine_is_parted_from_the_drawers_beside_it() -> None:
     cells = (oven := Cell(0, 0, 160, 288), *(Cell(160, top, 320, top + 96) for top in (0, 96, 192)))
     lines = odds(332, 300, [(0, 0, 288), (160, 0, 288), (320, 0, 288)], [(0, 0, 320), (288, 0, 320)])
-    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=0.0028), odds=lines)
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=0.0028), odds=lines, seen=np.ones(SEEN, bool))
     assert unit_cell(run, 80.0, 150.0, category_of("oven")) == oven
+
+
+def test_an_oven_of_black_glass_is_parted_from_the_drawer_below_it() -> None:
+    """All edges are clear, and a rectangle of both is as near an oven's usual size: but the drawer's front returns light."""
+    cells = (oven := Cell(0, 0, 240, 200), Cell(0, 200, 240, 372), Cell(240, 0, 372, 372))
+    lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (200, 0, 240), (372, 0, 372)])
+    seen = np.ones(SEEN, bool)
+    seen[5:200, 5:235] = False
+    run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines, seen=seen)
+    assert unit_cell(run, 120.0, 100.0, category_of("oven")) == oven
 
 
 def door_under_a_rail(uprights_from: int) -> PanelOdds:
@@ -163,3 +181,11 @@ def test_a_strip_with_a_handle_is_no_filler() -> None:
     door, line = Cell(0, 0, 176, 300), [(152, 0, 300)]
     assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[(164, 30)]), door, CELL_M)) == 1
     assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[]), door, CELL_M)) == 2
+
+
+@pytest.mark.parametrize("apart", [24, 36])
+def test_seams_of_stacks_at_other_heights_are_no_line_through_the_door_between_them(apart: int) -> None:
+    """A path along both bends by 60 to 90 mm over the door, and shows over three quarters of its span."""
+    run = odds(1000, 300, [(260, 0, 300), (480, 0, 300)], [(150 + apart, 0, 260), (150, 480, 1000)], sure=4.0)
+    found = {(round(cell.left), round(cell.top)) for cell in cut_panels(run, Cell(0, 0, 1000, 300), CELL_M)}
+    assert found == {(0, 0), (0, 151 + apart), (261, 0), (481, 0), (481, 151)}

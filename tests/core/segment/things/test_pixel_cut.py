@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.masks import mask_iou
-from r2c2r_core.segment.things.pixel_cut import cut_pixels, learn_colours
+from r2c2r_core.segment.things.pixel_cut import cut_pixels, learn_colours, unmixed
 
 
 def disk(size: int, centre: tuple[float, float], radius: float) -> np.ndarray:
@@ -32,3 +32,19 @@ def test_a_learned_model_tells_the_things_colours_from_those_around_it() -> None
     assert (odds[:, 20:] < -1).all()
     unseen = model.odds(np.full((1, 1, 3), 20, np.uint8))
     assert abs(float(unseen[0, 0])) < 0.1  # a colour that neither showed says nothing
+
+
+def test_colours_that_mix_at_a_border_decide_nothing_there_and_all_within() -> None:
+    odds = np.full((9, 12), -2.0, np.float32)
+    odds[:, 6:] = 2.5
+    odds[:, 6] = 1.0  # a mixture that looks more like the thing
+    said = unmixed(odds)
+    assert (said[:, 5:7] == 0).all()
+    assert (said[:, :5] == -2.0).all()
+    assert (said[:, 8:] == 2.5).all()
+
+
+def test_one_pixel_of_another_colour_decides_nothing() -> None:
+    odds = np.full((9, 9), -2.0, np.float32)
+    odds[4, 4] = 2.5
+    assert unmixed(odds).max() == 0

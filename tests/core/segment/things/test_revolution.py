@@ -13,9 +13,10 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Depth
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.stage import open_session
-from r2c2r_core.segment.things.profile import best_profile
+from r2c2r_core.segment.things.pixel_cut import ColourModel
+from r2c2r_core.segment.things.profile import Colours, best_profile, profile_evidence
 from r2c2r_core.segment.things.revolution import Sight, find_round
-from r2c2r_core.segment.things.strips import Grid
+from r2c2r_core.segment.things.strips import Grid, Strips
 from r2c2r_core.segment.things.thing import sized_as
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import BOTTLE, BOTTLE_PROFILE, CAP_M, WORKTOP_M, bottle, click_on, prompt
@@ -91,6 +92,22 @@ def test_a_body_that_a_click_says_no_on_is_not_taken(
     config, walls = sized_as(category_of("bottle")), tuple(plane for plane in opened.planes if plane.area_m2 > 0.4)
     found = find_round(opened.scene, [sight(*ON_BODY)], [sight(x + beside_m, y, z - 0.05)], np.array(ON_BODY), config, walls)
     assert (found is not None) == taken
+
+
+def test_a_neck_of_a_colour_that_nothing_else_has_is_told_by_its_likeness_from_all_sides() -> None:
+    """Neither depth nor colours learned elsewhere say anything of it."""
+    views, levels, cells, radius = 12, 20, 24, 8
+    rng = np.random.default_rng(0)
+    lab = rng.integers(40, 220, (views, levels, 2 * cells, 3), dtype=np.uint8)  # a pattern that every view shows elsewhere
+    neck = (slice(None), slice(0, 15), slice(cells - radius, cells + radius))
+    lab[neck] = 90 + rng.integers(0, 6, lab[neck].shape)
+    nothing = np.zeros(lab.shape[:3])
+    unknown = ColourModel(np.zeros((16, 32, 32), np.float32))
+    strips = Strips(lab, nothing, nothing > 0, nothing > 0, nothing > 0)
+    odds, _, _ = profile_evidence(strips, Colours(unknown, unknown, unknown))
+    assert (odds[:15, :radius] > 0.5).all()
+    assert (odds[:, radius:] < 0).all()
+    assert (odds[15:] < 0).all()
 
 
 def test_the_profile_keeps_to_edges_where_odds_go_on_beyond_and_ends_where_nothing_is() -> None:

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
-from r2c2r_core.segment.runs.relief import Relief
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.tuning import param, tuned
 
 
@@ -17,7 +18,6 @@ class Params:
 
     inside_m: float = param(0.0125, "m", "inside the cut, where an edge is looked for")
     outside_m: float = param(0.010, "m", "outside the cut, where an edge is looked for")
-    depth_ends_m: float = param(0.008, "m", "depth that stops this far short of the cut moves the search there")
     depth_short_m: float = param(
         0.04,
         "m",
@@ -35,6 +35,18 @@ class Params:
     widest_gap_m: float = param(0.012, "m", "of a gap, as blurred as it looks")
     clear: float = param(3.5, "ratio", "to the panel's own median gradient, of an edge")
     strong_share: float = param(0.45, "share", "of the strongest gradient nearby, of an edge")
+    one_colour: float = param(
+        0.35, "ratio", "to the depth of a gap, by which colours may differ from one side of it to the other", gt=0
+    )
+    gap_noise: float = param(6.0, "σ", "of dips within a panel, of a gap between surfaces of one colour")
+    rail_m: float = param(
+        0.05,
+        "m",
+        "of a front inside its edge, whose dips count alone too: the grain of a frame's rail runs across that of its panel",
+        gt=0,
+        source="frames of doors sold are 50-90 mm wide",
+    )
+    gap_contrast: float = param(1.5, "grey", "CIELAB units by which such a gap is darker, at least")
     upper_face_m: float = param(
         0.02,
         "m",
@@ -45,10 +57,18 @@ class Params:
         0.02, "m", "of what is dark of a channel over a front, at most", source="worktops are 20-40 mm thick"
     )
     open_gap_m: float = param(0.004, "m", "of a gap wide enough to see into", source="gaps between fronts are 2-4 mm")
-    known: float = param(0.15, "share", "of the panel's depth points, of what depth sees")
+    open_dark: float = param(
+        0.5,
+        "share",
+        "of the light that is missing in such a gap, at least",
+        gt=0,
+        source="development kitchens: 0.2 to 0.4 in shadows of worktops on fronts as white as they",
+    )
+    known: float = param(0.3, "share", "of the panel's depth points, of what depth sees")
     recess_m: float = param(0.0125, "m", "of a recessed channel as depth shows it", source="the least that hands reach into")
     thick_m: float = param(0.014, "m", "of fronts at least, and so the depth of a channel", source="boards of 16-22 mm")
     behind_m: float = param(0.006, "m", "behind the plane, on average, of what is not the panel", source="depth of many frames")
+    lip_m: float = param(0.06, "m", "of a lip's height, at most", gt=0, source="worktops are 20-40 mm thick, some 60")
     before_m: float = param(0.004, "m", "before the plane, on average, of a lip", source="worktops stand 1-3 cm over fronts")
     depth_off_m: float = param(
         0.005, "m", "by which depth of many frames is off along the plane", source="a cell of the relief"
@@ -60,9 +80,16 @@ class Surface(NamedTuple):
 
     lab: np.ndarray  # (rows, columns, 3), the mosaic's CIELAB colours
     seen: np.ndarray  # where it has colour
-    on_plane: np.ndarray  # where depth saw the plane
     height_m: np.ndarray  # mean height of depth over the plane; 0 where there is none
     points: np.ndarray  # of depth that the mean is of
+    seams: PanelOdds | None = None  # what the network sees in it
+
+    def shows(self, cell: Cell) -> tuple[bool, bool, bool, bool]:
+        """Which edges of a panel the network sees where it was cut, more likely than not: left, right, top, bottom."""
+        if self.seams is None:
+            return False, False, False, False
+        left, right, top, bottom = self.seams.of_edges(cell)
+        return left > 0, right > 0, top > 0, bottom > 0
 
 
 class Profile(NamedTuple):
@@ -71,29 +98,45 @@ class Profile(NamedTuple):
     gradient: np.ndarray  # CIELAB units a cell
     slope: np.ndarray  # of lightness, signed
     light: np.ndarray  # relative luminance, 0..1; nan where nothing is known
-    support: np.ndarray  # share of cells for which depth saw the plane
     height: np.ndarray  # metres over the plane; nan where nothing is known
     points: np.ndarray  # of depth, in a cell
+    lab: np.ndarray  # mean CIELAB colours, (positions, 3)
 
     def mirrored(self) -> "Profile":
         """As met from the other end."""
         return Profile(
-            self.gradient[::-1], -self.slope[::-1], self.light[::-1], self.support[::-1], self.height[::-1], self.points[::-1]
+            self.gradient[::-1],
+            -self.slope[::-1],
+            self.light[::-1],
+            self.height[::-1],
+            self.points[::-1],
+            self.lab[::-1],
         )
 
 
-def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Cell:
+class Refined(NamedTuple):
+    """A panel as refined from where it was cut."""
+
+    panel: Cell
+    lit_top: float  # its upper edge, or, where that lies in a shadow of a lip, where the shadow ends on it
+    shown: tuple[bool, bool, bool, bool] = (True, True, True, True)  # left, right, top, bottom: or where it was cut
+
+
+def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Refined:
     """The panel's rectangle, refined from where it was cut."""
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     if rows.stop - rows.start < 12 or columns.stop - columns.start < 12:
-        return cell
-    left, right = _ends(cell.left, cell.right, _profiles(surface, rows, axis=0), cell_m)
+        return Refined(cell, cell.top, shown=(False, False, False, False))
+    seen = surface.shows(cell)
+    (left, right), beside = _ends(cell.left, cell.right, seen[:2], _profiles(surface, rows, axis=0), cell_m)
     across, lab = _profiles(surface, columns, axis=1), surface.lab[:, columns]
-    top, bottom = _ends(cell.top, cell.bottom, across, cell_m)
-    below = _below_upper_face(top, bottom, across, lab, cell_m)
-    if below is None:
-        below = _above_shadow(top, bottom, lab, cell_m) if _lip_over(top, across, cell_m) else top
-    return Cell(left, below, right, bottom)
+    (lit, bottom), upright = _ends(cell.top, cell.bottom, seen[2:], across, cell_m)
+    shown, lit = (*beside, *upright), _under_lip(lit, bottom, across, cell_m)
+    below = _below_upper_face(lit, bottom, across, lab, cell_m)
+    if below is not None:
+        return Refined(Cell(left, below, right, bottom), below, shown)
+    top = _above_shadow(lit, bottom, lab, cell_m) if _lip_over(lit, across, cell_m) else lit
+    return Refined(Cell(left, top, right, bottom), lit, shown)
 
 
 def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
@@ -101,9 +144,9 @@ def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
     inset = (across.stop - across.start) // 8
     middle = slice(across.start + inset, across.stop - inset)
     if axis == 0:
-        colours, known, support, height, points = (values[middle] for values in surface)
+        colours, known, height, points = (values[middle] for values in surface[:4])
     else:
-        colours, known, support, height, points = (np.swapaxes(values[:, middle], 0, 1) for values in surface)
+        colours, known, height, points = (np.swapaxes(values[:, middle], 0, 1) for values in surface[:4])
     change = np.linalg.norm(np.roll(colours, -1, axis=1) - np.roll(colours, 1, axis=1), axis=2) / 2
     slopes = (np.roll(colours[..., 0], -1, axis=1) - np.roll(colours[..., 0], 1, axis=1)) / 2
     valid = known & np.roll(known, 1, axis=1) & np.roll(known, -1, axis=1)
@@ -115,9 +158,8 @@ def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
     slope[[0, -1]] = 0
     light = np.where(count > 0, _luminance(np.mean(_middles(colours[..., 0], valid), axis=0)), np.nan)
     high = np.where(points.any(axis=0), (height * points).sum(axis=0) / np.maximum(points.sum(axis=0), 1e-6), np.nan)
-    return Profile(
-        np.where(np.isfinite(gradient), gradient, 0.0), slope, light, support.mean(axis=0), high, points.mean(axis=0)
-    )
+    lab = np.where(known[..., None], colours, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)[:, None]
+    return Profile(np.where(np.isfinite(gradient), gradient, 0.0), slope, light, high, points.mean(axis=0), lab)
 
 
 def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
@@ -128,11 +170,15 @@ def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     )
 
 
-def _ends(low: float, high: float, profile: Profile, cell_m: float) -> tuple[float, float]:
+def _ends(
+    low: float, high: float, seen: tuple[bool, bool], profile: Profile, cell_m: float
+) -> tuple[tuple[float, float], tuple[bool, bool]]:
+    """Both edges along an axis, and whether each shows; `seen`: by the network, where it was cut."""
     count = len(profile.gradient)
     own = _own(low, high, profile)
-    first = _end(low, high, profile, own, cell_m)
-    return first, count - _end(count - high, count - low, profile.mirrored(), own, cell_m)
+    first, begins = _end(low, high, seen[0], profile, own, cell_m)
+    last, ends = _end(count - high, count - low, seen[1], profile.mirrored(), own, cell_m)
+    return (first, count - last), (begins, ends)
 
 
 def _own(low: float, high: float, profile: Profile) -> float:
@@ -140,46 +186,88 @@ def _own(low: float, high: float, profile: Profile) -> float:
     return float(np.median(profile.gradient[round(low) + 4 : round(high) - 4]))
 
 
-def _end(low: float, high: float, profile: Profile, own: float, cell_m: float) -> float:
-    """The lower edge, in positions where i + 0.5 is the middle of cell i."""
-    params, (gradient, slope, light, support, *_) = tuned(Params), profile
-    usual = float(np.median(support[round(low) : round(high)]))
-    covered = np.flatnonzero(support[round(low) : round((low + high) / 2)] > 0.4 * usual)
-    start = low
-    if usual > 0.2 and len(covered) and covered[0] * cell_m > params.depth_ends_m:
-        start = low + float(covered[0])  # the cut followed a shadow or an edge of something beside the panel
-    start = max(start, low + _dark_from(round(low), round((low + high) / 2), light, cell_m))
+def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell_m: float) -> tuple[float, bool]:
+    """The lower edge, in positions where i + 0.5 is the middle of cell i, and whether it shows or is where it was cut."""
+    params, (gradient, slope, light, *_) = tuned(Params), profile
+    start = low + _dark_from(round(low), round((low + high) / 2), light, cell_m)
     least = max(params.clear * own, params.least_gradient)
     begins = _plane_from(low, high, profile, cell_m)
     if begins is not None:
-        return _step_near(begins, gradient, least, cell_m)
+        return _step_near(begins, gradient, least, cell_m), True
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
         last -= 1  # the flank of what lies farther in
     peaks = _peaks(gradient[first:last], least)
+    own_gap = _gap_in_one_colour(profile, start, high, last, cell_m)
+    if own_gap is not None:
+        peaks = [*peaks, own_gap - first]
+    if not peaks and seen:
+        return low, True
     if not peaks:  # the cut followed depth, which ends before the panel does
         first, last = max(round(low - params.depth_short_m / cell_m), 1), first + 2
-        peaks = _peaks(gradient[first:last], least)
+        peaks = [i for i in _peaks(gradient[first:last], least) if not _is_behind(first + i, round(low), round(high), profile)]
     if not peaks:
-        return start + (params.half_gap_m / cell_m if start == low else 0.0)
+        return start + (params.half_gap_m / cell_m if start == low else 0.0), False
     window = gradient[first:last]
     i = peaks[-1]  # the innermost
     gap = _gap(slope, first + i, max(first, first + i - round(params.widest_gap_m / cell_m)))
     if gap is not None:
-        return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2)
+        return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2), True
     a, b, c = (float(value) for value in window[i - 1 : i + 2])
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0
-    return first + i + 0.5 + offset
+    return first + i + 0.5 + offset, True
+
+
+def _is_behind(start: int, low: int, high: int, profile: Profile) -> bool:
+    """Whether depth shows what lies before a panel, from `start` to its cut at `low`, to be behind its plane."""
+    params, strip = tuned(Params), slice(start, low)
+    points = profile.points[strip]
+    if points.sum() <= params.known * float(np.median(profile.points[low:high])):
+        return False
+    height = np.nansum(profile.height[strip] * points) / points.sum() - _median_seen(profile.height[low:high])
+    return bool(height < -params.behind_m)
+
+
+def _gap_in_one_colour(profile: Profile, low: float, high: float, last: int, cell_m: float) -> int | None:
+    """The inner flank of the innermost gap with the same colour on both sides, from a cut at `low` on; None where none is.
+
+    A front is one board: beyond such a gap its face frame, or another front, begins, however much clearer that one's end is.
+    """
+    params, half = tuned(Params), round(tuned(Params).widest_gap_m / 2 / cell_m)
+    lab, (before, after) = profile.lab, _beside(profile.lab, half + 1)
+    middle = (lab[:-2, 0] + lab[1:-1, 0] + lab[2:, 0]) / 3
+    dip = np.pad(np.minimum(before[1:-1, 0], after[1:-1, 0]) - middle, 1)
+    differ = np.linalg.norm(before - after, axis=1)
+    first, beyond = round(low) + 4, round(high) - 4
+    inside = (dip[first:beyond], dip[first : min(first + round(params.rail_m / cell_m), beyond)])
+    noise = 1.4826 * max(float(np.median(np.abs(part))) for part in inside)
+    least = max(params.gap_noise * noise, params.gap_contrast)
+    for at in range(last, round(low) - 1, -1):
+        if dip[at] > least and differ[at] < params.one_colour * dip[at] and dip[at] == dip[at - half : at + half + 1].max():
+            return at + int(np.argmax(profile.slope[at : at + half]))
+    return None
+
+
+def _beside(values: np.ndarray, off: int) -> np.ndarray:
+    """Means of two positions (2, n, channels) that far before and after each; the border's beyond the ends."""
+    padded = np.pad(values, ((off, off), (0, 0)), mode="edge")
+    pairs = (padded[:-1] + padded[1:]) / 2
+    count = len(values)
+    return np.stack([pairs[:count], pairs[-count:]])
+
+
+def _median_seen(values: np.ndarray) -> float:
+    """The median of what some frame shows; not a number where nothing is."""
+    seen = values[~np.isnan(values)]
+    return float(np.median(seen)) if len(seen) else float("nan")
 
 
 def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float:
     """How far a gap reaches into a panel whose cut lies on the gap's other side."""
     params = tuned(Params)
-    near = light[first : first + round(params.upper_face_m / cell_m)] < params.darkest_shade * float(
-        np.nanmedian(light[first:last])
-    )
+    near = light[first : first + round(params.upper_face_m / cell_m)] < params.darkest_shade * _median_seen(light[first:last])
     begins = int(np.argmax(near))
     inside = np.flatnonzero(~near[begins:])
     return float(begins + inside[0]) if near[:3].any() and len(inside) else 0.0
@@ -189,7 +277,7 @@ def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> int
     """Where depth shows a panel to begin beside a recessed channel: a strip behind its plane, between two on it; else None."""
     params, first = tuned(Params), round(low)
     inside = slice(first, round(high))
-    height = profile.height - float(np.nanmedian(profile.height[inside]))
+    height = profile.height - _median_seen(profile.height[inside])
     known = profile.points > params.known * float(np.median(profile.points[inside]))
     reach = round(params.channel_m / cell_m)
     start, stop = max(first - 2 * reach, 0), min(first + reach, round((low + high) / 2))
@@ -207,6 +295,29 @@ def _step_near(begins: int, gradient: np.ndarray, least: float, cell_m: float) -
     first, last = begins - off, begins + off + 1
     peaks = _peaks(gradient[first - 1 : last + 1], least)
     return (first - 1 + peaks[-1] if peaks else first + int(np.argmax(gradient[first:last]))) + 0.5
+
+
+def _under_lip(top: float, bottom: float, profile: Profile, cell_m: float) -> float:
+    """The upper edge, moved down where a lip of the panel's colour, as a worktop's, was taken for its upper part.
+
+    Depth shows a lip before the panel's plane; what stands out of a front, as a grip along its edge, has another front or a
+    lip over it.
+    """
+    params, start, middle = tuned(Params), round(top), round((top + bottom) / 2)
+    reach, off = round(params.lip_m / cell_m), round(params.depth_off_m / cell_m)
+    height = profile.height - _median_seen(profile.height[start + reach : middle])
+    usual = float(np.median(profile.points[start + reach : middle])) if start + reach < middle else 0.0
+    over = slice(max(start - reach // 2, 0), max(start - off, 0))
+    points = profile.points[over]
+    if points.sum() > params.known * usual * len(points) and np.nansum(height[over] * points) > -params.before_m * points.sum():
+        return top
+    strip = np.nan_to_num(height[start : start + reach])
+    peak = int(np.argmax(strip[: reach // 2])) if len(strip) else 0
+    below = np.flatnonzero(strip[peak:] < strip[peak : peak + 1] / 2)
+    if not len(below) or strip[peak] < params.behind_m:
+        return top
+    least = max(params.clear * _own(top, bottom, profile), params.least_gradient)
+    return _step_near(start + peak + int(below[0]), profile.gradient, least, cell_m)
 
 
 def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
@@ -297,9 +408,13 @@ def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarr
     params, light, gradient = tuned(Params), profile.light, profile.gradient
     start, reach = round(top), round(params.upper_face_m / cell_m)
     low, panel = max(start - 2 * reach, 0), slice(start + reach, max(round((top + bottom) / 2), start + reach + 1))
-    darkness = np.nan_to_num(1 - light[low : start + reach] / float(np.nanmedian(light[panel]))).clip(0)
+    darkness = np.nan_to_num(1 - light[low : start + reach] / _median_seen(light[panel])).clip(0)
     half_dark = np.flatnonzero(darkness > darkness.max() / 2)
-    if not params.open_gap_m < darkness[half_dark].sum() * cell_m or len(half_dark) * cell_m > params.channel_m:
+    if (
+        darkness.max() < params.open_dark
+        or not params.open_gap_m < darkness[half_dark].sum() * cell_m
+        or len(half_dark) * cell_m > params.channel_m
+    ):
         return None
     middle = low + int(np.argmax(darkness))
     over = max(middle - reach, 0) + int(np.argmax(gradient[max(middle - reach, 0) : middle + 1]))
@@ -329,15 +444,15 @@ def _luminance(lightness: np.ndarray) -> np.ndarray:
     return np.asarray(((np.asarray(lightness) * (100 / 255) + 16) / 116) ** 3)
 
 
-def surface_of(mosaic: np.ndarray, relief: Relief, on_plane: np.ndarray) -> Surface:
-    """Of a mosaic (rows, columns, 3), the relief of the same plane and where depth saw the plane."""
+def surface_of(mosaic: np.ndarray, relief: Relief, seams: PanelOdds) -> Surface:
+    """Of a mosaic (rows, columns, 3), the relief of the same plane and what the network sees in both."""
     lab, seen = as_lab(mosaic)
     height = relief.raised * relief.lift_m + (1 - relief.raised) * relief.level_m
     height, points = (
         np.repeat(np.repeat(values, STEP, axis=0), STEP, axis=1)[: lab.shape[0], : lab.shape[1]]
         for values in (height, relief.count)
     )
-    return Surface(lab, seen, on_plane, height, points)
+    return Surface(lab, seen, height, points, seams)
 
 
 def as_lab(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

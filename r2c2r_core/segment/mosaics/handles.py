@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 
 from r2c2r_core.calibration import probability
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
-from r2c2r_core.segment.runs.relief import Relief
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.tuning import param, tuned
 
 

@@ -1,8 +1,7 @@
 """Log-odds of fronts' edges and handles on an orthomosaic, by small networks trained on elevations drawn at random.
 
-An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py` for unlike times on other
-drawings): where only one of them is sure, nothing is. No kitchen generator that the benchmarks use has a part in what they are
-trained on.
+An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py`): where only one of
+them is sure, nothing is. No kitchen generator that the benchmarks use has a part in what they are trained on.
 """
 
 import threading
@@ -14,7 +13,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image
-from r2c2r_core.segment.runs.orthomosaic import STEP
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 
 NETWORKS = tuple(sorted(Path(__file__).parent.glob("panel_net_*.onnx")))
 _LOCAL = threading.local()
@@ -38,12 +37,21 @@ class PanelOdds:
         odds, size = (self.upright, (1, 3)) if axis == 0 else (self.level, (3, 1))
         return np.asarray(cv2.dilate(odds, np.ones(size, np.uint8)))
 
-    def along(self, axis: int, position: float, low: float, high: float) -> float:
-        """Mean log-odds of an edge along a line at `position`, from `low` to `high`, in grid cells."""
+    def along(self, axis: int, position: float, low: float, high: float) -> np.ndarray:
+        """Log-odds of an edge along a line at `position`, from `low` to `high`, in grid cells: one a cell of the odds."""
         odds = self.near(axis) if axis == 0 else self.near(axis).T
         at = min(max(round(position / STEP - 0.5), 0), odds.shape[1] - 1)
         first = min(max(round(low / STEP), 0), len(odds) - 1)
-        return float(odds[first : max(round(high / STEP), first + 1), at].mean())
+        return odds[first : max(round(high / STEP), first + 1), at]
+
+    def of_edges(self, cell: Cell) -> tuple[float, float, float, float]:
+        """Mean log-odds of each edge of a rectangle: left, right, top, bottom."""
+        return (
+            float(self.along(0, cell.left, cell.top, cell.bottom).mean()),
+            float(self.along(0, cell.right, cell.top, cell.bottom).mean()),
+            float(self.along(1, cell.top, cell.left, cell.right).mean()),
+            float(self.along(1, cell.bottom, cell.left, cell.right).mean()),
+        )
 
 
 def panel_odds(mosaic: Image, count: np.ndarray, raised: np.ndarray, level_m: np.ndarray) -> PanelOdds:

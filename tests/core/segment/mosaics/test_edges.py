@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.runs.edges import Surface, as_lab, panel_edges
-from r2c2r_core.segment.runs.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.edges import Surface, as_lab, panel_edges
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 
 CELL_M = 0.0025
 WALL, BLUE, STONE = (225, 225, 215), (70, 100, 130), (120, 120, 125)
@@ -26,11 +27,11 @@ def area(cell: Cell) -> tuple[slice, slice]:
 
 def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, float]) -> tuple[float, ...]:
     """Where depth sees nothing but what has a height (m over the plane) and the plane."""
-    plane, height, points = (np.zeros(image.shape[:2]) for _ in range(3))
-    plane[area(on_plane)] = points[area(on_plane)] = 1
+    height, points = np.zeros(image.shape[:2]), np.zeros(image.shape[:2])
+    points[area(on_plane)] = 1
     for cell, height_m in heights:
         height[area(cell)], points[area(cell)] = height_m, 1
-    found = panel_edges(cut, Surface(*as_lab(image), plane > 0, height, points), CELL_M)
+    found = panel_edges(cut, Surface(*as_lab(image), height, points), CELL_M).panel
     return found.left, found.top, found.right, found.bottom
 
 
@@ -41,9 +42,52 @@ def test_an_edge_is_where_colour_changes_though_depth_ends_3_cm_short_of_it() ->
     assert edges(mosaic((PANEL, BLUE)), PANEL, short) == true  # the cut followed colour
 
 
+def test_a_black_door_ends_where_it_was_cut_over_a_plinth_as_black_that_depth_sees_behind_it() -> None:
+    """The plinth's own light begins 25 mm lower: where depth sees nothing, that would be the door's edge."""
+    black, lit = (12, 12, 14), (60, 60, 64)
+    image, cut = mosaic((PANEL, black), (Cell(60, 300, 260, 340), black), (Cell(60, 310, 260, 340), lit)), PANEL
+    assert edges(image, cut, cut)[3] == pytest.approx(310, abs=EDGE_CELLS)
+    assert edges(image, cut, cut, (Cell(60, 300, 260, 340), -0.03))[3] == pytest.approx(300, abs=EDGE_CELLS)
+
+
+def test_a_lip_of_the_panels_colour_is_none_of_it_and_a_grip_along_its_edge_is() -> None:
+    lip = Cell(40, 52, 280, 60)
+    whole = Cell(PANEL.left, lip.top, PANEL.right, PANEL.bottom)
+    image = mosaic((whole, BLUE), (Cell(60, 59, 260, 60), (62, 92, 121)))
+    assert edges(image, whole, PANEL)[1] == pytest.approx(52, abs=EDGE_CELLS)
+    assert edges(image, whole, PANEL, (lip, 0.014))[1] == pytest.approx(60, abs=EDGE_CELLS)
+    assert edges(image, whole, PANEL, (lip, 0.014), (Cell(40, 0, 280, 52), 0.0))[1] == pytest.approx(52, abs=EDGE_CELLS)
+
+
+def test_an_edge_that_only_the_network_sees_is_where_it_was_cut_though_a_tile_ends_3_cm_beyond() -> None:
+    ivory, tile = (235, 234, 230), (Cell(60, 40, 260, 47), (205, 205, 200))
+    image = mosaic(tile, background=ivory)
+    thought = [np.full((image.shape[0] // STEP, image.shape[1] // STEP), -4.0, np.float32) for _ in range(4)]
+    nothing = np.zeros(image.shape[:2])
+
+    def top() -> float:
+        return panel_edges(PANEL, Surface(*as_lab(image), nothing, nothing, PanelOdds(*thought)), CELL_M).panel.top
+
+    assert top() == pytest.approx(47, abs=EDGE_CELLS)
+    thought[1][round(PANEL.top) // STEP] = 2
+    assert top() == pytest.approx(PANEL.top, abs=EDGE_CELLS)
+
+
 def test_a_cut_10_mm_outside_the_panel_finds_its_edge() -> None:
     outside = Cell(56, 56, 264, 304)
     assert edges(mosaic((PANEL, BLUE)), outside, outside) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
+
+
+def test_a_faint_gap_in_one_colour_is_the_edge_though_the_frame_beyond_it_ends_more_clearly() -> None:
+    """The gap round an inset front shows less than the end of the face frame, 20 mm on, against a wall."""
+    framed = mosaic((Cell(52, 60, 260, 300), BLUE), (Cell(59, 60, 60, 300), (55, 80, 105)), background=WALL)
+    assert edges(framed, Cell(57, 60, 260, 300), Cell(52, 60, 260, 300))[0] == pytest.approx(60, abs=EDGE_CELLS)
+
+
+def test_the_grain_of_a_rail_is_no_gap_though_the_panel_below_it_has_none_along_it() -> None:
+    oak, dark = (205, 170, 120), (197, 162, 112)
+    grain = [(Cell(60, row, 260, row + 2), dark) for row in range(64, 84, 5)]
+    assert edges(mosaic((PANEL, oak), *grain), PANEL, PANEL) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
 
 
 def in_shade(colour: tuple[int, int, int], share: float) -> tuple[int, int, int]:
@@ -76,6 +120,15 @@ def test_the_upper_face_of_a_front_below_a_wide_gap_is_not_its_front() -> None:
     image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.02)), (face, in_shade(BLUE, 0.75)))
     for cut in (52, 54, 60):
         assert edges(image, Cell(60, cut, 260, 300), PANEL)[1] == pytest.approx(60, abs=1.0)
+
+
+def test_the_shadow_of_a_worktop_as_white_as_its_front_is_no_gap_to_see_into() -> None:
+    """It fades from 5 to 30 mm below, as light from a room does."""
+    white, shade = (178, 178, 172), np.interp(np.arange(20), [2, 12], [0.66, 1.0])
+    image = np.full((360, 320, 3), white, np.float64)
+    image[60:80, 60:260] *= shade[:, None, None] ** (1 / 2.2)
+    found = edges(cv2.GaussianBlur(image, (0, 0), 0.7).astype(np.uint8), PANEL, PANEL, (Cell(40, 46, 280, 60), 0.02))
+    assert found[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
 def test_a_panel_cut_at_the_far_side_of_a_dark_gap_ends_before_it() -> None:

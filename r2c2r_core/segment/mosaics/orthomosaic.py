@@ -32,6 +32,13 @@ class Params:
     odd_lab: float = param(25.0, "grey", "off what most frames show, from where a frame counts little", gt=0)
     odd_weight: float = param(0.02, "share", "of its weight that such a frame keeps", gt=0)
     least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
+    past_m: float = param(
+        0.1, "m", "behind the plane, from where a view looks past it: deeper than a panel is sunk, nearer than a unit's rear"
+    )
+    hole_m: float = param(0.2, "m", "side of the least square that a front leaves empty when it opens", gt=0)
+    across_m: float = param(0.08, "m", "of a shelf's edge, or of what stands at it, that parts such a hole", gt=0)
+    about_m: float = param(0.04, "m", "of a hole's frame: the edges of a unit's boards, and a depth pixel")
+    coarse_m: float = param(0.02, "m", "cells in which holes are looked for: depth is coarser than colour", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,24 +148,32 @@ def frame_quality(grid: PlaneGrid, region: PlaneRegion, scene: Scene) -> np.ndar
     points = points[region.supports(points, 0.03)]
     if len(points) == 0:
         return np.zeros((len(scene.frames), 0))
-    return np.stack([_view_quality(points, grid.outward, frame, scene) for frame in scene.frames])
+    return np.stack([_view_quality(points, grid, frame, scene) for frame in scene.frames])
 
 
 def choose_frames(quality: np.ndarray, scene: Scene, count: int) -> list[int]:
-    """The frames that see a region best by their `frame_quality`: those that see each part of it best, together."""
-    per_point = max(3, count // 4)
-    ranks = np.argsort(-quality, axis=0, kind="stable")[:per_point]
-    score = np.zeros(len(scene.frames))
-    for point in range(quality.shape[1]):
-        score[ranks[:, point]] += quality[ranks[:, point], point]
-    best = np.argsort(-score, kind="stable")[:count]
-    return [scene.frames[i].index for i in best if score[i] > 0]
+    """The frames that show a region best together by their `frame_quality`, most telling first: any first few show all of it.
+
+    Greedy for a submodular sum (Nemhauser 1978): what a frame adds to a part falls with what the frames before it show of it,
+    and counts against the best view of that part, or its worst seen end would have none; squared, as weights of a blend are.
+    """
+    seen = quality[:, quality.max(axis=0, initial=0.0) > 0]
+    share, shown, chosen = (seen / seen.max(axis=0, initial=0.0)) ** 2, np.zeros(seen.shape[1]), list[int]()
+    while len(chosen) < count:
+        gains = np.log1p(share / (1 + shown)).sum(axis=1)
+        gains[chosen] = 0.0
+        best = int(np.argmax(gains))
+        if gains[best] <= 0:
+            break
+        chosen.append(best)
+        shown += share[best]
+    return [scene.frames[i].index for i in chosen]
 
 
-def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) -> np.ndarray:
+def _view_quality(points: Points, grid: PlaneGrid, frame: Frame, scene: Scene) -> np.ndarray:
     params = tuned(Params)
     to_camera = frame.world_from_camera.translation - points
-    cosine = (to_camera @ outward) / np.linalg.norm(to_camera, axis=1)
+    cosine = (to_camera @ grid.outward) / np.linalg.norm(to_camera, axis=1)
     width, height = _stored_size(scene, frame)
     camera = frame.rgb_camera.resized(width, height)
     local = frame.world_from_camera.inverse.apply(points)
@@ -167,6 +182,8 @@ def _view_quality(points: Points, outward: Vector3, frame: Frame, scene: Scene) 
     border = params.border_share * width
     inside = (z > 0.15) & (uv > border).all(axis=1) & (uv < [width - border, height - border]).all(axis=1)
     good = inside & (cosine > params.least_cosine) & ~scene.noise.occluded(seen, z, params.view_in_front_m)
+    column, row = np.floor(grid.cells_of(points)).astype(int).T.clip(0, [[grid.columns - 1], [grid.rows - 1]])
+    good &= ~opened_cells(grid, scene, frame)[row, column]
     return np.where(good, cosine * np.sqrt(max(frame.sharpness, 1e-3)) / np.maximum(z, 0.4), 0)
 
 
@@ -213,7 +230,40 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> tuple[np.ndarr
     seen = cv2.warpPerspective(depth, _for_opencv(to_depth), (grid.columns, grid.rows), flags=flags)
     occluded = scene.noise.occluded(seen, z, tuned(Params).in_front_m)
     grown = cv2.dilate(occluded.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    return inside & ~grown, z
+    return inside & ~grown & ~opened_cells(grid, scene, frame), z
+
+
+def opened_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> np.ndarray:
+    """Cells (rows, columns) at which a frame looks past a plane that the scan has there: a front of it stands open.
+
+    Glass, past which all frames look, is no plane of the scan; nor is a gap, or a reading gone astray, as large as a front.
+    """
+    params = tuned(Params)
+    size = np.ceil(np.array([grid.columns, grid.rows]) * grid.cell_m / params.coarse_m).astype(int)
+    coarse = PlaneGrid(grid.world_from_plane, grid.left_m, grid.top_m, params.coarse_m, *size.tolist())
+    homography = coarse.pixel_from_cell(frame, frame.depth_camera)
+    z = (
+        homography[2, 0] * (np.arange(size[0]) + 0.5)
+        + (homography[2, 1] * (np.arange(size[1]) + 0.5) + homography[2, 2])[:, None]
+    )
+    sensor = scene.depth(frame.index)
+    scan = scene.surface_depth(frame.index, (sensor.shape[1], sensor.shape[0]))
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    measured, known = (
+        cv2.warpPerspective(depth, _for_opencv(homography), size.tolist(), flags=flags) for depth in (sensor, scan)
+    )
+    past = (z > 0.15) & scene.noise.seen_through(measured, z, params.past_m)
+    past &= (known > 0) & ~scene.noise.seen_through(known, z, params.past_m)
+    hole = past.astype(np.uint8)
+    for operation, side_m in (
+        (cv2.MORPH_CLOSE, params.across_m),
+        (cv2.MORPH_OPEN, params.hole_m),
+        (cv2.MORPH_DILATE, 2 * params.about_m),
+    ):
+        side = 2 * round(side_m / params.coarse_m / 2) + 1
+        hole = cv2.morphologyEx(hole, operation, np.ones((side, side), np.uint8))
+    row, column = ((np.arange(count) * grid.cell_m / params.coarse_m).astype(int) for count in (grid.rows, grid.columns))
+    return np.asarray(hole[row[:, None], column] > 0)
 
 
 def blend(tiles: list[Tile], count: int) -> Image:
@@ -222,11 +272,11 @@ def blend(tiles: list[Tile], count: int) -> Image:
     A drawer that is open in some frames, or something that passed by, must not leave a shade on the mosaic.
     """
     params, best = tuned(Params), tiles[:count]
-    moved = [_moved(tile) for tile in best]
-    usual = _usual(moved)
+    usual = _usual(best)
     total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
     weights = np.zeros(tiles[0].weight.shape, np.float32)
-    for colour, weight in moved:
+    for tile in best:
+        colour, weight = _moved(tile)
         lab = colour.astype(np.float32)
         lightness, a, b = cv2.split(cv2.absdiff(lab, usual))
         off = cv2.max(lightness, cv2.max(a, b))
@@ -241,22 +291,25 @@ def blend(tiles: list[Tile], count: int) -> Image:
 
 def _moved(tile: Tile) -> tuple[np.ndarray, np.ndarray]:
     """A tile's colour and its weight in the mosaic, moved by its shift."""
+    if tile.shift == (0.0, 0.0):
+        return tile.lab, tile.weight**2
     move = np.array([[1, 0, tile.shift[0]], [0, 1, tile.shift[1]]], np.float32)
     size = (tile.weight.shape[1], tile.weight.shape[0])
     return cv2.warpAffine(tile.lab, move, size), cv2.warpAffine(tile.weight, move, size) ** 2
 
 
-def _usual(moved: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _usual(tiles: list[Tile]) -> np.ndarray:
     """The median colour (rows, columns, 3) of the tiles that show a cell, on cells of STEP."""
-    coarse = np.stack([colour[::STEP, ::STEP] for colour, _ in moved])
-    shown = np.stack([weight[::STEP, ::STEP] for _, weight in moved]) > 0
+    thinned = [[array[::STEP, ::STEP].copy() for array in _moved(tile)] for tile in tiles]  # copied: a view keeps all of it
+    coarse = np.stack([colour for colour, _ in thinned])
+    shown = np.stack([weight for _, weight in thinned]) > 0
     coarse[~shown] = 255  # sorts behind all that is shown
     coarse.sort(axis=0)
     count = shown.sum(axis=0)
     pair = np.stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(coarse) - 1)])
     middle = np.take_along_axis(coarse, pair[..., None], axis=0).astype(np.float32).mean(axis=0)
     middle[count == 0] = 0
-    rows, columns = moved[0][1].shape
+    rows, columns = tiles[0].weight.shape
     return np.asarray(cv2.resize(middle, (columns, rows), interpolation=cv2.INTER_LINEAR))
 
 

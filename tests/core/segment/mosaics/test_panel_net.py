@@ -1,12 +1,15 @@
 """The network that finds edges of fronts: what it is fed, and what it makes of elevations it was not trained on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.runs.panel_net import NETWORKS, PanelOdds, features, panel_odds
+from r2c2r_core.segment.mosaics.panel_net import NETWORKS, PanelOdds, features, panel_odds
 from training.crops import crops
 from training.elevations import draw
 from training.sight import Sight, seen
+from training.styles import FaceFrame, any_style
 
 UNSEEN = range(10_000_000, 10_000_012)  # far from what any training draws
 
@@ -54,6 +57,28 @@ def test_what_it_is_fed_does_not_depend_on_the_number_of_depth_points() -> None:
     twice = features(sight.mosaic, 2 * sight.count, sight.raised, sight.level_m)
     assert once.shape == (19, sight.mosaic.shape[0] // 2, sight.mosaic.shape[1] // 2)
     np.testing.assert_allclose(once, twice, atol=1e-5)
+
+
+def touching(seed: int) -> float:
+    """Of the upright edges that a drawing tells, the share with a front at both sides."""
+    drawn = draw(seed)
+    rows, columns = np.nonzero(drawn.upright[:, 6:-6])
+    return float((drawn.front[rows, columns] * drawn.front[rows, columns + 12] > 0).mean())  # 15 mm to each side
+
+
+@pytest.mark.parametrize("seed", [10_000_003, 10_000_005])
+def test_fronts_that_are_drawn_in_a_face_frame_stand_apart(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = FaceFrame(
+        top_m=0.04, bottom_m=0.04, between_m=0.03, stile_m=0.04, mullion_m=0.04, light=np.ones(3), behind_m=0, joint_light=1
+    )
+
+    def styled(frame: FaceFrame | None) -> None:
+        monkeypatch.setattr("training.elevations.any_style", lambda rng: replace(any_style(rng), frame=frame))
+
+    styled(None)
+    assert touching(seed) > 0.3
+    styled(frame)
+    assert touching(seed) < 0.1
 
 
 def test_training_draws_crops_of_one_size_with_their_truth() -> None:

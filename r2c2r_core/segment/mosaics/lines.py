@@ -7,7 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from r2c2r_core.segment.runs.orthomosaic import Tile
+from r2c2r_core.segment.mosaics.orthomosaic import Tile
 from r2c2r_core.tuning import param, tuned
 
 """Evidence is pooled over this much of the line's length, so that a line must be seen along most of its span."""
@@ -23,7 +23,7 @@ class Params:
         "of the line's length over which evidence is pooled, so that a line must be seen along most of its span",
         gt=0,
     )
-    scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "widths of the dark ridge and of the colour step")
+    scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "widths of the ridge and of the colour step")
     noise_floor: float = param(0.35, "grey", "below this, differences mean nothing", gt=0)
     max_shift_m: float = param(0.03, "m", "pose error between frames, at most", source="30 mm on a KinectFusion trajectory")
 
@@ -134,7 +134,7 @@ def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """The stronger of a dark ridge and a colour step, in grey levels, over two widths."""
+    """The stronger of a ridge, dark or lit, and a colour step, in grey levels, over two widths."""
     params = tuned(Params)
     best = np.full(means.shape[:2], -9.0, np.float32)
     known = seen.copy()
@@ -144,7 +144,7 @@ def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.nd
         centre = cv2.blur(means, (k | 1, 1))
         ridge = (left[..., 0] + right[..., 0]) / 2 - centre[..., 0]
         step = 0.5 * np.linalg.norm(np.roll(means, k, axis=1) - np.roll(means, -k, axis=1), axis=2)
-        best = np.maximum(best, np.maximum(ridge, 0.9 * step))
+        best = np.maximum(best, np.maximum(np.abs(ridge), 0.9 * step))
         known &= np.roll(seen, 2 * k, axis=1) & np.roll(seen, -2 * k, axis=1)
     margin = min(8, means.shape[1] // 4)
     known[:, :margin] = False

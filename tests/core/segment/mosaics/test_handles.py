@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.runs.handles import find_handle
-from r2c2r_core.segment.runs.orthomosaic import STEP, Cell
-from r2c2r_core.segment.runs.panel_net import PanelOdds
-from r2c2r_core.segment.runs.relief import Relief
+from r2c2r_core.segment.mosaics.handles import find_handle
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
 
 ROWS, COLUMNS, CELL_M = 120, 80, 0.005  # of the network's cells
 PANEL = Cell(10 * STEP, 10 * STEP, 70 * STEP, 110 * STEP)

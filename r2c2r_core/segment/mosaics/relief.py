@@ -1,13 +1,14 @@
 """Height map over a plane: depth points of many frames, binned on its grid."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from r2c2r_core.geometry.camera import depth_points, project
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.runs.orthomosaic import STEP, PlaneGrid
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, PlaneGrid
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -24,7 +25,17 @@ class Params:
     ledge_m: float = param(0.035, "m", "width of what is long and raised and no handle")
     sunk_m: float = param(0.013, "m", "of the panel in a frame, at most", source="shaker doors 6-10 mm, routed ones to 12")
     board_m: float = param(0.022, "m", "between two fronts one before the other", source="boards of 16-22 mm, and play between")
+    pane_m: float = param(
+        0.08, "m", "least side of a pane of glass", gt=0, source="panes of doors are 15 cm wide and more, channels 3 cm"
+    )
     end_window_m: float = param(0.02, "m", "beyond an end of the plane there are no points of it for this far")
+
+
+class Edges(NamedTuple):
+    """Of a plane, as depth shows them: z-scores 0..6, (blocks, positions)."""
+
+    ends: np.ndarray
+    within: np.ndarray  # where it may go on: it steps back, or the panel of a frame is sunk so deep; or glass begins
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,35 +60,51 @@ class Relief:
         closed = cv2.morphologyEx(np.pad(filled, size), cv2.MORPH_CLOSE, element)[size:-size, size:-size]
         return np.asarray(cv2.medianBlur(closed, 5) > 0)
 
-    def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
-        """Where the plane begins or ends, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
+    def levels_over(self, cell: Cell) -> np.ndarray:
+        """The count of points of the plane over a rectangle of the grid, and the sum of their levels: (2,)."""
+        (left, right), (top, bottom) = (
+            [max(round(end / STEP), 0) for end in ends] for ends in ((cell.left, cell.right), (cell.top, cell.bottom))
+        )
+        window = slice(top, max(bottom, top)), slice(left, max(right, left))
+        points = self.count[window] * (1 - self.raised[window])
+        return np.array([points.sum(), (points * self.level_m[window]).sum()])
+
+    def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> "Edges":
+        """Where the plane ends or steps back, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
         params = tuned(Params)
         points = self.count * (1 - self.raised)
-        flat, raised, depth = (
+        framed = np.where(self._glazed(), np.median(points[points > 0]) if points.any() else 0.0, points)
+        whole, flat, raised, depth = (
             self._blocks(_box_mean(values, 1), axis, block, columns, rows)
-            for values in (points, self.count * self.raised, points * self.level_m)
+            for values in (framed, points, self.count * self.raised, points * self.level_m)
         )
         level = depth / np.maximum(flat, 1e-6)
         handle, shadow = (round(size_m / self.cell_m) * STEP for size_m in (params.handle_thick_m, params.shadow_m))
         reach = max(2, round(params.end_window_m / self.cell_m) * STEP)
-        flat, raised = _behind_handles(flat, raised, handle, shadow, reach)
-        usual = float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
-        # The plane ends, or all that is near it: beside the end of a door whose handle is there, little of the plane is left.
-        found = [_ends(density, usual, reach) for density in (flat, flat + raised)]
-        # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
-        share = raised / np.maximum(flat + raised, 0.05)
-        ledge = _windows(share, round(params.ledge_m / self.cell_m) * STEP)
-        beside = _windows(share, reach)
-        rise = np.maximum(ledge[0] - beside[1], ledge[1] - beside[0])
-        found.append((6 * np.clip((rise - 0.5) / 0.2, 0, 1), rise))
-        # Or it goes on further back than the panel of a frame is sunk: a door that slides before another.
+        ends, panes = (
+            _end_scores(*_behind_handles(density, raised, handle, shadow, reach), self.cell_m) for density in (whole, flat)
+        )
+        flat, _ = _behind_handles(flat, raised, handle, shadow, reach)
+        # It goes on further back than the panel of a frame is mostly sunk: a door that slides before another.
         seen = [np.maximum(window, 1e-6) for window in _windows(flat, reach)]
         before, after = (window / n for window, n in zip(_windows(flat * level, reach), seen, strict=True))
-        back = np.where(np.minimum(*seen) > 0.4 * usual, np.abs(after - before), 0)
-        found.append((6 * np.clip((back - params.sunk_m) / (params.board_m - params.sunk_m), 0, 1), back))
-        peaks = np.max([_at_peaks(score, sharp, reach) for score, sharp in found], axis=0)
-        # Ends wander by a cell or two from block to block: widened, so that blocks agree.
-        return np.asarray(cv2.dilate(peaks.astype(np.float32), np.ones((1, 5), np.uint8)))
+        back = np.where(np.minimum(*seen) > 0.4 * _usual(flat), np.abs(after - before), 0)
+        step = 6 * np.clip((back - params.sunk_m) / (params.board_m - params.sunk_m), 0, 1)
+        return Edges(ends=_widened(ends, reach), within=_widened([*panes, (step, back)], reach))
+
+    def _glazed(self) -> np.ndarray:
+        """Cells of holes in the plane that are as large as a pane and that it encloses: glass in a frame, or a niche."""
+        params = tuned(Params)
+        hole = (~self.on_plane()).astype(np.uint8)
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(hole, connectivity=4)
+        left, top, wide, high = (
+            stats[:, k] for k in (cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP, cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT)
+        )
+        rows, columns = hole.shape
+        inner = (left > 0) & (top > 0) & (left + wide < columns) & (top + high < rows)
+        pane = inner & (np.minimum(wide, high) * self.cell_m > params.pane_m)
+        pane[0] = False
+        return np.asarray(pane[labels])
 
     def _blocks(self, values: np.ndarray, axis: int, block: int, columns: int, rows: int) -> np.ndarray:
         """Means over blocks of the grid, (blocks, positions)."""
@@ -148,12 +175,37 @@ def _windows(values: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
+def _end_scores(flat: np.ndarray, raised: np.ndarray, cell_m: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """How surely (0..6) the plane ends at each position and how sharply, by each of what may show it."""
+    params, usual = tuned(Params), _usual(flat)
+    reach = max(2, round(params.end_window_m / cell_m) * STEP)
+    # The plane ends, or all that is near it: beside the end of a door whose handle is there, little of the plane is left.
+    found = [_ends(density, usual, reach) for density in (flat, flat + raised)]
+    # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
+    share = raised / np.maximum(flat + raised, 0.05)
+    ledge = _windows(share, round(params.ledge_m / cell_m) * STEP)
+    beside = _windows(share, reach)
+    rise = np.maximum(ledge[0] - beside[1], ledge[1] - beside[0])
+    return [*found, (6 * np.clip((rise - 0.5) / 0.2, 0, 1), rise)]
+
+
+def _usual(flat: np.ndarray) -> float:
+    """The density of points where the plane is."""
+    return float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
+
+
 def _ends(density: np.ndarray, usual: float, reach: int) -> tuple[np.ndarray, np.ndarray]:
     """How surely (0..6) points end at each position, and how sharply."""
     before, after = _windows(density, reach)
     high, low = np.maximum(before, after), np.minimum(before, after)
     step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
     return 6 * np.clip((step - 0.55) / 0.3, 0, 1), (high - low) / usual
+
+
+def _widened(found: list[tuple[np.ndarray, np.ndarray]], reach: int) -> np.ndarray:
+    """The highest of scores where they are sharpest; ends wander by a cell or two from block to block: so that blocks agree."""
+    peaks = np.max([_at_peaks(score, sharp, reach) for score, sharp in found], axis=0)
+    return np.asarray(cv2.dilate(peaks.astype(np.float32), np.ones((1, 5), np.uint8)))
 
 
 def _at_peaks(score: np.ndarray, sharp: np.ndarray, reach: int) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from r2c2r_core.segment.runs.orthomosaic import STEP
-from r2c2r_core.segment.runs.relief import Relief
+from r2c2r_core.segment.mosaics.orthomosaic import STEP
+from r2c2r_core.segment.mosaics.relief import Relief
 
 CELL_M, COLUMNS, ROWS, BLOCK = 0.005, 120, 24, 12
 SURE = 4.0  # of 6
@@ -20,7 +20,16 @@ def relief(level_m: np.ndarray, lift_m: np.ndarray, seen: np.ndarray) -> Relief:
 
 def ends(known: Relief) -> list[float]:
     """Columns at which every block shows an end, each stretch by its middle."""
-    shown = known.edge_evidence(0, BLOCK, COLUMNS * STEP, ROWS * STEP).min(axis=0) > SURE
+    return _stretches(known.edge_evidence(0, BLOCK, COLUMNS * STEP, ROWS * STEP).ends)
+
+
+def steps(known: Relief) -> list[float]:
+    """Columns at which every block shows a step back, or the border of a pane."""
+    return _stretches(known.edge_evidence(0, BLOCK, COLUMNS * STEP, ROWS * STEP).within)
+
+
+def _stretches(scores: np.ndarray) -> list[float]:
+    shown = scores.min(axis=0) > SURE
     at = np.flatnonzero(shown)
     return [float(part.mean() + 0.5) / STEP for part in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if len(part)]
 
@@ -48,10 +57,26 @@ def test_a_front_ends_at_the_edge_of_a_worktop_as_thick_as_a_bar() -> None:
     assert any(abs(found - 50) <= 2.0 for found in ends(relief(level, lift, seen)))
 
 
-def test_a_door_ends_where_it_stands_before_another_and_not_where_its_panel_is_sunk() -> None:
+def test_a_plane_steps_back_where_a_door_stands_before_another_and_not_where_its_panel_is_sunk() -> None:
     level, lift, seen = flat()
     level[60:] = -0.03
-    (found,) = ends(relief(level, lift, seen))
+    (found,) = steps(relief(level, lift, seen))
     assert abs(found - 60) <= 1.0
-    level[60:] = -0.01
     assert ends(relief(level, lift, seen)) == []
+    level[60:] = -0.01
+    assert steps(relief(level, lift, seen)) == []
+
+
+def test_the_plane_does_not_end_at_a_pane_of_glass_in_a_frame_but_at_a_channel_between_fronts() -> None:
+    def framed(top: int, bottom: int) -> list[float]:
+        """Level lines of a plane in the middle of nothing, with a hole in it between these rows."""
+        seen = np.zeros((120, 120))
+        seen[10:110, 10:110] = 20
+        seen[top:bottom, 22:98] = 0
+        none = np.zeros(seen.shape)
+        edges = Relief(CELL_M, seen, none, none, none).edge_evidence(1, BLOCK, 120 * STEP, 120 * STEP)
+        middle = edges.ends[len(edges.ends) // 3 : -len(edges.ends) // 3]
+        return _stretches(middle)
+
+    assert [round(at) for at in framed(30, 90)] == [10, 110]
+    assert [round(at) for at in framed(50, 56)] == [10, 50, 56, 110]

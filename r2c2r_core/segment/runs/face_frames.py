@@ -1,0 +1,229 @@
+"""Fronts inset in a face frame: gaps all round them, of which those at two sides end before a rail or stile of the frame.
+
+A panel sunk in a front has lines all round it too, but there the borders of the front go on beside its rails and stiles.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import cv2
+import numpy as np
+
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
+from r2c2r_core.segment.runs.contrast import CORNER, SIDES, Contrast, edges_of
+from r2c2r_core.segment.runs.xy_cut import LineField, across
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What shows of a face frame. Contrasts are lightness, 0 to 255, of a line against both sides of it."""
+
+    narrowest_m: float = param(0.014, "m", "of rails and stiles that are looked for", gt=0, source="a cut leaves no less")
+    widest_m: float = param(0.1, "m", "of rails and stiles", gt=0, source="two stiles of 38-50 mm stand side by side")
+    smallest_m: float = param(0.06, "m", "of a front that is inset", gt=0)
+    contrast: float = param(1.0, "grey", "of a gap, at least", gt=0, source="noise of mosaics along 30 mm of a line is 0.3")
+    alike: float = param(
+        0.4,
+        "ratio",
+        "of a gap's faintest part to the rest of it, and of a gap to a clear one beside it",
+        gt=0,
+        source="likewise",
+    )
+    ended: float = param(
+        0.6,
+        "ratio",
+        "to a gap's contrast, of what changes beside a rail where it would go on",
+        gt=0,
+        source="development kitchens: 0.0 to 0.55 on face frames, mostly grain; 0.8 to 1.3 where a front's own borders go on",
+    )
+    other: float = param(
+        2.0,
+        "ratio",
+        "to an edge's contrast, of what changes beside a front that is no gap going on: a worktop's edge, a wall's",
+        gt=0,
+        source="likewise: 3.4 to 4 under worktops",
+    )
+    flush_m: float = param(
+        0.005,
+        "m",
+        "behind its face frame, of a front's border at most: deeper is the panel of a frame",
+        gt=0,
+        source="fronts are inset flush within 2 mm; the mean depth over a border is known to 1 mm",
+    )
+    border_m: tuple[float, float] = param(
+        (0.01, 0.035), "m", "from a front's edge, from where and up to where its border is: a front's own panel begins later"
+    )
+    options: int = param(3, "count", "of lines beside an edge, the clearest, of which one may be the gap", ge=1)
+
+
+def inset_fronts(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Sequence[Cell], cell_m: float) -> list[Cell]:
+    """The cells, of those that hold a front with rails or stiles of a face frame both on their own."""
+    field, found = LineField(odds, cell_m), list[Cell]()
+    for cell in cells:
+        front = _inset(contrast, field, cell, cell_m) if field.is_front(cell) else None
+        if front is not None and _is_sunk(relief, front, cell, cell_m):
+            front = None
+        found += [cell] if front is None else [front, *_around(front, cell)]
+    return found
+
+
+def is_rail(contrast: Contrast, front: Cell, strip: Cell, axis: int) -> bool:
+    """Whether a strip beside a front is of its face frame: a gap is between them, and those at its other sides end there."""
+    params, ends = tuned(Params), across(front, axis)
+    strip_ends, others = across(strip, axis), across(front, 1 - axis)
+    own = [float(np.median(contrast.along(1 - axis, at, ends[0] + CORNER, ends[1] - CORNER))) for at in others]
+    shared = ends[0] if strip_ends[0] < ends[0] else ends[1]
+    between = float(np.median(contrast.along(axis, shared, others[0] + CORNER, others[1] - CORNER)))
+    if min(own) < params.contrast or between < params.alike * max(own):
+        return False
+    return all(_ends(contrast, 1 - axis, at, strip_ends, gap) for at, gap in zip(others, own, strict=True))
+
+
+def clear_of_rails(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
+    """A panel refined from where it was cut, its edges as cut where they lie past the middle of a rail beside it."""
+    edges = dict(zip(SIDES, edges_of(panel), strict=True))
+    for other in cells:
+        for axis, end in SIDES:
+            (low, high), border = across(other, axis), across(cut, axis)[end]
+            near, far = (low, high) if end else (high, low)
+            if abs(near - border) > 1 or not _beside(other, cut, axis) or high - low > tuned(Params).widest_m / cell_m:
+                continue
+            beyond = (edges[axis, end] - (near + far) / 2) * (far - near)
+            if beyond > 0 and is_rail(contrast, cut, other, axis):
+                edges[axis, end] = border
+    return Cell(edges[0, 0], edges[1, 0], edges[0, 1], edges[1, 1])
+
+
+def _beside(other: Cell, cell: Cell, axis: int) -> bool:
+    """Whether one cell is beside most of another's side."""
+    (start, stop), (low, high) = across(other, 1 - axis), across(cell, 1 - axis)
+    return min(stop, high) - max(start, low) > 0.5 * (high - low)
+
+
+def _inset(contrast: Contrast, field: LineField, cell: Cell, cell_m: float) -> Cell | None:
+    """The front within a cell, with a frame at most of its sides, the largest of equals; None where there is none.
+
+    Its gaps are faint, but no lines that the network holds no edge possible on: those are grain.
+    """
+    smallest, best = tuned(Params).smallest_m / cell_m, (0, 0.0, cell)
+    options = [
+        (border, *(line for line in lines_beside(contrast, cell, side, cell_m) if field.is_possible(cell, side[0], line)))
+        for side, border in zip(SIDES, edges_of(cell), strict=True)
+    ]
+    for left, right, top, bottom in product(*options):
+        front = Cell(left, top, right, bottom)
+        moved = [edge != border for edge, border in zip(edges_of(front), edges_of(cell), strict=True)]
+        worth = (sum(moved), front.width * front.height)
+        large = min(front.width, front.height) >= smallest
+        if worth > best[:2] and sum(moved) < 4 and large and _is_inset(contrast, front, cell, moved):
+            best = (*worth, front)
+    return best[2] if best[0] else None
+
+
+def shows(contrast: Contrast, axis: int, at: float, low: float, high: float) -> bool:
+    """Whether a line at about a position shows over most of a span."""
+    return bool(np.median(contrast.along(axis, at, low, high)) >= tuned(Params).contrast)
+
+
+def lines_beside(contrast: Contrast, cell: Cell, side: tuple[int, int], cell_m: float) -> list[float]:
+    """Positions of lines beside one edge of a cell that show along the middle of it, the clearest first."""
+    params, (axis, end) = tuned(Params), side
+    (low, high), beside = across(cell, axis), across(cell, 1 - axis)
+    widest = params.widest_m / cell_m
+    reach = min(widest, (high - low) / 3)
+    corner = min(widest, (beside[1] - beside[0]) / 4)
+    near, far = (high - params.narrowest_m / cell_m, high - reach) if end else (low + params.narrowest_m / cell_m, low + reach)
+    first, last = round(min(near, far)), round(max(near, far))
+    if (far - near) * (-1 if end else 1) < 3:
+        return []
+    seen = cv2.dilate(contrast.near(axis, first, last, beside[0] + corner, beside[1] - corner), np.ones((1, 3), np.uint8))
+    score = np.sort(seen, axis=0)[1]  # a handle may hide one part
+    peaks = [i for i in range(len(score)) if score[i] >= params.contrast and score[i] == score[max(i - 3, 0) : i + 4].max()]
+    apart = [i for k, i in enumerate(peaks) if k == 0 or i - peaks[k - 1] > 3]
+    return [first + i + 0.5 for i in sorted(apart, key=lambda i: -score[i])[: params.options]]
+
+
+def _is_sunk(relief: Relief, front: Cell, cell: Cell, cell_m: float) -> bool:
+    """Whether depth shows the border of a would-be front behind what is around it in its cell: it is a frame's panel."""
+    params = tuned(Params)
+    near, far = (size / cell_m for size in params.border_m)
+    border = _mean_level(relief, _shrunk(front, near), _shrunk(front, far))
+    frame = _mean_level(relief, cell, _shrunk(front, -near / 2))
+    return border is not None and frame is not None and border < frame - params.flush_m
+
+
+def _mean_level(relief: Relief, outer: Cell, inner: Cell) -> float | None:
+    """Mean depth, outwards, of the points between two rectangles one in the other; None without any."""
+    points, total = relief.levels_over(outer) - relief.levels_over(inner)
+    return float(total / points) if points > 0 else None
+
+
+def _shrunk(cell: Cell, by: float) -> Cell:
+    return Cell(cell.left + by, cell.top + by, cell.right - by, cell.bottom - by)
+
+
+def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool]) -> bool:
+    """Whether a front has gaps from corner to corner where it was moved in, and those at its other sides end there."""
+    params = tuned(Params)
+    parts = [
+        contrast.along(axis, edge, across(front, 1 - axis)[0] + CORNER, across(front, 1 - axis)[1] - CORNER)
+        for (axis, _), edge in zip(SIDES, edges_of(front), strict=True)
+    ]
+    usual = [float(np.median(each)) for each in parts]
+    beside = {k: _beyond(contrast, front, cell, moved, k) for k in range(len(SIDES))}
+    clear = max((own for k, own in enumerate(usual) if not moved[k] and not _is_other(beside[k], own)), default=0.0)
+    for each, own, inner in zip(parts, usual, moved, strict=True):
+        faintest = min(np.sort(each)[1], each[0], each[-1])  # a handle may hide one, but not at a corner
+        if inner and (faintest < max(params.alike * own, params.contrast) or own < params.alike * clear):
+            return False
+    for of in (0, 1):
+        told = [k for k, (axis, _) in enumerate(SIDES) if axis != of and beside[k] and not _is_other(beside[k], usual[k])]
+        if any(moved[k] for k, (axis, _) in enumerate(SIDES) if axis == of) and not told:
+            return False  # nothing tells a rail from a part of the front
+        if not all(usual[k] >= params.contrast and max(beside[k]) <= params.ended * usual[k] for k in told):
+            return False
+    return True
+
+
+def _beyond(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool], side: int) -> list[float]:
+    """What changes over the strips beside a front, at its ends, where one of its edges would go on."""
+    axis, at = SIDES[side][0], edges_of(front)[side]
+    return [_change(contrast, axis, at, strip) for strip in _strips(front, cell, moved, 1 - axis)]
+
+
+def _is_other(beside: Sequence[float], own: float) -> bool:
+    """Whether what changes beside a front is far more than its own edge does: no gap that goes on, but a worktop or a wall."""
+    return max(beside, default=0.0) > tuned(Params).other * own
+
+
+def _strips(front: Cell, cell: Cell, moved: Sequence[bool], axis: int) -> Iterator[tuple[float, float]]:
+    """From where to where a frame reaches along an axis, at the edges of a front that were moved in."""
+    for (of, _), inner, edge, border in zip(SIDES, moved, edges_of(front), edges_of(cell), strict=True):
+        if of == axis and inner:
+            yield min(edge, border), max(edge, border)
+
+
+def _ends(contrast: Contrast, axis: int, at: float, strip: tuple[float, float], own: float) -> bool:
+    """Whether a gap of a contrast is no more to be seen over a strip."""
+    return _change(contrast, axis, at, strip) <= tuned(Params).ended * own
+
+
+def _change(contrast: Contrast, axis: int, at: float, strip: tuple[float, float]) -> float:
+    """What changes at about a position over a strip."""
+    corner = min(CORNER, (strip[1] - strip[0]) / 3)
+    return float(contrast.changes(axis, at, strip[0] + corner, strip[1] - corner, 1).max())
+
+
+def _around(inner: Cell, outer: Cell) -> list[Cell]:
+    """What is left of a cell around one within it."""
+    parts = (
+        Cell(outer.left, outer.top, outer.right, inner.top),
+        Cell(outer.left, inner.bottom, outer.right, outer.bottom),
+        Cell(outer.left, inner.top, inner.left, inner.bottom),
+        Cell(inner.right, inner.top, outer.right, inner.bottom),
+    )
+    return [part for part in parts if part.width > 0 and part.height > 0]

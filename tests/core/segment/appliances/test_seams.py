@@ -1,0 +1,41 @@
+"""Where an appliance's doors may end above a drawer: the likeliest level line of its run first, each seam once."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from r2c2r_core.segment.appliances.seams import drawer_seams
+from r2c2r_core.segment.fronts.front import Front
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.runs.run import Run
+
+CELL_M = 0.005
+FRONT = Cell(0, 0, 120, 360)  # 0.6 by 1.8 m
+LIKELIER, FAINTER = 240, 200  # rows, within the lower 60 % and over the lowest 15 %
+
+
+def front(*rows: int) -> Front:
+    """A refrigerator whose run was parted at those rows."""
+    faint = np.full((360 // STEP, 120 // STEP), -4, np.float32)
+    level = faint.copy()
+    level[FAINTER // STEP], level[LIKELIER // STEP] = 1, 4
+    ends = [FRONT.top, *rows, FRONT.bottom]
+    cells = tuple(Cell(FRONT.left, top, FRONT.right, bottom) for top, bottom in pairwise(ends))
+    run = SimpleNamespace(odds=PanelOdds(faint, level, faint, faint), cells=cells, grid=SimpleNamespace(cell_m=CELL_M))
+    return Front(cast(Run, run), FRONT, None, 0.0)
+
+
+def test_of_several_lines_the_likeliest_comes_first() -> None:
+    assert drawer_seams(front(FAINTER, LIKELIER)) == pytest.approx([(180 - LIKELIER) * CELL_M, (180 - FAINTER) * CELL_M])
+
+
+def test_lines_beside_each_other_are_one_seam() -> None:
+    assert drawer_seams(front(LIKELIER - 2, LIKELIER)) == pytest.approx([(180 - LIKELIER) * CELL_M], abs=2 * CELL_M)
+
+
+def test_no_drawer_is_as_low_or_as_high_as_those() -> None:
+    assert drawer_seams(front(30, 340)) == ()

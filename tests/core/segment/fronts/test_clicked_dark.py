@@ -1,0 +1,108 @@
+"""Clicks on fronts that return no light."""
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
+from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.scene import Scene
+from tests.core.segment.motion.boards import LEAF, THICKNESS_M, filmed
+
+WIDTH_M, HEIGHT_M = 1.7, 0.9
+
+
+class Film:
+    """As much of a scene as a click asks for."""
+
+    def __init__(self, *, glass: bool, dark_corner: bool = False) -> None:
+        self._film = filmed("left", np.zeros(3), glass=glass)
+        self._dark_corner = dark_corner
+
+    def depth(self, index: int) -> Any:
+        depth = self._film.depth(index).copy()
+        if self._dark_corner:
+            depth[:60, :60] = 0
+        return depth
+
+    def frame(self, index: int) -> Any:
+        return self._film.frames[index]
+
+    def has_depth(self, index: int, x_px: float, y_px: float) -> bool:
+        return Scene.has_depth(cast(Scene, self), index, x_px, y_px)
+
+    def depth_at_step(self, index: int, x_px: float, y_px: float) -> float | None:
+        return Scene.depth_at_step(cast(Scene, self), index, x_px, y_px)
+
+    def ray(self, index: int, x_px: float, y_px: float) -> Any:
+        return Scene.ray(cast(Scene, self), index, x_px, y_px)
+
+
+def _plane(behind_m: float, *, hole: bool) -> PlaneRegion:
+    """A plane so far behind LEAF's face, with a hole where LEAF is."""
+    place = LEAF.world_from_front
+    support = np.ones((round(HEIGHT_M / 0.02), round(WIDTH_M / 0.02)), bool)
+    if hole:
+        support[8:37, 30:55] = False
+    origin = place.apply(np.array([[0.0, behind_m, 0.0]]))[0]
+    return PlaneRegion(type(place)(place.rotation, origin), WIDTH_M, HEIGHT_M, support, 0.02, float(support.sum()) * 4e-4)
+
+
+FACE, REAR = _plane(0.0, hole=True), _plane(THICKNESS_M + 0.45, hole=False)
+CLICK = PromptPoint(frame=1, x=96.0, y=76.0, label=1)
+
+
+def test_a_click_on_black_glass_lies_on_the_plane_of_what_is_round_it() -> None:
+    place = dark_place(cast(Scene, Film(glass=True)), (REAR, FACE), CLICK)
+    assert place is not None
+    local = LEAF.world_from_front.inverse.apply(place[None])[0]
+    assert abs(local[1]) < 1e-6
+    assert (np.abs(local[[0, 2]]) < LEAF.half_m).all()
+
+
+def test_a_click_that_has_depth_is_where_that_is() -> None:
+    assert dark_place(cast(Scene, Film(glass=False)), (REAR, FACE), CLICK) is None
+
+
+def test_a_click_in_the_gap_at_a_silhouette_is_on_no_black_glass(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Film, "depth_at_step", lambda *_: 2.0)
+    assert dark_place(cast(Scene, Film(glass=True)), (REAR, FACE), CLICK) is None
+
+
+def test_a_hole_that_no_plane_surrounds_tells_nothing() -> None:
+    assert dark_place(cast(Scene, Film(glass=True)), (REAR,), CLICK) is None
+
+
+def test_a_hole_that_goes_on_beyond_the_picture_is_no_front_s() -> None:
+    corner = PromptPoint(frame=1, x=2.0, y=2.0, label=1)
+    assert dark_place(cast(Scene, Film(glass=False, dark_corner=True)), (REAR, FACE), corner) is None
+
+
+def _band(top_m: float, bottom_m: float) -> PlaneRegion:
+    """What is seen of LEAF's face between two heights, over its middle."""
+    place, height = LEAF.world_from_front, top_m - bottom_m
+    origin = place.apply(np.array([[0.0, 0.0, (top_m + bottom_m) / 2]]))[0]
+    support = np.ones((round(height / 0.02), round(WIDTH_M / 0.02)), bool)
+    return PlaneRegion(type(place)(place.rotation, origin), WIDTH_M, height, support, 0.02, WIDTH_M * height)
+
+
+ABOVE, BELOW = _band(HEIGHT_M / 2, LEAF.half_m[1]), _band(-LEAF.half_m[1], -HEIGHT_M / 2)
+
+
+def test_black_glass_between_two_parts_of_a_plane_is_surrounded_by_both() -> None:
+    film = cast(Scene, Film(glass=True))
+    place = dark_place(film, (REAR, ABOVE, BELOW), CLICK)
+    assert place is not None
+    assert abs(LEAF.world_from_front.inverse.apply(place[None])[0, 1]) < 1e-6
+
+
+def test_a_front_may_go_on_beyond_its_plane_only_where_that_has_no_depth() -> None:
+    glass, wood = (cast(Scene, Film(glass=shown)) for shown in (True, False))
+    under = ABOVE.world_from_plane.apply(np.array([[0.0, 0.0, -ABOVE.height_m / 2]]))[0]  # its lower border
+    oven = category_of("oven")
+    assert oven is not None
+    assert dark_beyond(glass, ABOVE, CLICK, under, oven) >= oven.height.usual
+    assert dark_beyond(wood, ABOVE, CLICK, under, oven) == 0.0

@@ -1,0 +1,113 @@
+"""Fronts inset in a face frame, told from panels sunk in a front: the gaps round the front end before its rails and stiles."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import pytest
+
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
+from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Relief
+from r2c2r_core.segment.runs.contrast import Contrast
+from r2c2r_core.segment.runs.face_frames import clear_of_rails, inset_fronts, is_rail
+
+CELL_M = 0.0025
+FRONT = Cell(60, 60, 260, 300)
+RAIL = 15  # cells: 37.5 mm
+CLOSE = 1.5  # cells: 4 mm
+
+
+def mosaic(*gaps: Cell, dark: int = 90, worktop: int = 0) -> Contrast:
+    """Lightness of one paint with outlines of gaps, one cell wide, as blurred as mosaics are, with a little noise.
+
+    A worktop is over all of it, and its shadow ends at a row.
+    """
+    light = np.full((360, 320), 170, np.uint8)
+    light[:worktop], light[max(worktop - 3, 0) : worktop] = 110, 80
+    for gap in gaps:
+        corners = (round(gap.left), round(gap.top)), (round(gap.right), round(gap.bottom))
+        cv2.rectangle(light, *corners, dark, 1)
+    noise = np.random.default_rng(0).normal(0, 1.0, light.shape)
+    return Contrast(cv2.GaussianBlur(light.astype(np.float32), (0, 0), 0.8) + noise)
+
+
+def odds(edge: float = -2.0) -> PanelOdds:
+    """All of it a front, to the network, with no edge likely anywhere, and none ruled out."""
+    none = np.full((180, 160), edge, np.float32)
+    return PanelOdds(upright=none, level=none, handle=np.full_like(none, -4.0), front=np.full_like(none, 4.0))
+
+
+def relief(behind_m: float = 0.0, within: Cell = FRONT) -> Relief:
+    """In one plane, but for what lies that far behind it, to a millimetre a point."""
+    level = np.random.default_rng(1).normal(0, 0.001, (180, 160))
+    left, top, right, bottom = (round(edge / STEP) for edge in edges(within))
+    level[top:bottom, left:right] -= behind_m
+    none = np.zeros(level.shape)
+    return Relief(CELL_M * STEP, none + 10, none, none, level)
+
+
+def grown(left: float = 0, top: float = 0, right: float = 0, bottom: float = 0) -> Cell:
+    return Cell(FRONT.left - left, FRONT.top - top, FRONT.right + right, FRONT.bottom + bottom)
+
+
+def edges(cell: Cell) -> tuple[float, ...]:
+    return cell.left, cell.top, cell.right, cell.bottom
+
+
+@pytest.mark.parametrize(
+    "cut", [grown(top=RAIL), grown(left=2 * RAIL), grown(top=RAIL, bottom=RAIL), grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)]
+)
+def test_a_front_is_what_its_gaps_enclose_not_the_frame_round_it(cut: Cell) -> None:
+    cells = inset_fronts(mosaic(FRONT), relief(), odds(), [cut], CELL_M)
+    assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
+    assert sum(cell.width * cell.height for cell in cells) == pytest.approx(cut.width * cut.height)  # they tile it
+
+
+def test_grain_where_the_network_rules_edges_out_is_no_gap() -> None:
+    cut = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)
+    assert inset_fronts(mosaic(FRONT), relief(), odds(-4.0), [cut], CELL_M) == [cut]
+
+
+def test_a_worktops_edge_that_goes_on_over_a_stile_does_not_make_it_a_part_of_the_front() -> None:
+    under = mosaic(FRONT, dark=150, worktop=round(FRONT.top))
+    cells = inset_fronts(under, relief(), odds(), [grown(right=RAIL)], CELL_M)
+    assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
+
+
+@pytest.mark.parametrize("frame", [RAIL, 2 * RAIL])
+def test_a_panel_sunk_in_a_front_is_a_part_of_it(frame: int) -> None:
+    sunk = Cell(FRONT.left + frame, FRONT.top + frame, FRONT.right - frame, FRONT.bottom - frame)
+    assert inset_fronts(mosaic(FRONT, sunk), relief(), odds(), [FRONT], CELL_M) == [FRONT]
+
+
+def test_a_panel_that_lies_behind_what_is_round_it_is_a_frames_and_no_front() -> None:
+    inset = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)
+    assert inset_fronts(mosaic(FRONT), relief(0.012), odds(), [inset], CELL_M) == [inset]
+    sunk = Cell(FRONT.left + 20, FRONT.top + 20, FRONT.right - 20, FRONT.bottom - 20)  # a shaker door inset in a face frame
+    assert len(inset_fronts(mosaic(FRONT), relief(0.012, sunk), odds(), [inset], CELL_M)) > 1
+
+
+def test_a_shadow_across_a_front_is_none_of_a_frame() -> None:
+    shadow = Cell(-5, -5, 325, FRONT.top + RAIL)  # from wall to wall
+    assert inset_fronts(mosaic(FRONT, shadow), relief(), odds(), [FRONT], CELL_M) == [FRONT]
+
+
+def strips(cut: Cell) -> Sequence[Cell]:
+    return [cut, Cell(cut.left, cut.top - 8, cut.right, cut.top), Cell(cut.left, 0, cut.right, cut.top - 8)]
+
+
+def test_the_gaps_of_a_front_end_before_a_rail_and_go_on_beside_its_own() -> None:
+    _, strip, _ = strips(FRONT)
+    assert is_rail(mosaic(FRONT), FRONT, strip, axis=1)
+    assert not is_rail(mosaic(FRONT, grown(top=8)), FRONT, strip, axis=1)
+    assert not is_rail(mosaic(), FRONT, strip, axis=1)  # nothing shows
+
+
+def test_an_edge_refined_past_a_rail_stays_where_it_was_cut() -> None:
+    refined = grown(top=7)
+    assert edges(clear_of_rails(mosaic(FRONT), refined, FRONT, strips(FRONT), CELL_M)) == edges(FRONT)
+    near = grown(top=2)
+    assert edges(clear_of_rails(mosaic(FRONT), near, FRONT, strips(FRONT), CELL_M)) == edges(near)
+    own = mosaic(FRONT, grown(top=8))  # the front's borders go on: what was cut is its frame's inner line
+    assert edges(clear_of_rails(own, refined, FRONT, strips(FRONT), CELL_M)) == edges(refined)
