@@ -49,6 +49,7 @@ class Matcher(Protocol):
 MATCHERS: Registry[Matcher] = Registry(
     seam="matcher",
     group="r2c2r.matchers",
+    protocol=Matcher,
     own=(
         Backend(
             name="sift",

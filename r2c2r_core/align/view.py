@@ -157,8 +157,8 @@ def mask_box(view: View) -> np.ndarray:
     rows, columns = np.flatnonzero(view.mask.any(axis=1)), np.flatnonzero(view.mask.any(axis=0))
     if not len(rows):
         return np.zeros(4)
-    edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], dtype=np.float64)
-    return (edges - [view.camera.cx, view.camera.cy] * 2) / view.camera.fx
+    corners_px = np.array([[columns[0], rows[0]], [columns[-1] + 1, rows[-1] + 1]], dtype=np.float64)
+    return pixel_rays(corners_px, view.camera)[:, :2].ravel()
 
 
 def known_corners(track: MaskTrack) -> Points:

@@ -35,6 +35,12 @@ def _front_centre(thing: ObjectRecord) -> np.ndarray:
 def _yaw(truth: ObjectRecord, found: ObjectRecord) -> Metric:
     if truth.turns_freely:
         return Metric(name="yaw", value=None, unit="deg", better="lower", tolerance=0.3, note=_ROUND)
+    return Metric(
+        name="yaw", value=abs(float(np.degrees(yaw_between(truth, found)))), unit="deg", better="lower", tolerance=0.3
+    )
+
+
+def yaw_between(truth: ObjectRecord, found: ObjectRecord) -> float:
+    """By how much the found object is turned about the true one's vertical axis, rad."""
     turn = truth.world_from_object.rotation.T @ found.world_from_object.rotation
-    yaw = abs(float(np.degrees(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))))
-    return Metric(name="yaw", value=yaw, unit="deg", better="lower", tolerance=0.3)
+    return float(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))

@@ -1,10 +1,13 @@
 """Shape: how much of the space the two boxes share (exactly, for both are solids), and how the mesh fits the scan."""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from r2c2r_core.evaluate.pose import yaw_between
 from r2c2r_core.evaluate.records import ObjectRecord
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.report import Metric
 
 _SCAN_METRICS: tuple[tuple[str, str, str, Literal["lower", "higher"]], ...] = (
@@ -34,11 +37,20 @@ def _scan_metric(found: ObjectRecord, name: str, key: str, unit: str, better: Li
     )
 
 
-def box_iou(a: ObjectRecord, b: ObjectRecord) -> float:
-    """Solid intersection over union of two boxes in any pose."""
-    volume_a, volume_b = float(np.prod(a.dimensions_m)), float(np.prod(b.dimensions_m))
-    shared = min(_shared_volume(a, b), volume_a, volume_b)
-    return shared / max(volume_a + volume_b - shared, 1e-12)
+def box_iou(truth: ObjectRecord, found: ObjectRecord) -> float:
+    """Solid intersection over union of two boxes in any pose; of a thing that is round, whose box has any yaw, at equal yaw."""
+    if truth.turns_freely:
+        found = _turned_to(truth, found)
+    volumes = float(np.prod(truth.dimensions_m)), float(np.prod(found.dimensions_m))
+    shared = min(_shared_volume(truth, found), *volumes)
+    return shared / max(sum(volumes) - shared, 1e-12)
+
+
+def _turned_to(truth: ObjectRecord, found: ObjectRecord) -> ObjectRecord:
+    """The found object turned about the true one's vertical axis until their yaws are equal."""
+    upright, pose = truth.world_from_object.rotation, found.world_from_object
+    back = upright @ rotation_about_z(-yaw_between(truth, found)) @ upright.T
+    return replace(found, world_from_object=Rigid3(back @ pose.rotation, pose.translation))
 
 
 def _shared_volume(a: ObjectRecord, b: ObjectRecord) -> float:

@@ -11,13 +11,13 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence, View, masked_points
 from r2c2r_core.generate.hypothesis import Hypothesis
-from r2c2r_core.generate.priors import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
 from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.relief import NO_RELIEF, BoxPart, Relief, handle_parts, measure_relief
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.depth import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.tuning import param, tuned
@@ -101,7 +101,7 @@ def _depths_and_handles(
     if style == "none":
         return tuple(others)
     best = depths[0]
-    styles: tuple[tuple[str, HandleStyle], ...] = (("its handle apart", "none"), ("its handle a block", "block"))
+    styles: tuple[tuple[str, HandleStyle], ...] = (("front without its handle", "none"), ("handle as a solid block", "block"))
     handles = [Hypothesis(told, partial(shape, best, other)) for told, other in styles]
     return (*others[:2], handles[0], *others[2:], handles[1])
 

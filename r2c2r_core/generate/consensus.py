@@ -31,7 +31,7 @@ Rule = Literal["medoid", "mean"]
 _SHAPE_METRICS = ("extent_middle", "extent_short", "volume_ratio")
 _BUT = {
     "oddness": "its proportions differ {oddness:.1f} %",
-    "unseen": "what nobody saw of it is {unseen:.0f} cm off the likeliest",
+    "unseen": "its side that was not filmed is {unseen:.0f} cm from where it is most likely",
     "heavy": "it has {faces:.0f} faces",
     "falls": "it would tip over",
     "copied": "it copies the masks with their errors",
@@ -160,8 +160,10 @@ def _reason(
     place = 1 + sum(1 for i in allowed if costs["fit"][i] < costs["fit"][best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     but = _passed_over(candidates, best, allowed, costs)
-    residual = f" and depth within {1000 * depth:.0f} mm" if depth is not None else ""
-    return f"{name}: {shape}mask IoU {chosen.metrics['mask_iou']:.2f}{residual} (fit {place} of {count}{skipped}){but}{beside}."
+    residual = f" and its surface within {1000 * depth:.0f} mm of the measured depth" if depth is not None else ""
+    fits = "the best" if place == 1 else f"number {place}"
+    agrees = f"its outline agrees {100 * chosen.metrics['mask_iou']:.0f} % with the masks{residual}"
+    return f"{name}: {shape}{agrees}, {fits} of {count} by fit{skipped}{but}{beside}."
 
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:
@@ -179,5 +181,5 @@ def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[i
         unseen=100 * candidates[rival].metrics.get("unseen_error_m", 0.0),
         faces=candidates[rival].metrics.get("faces", 0.0),
     )
-    fits = "fits better" if fit[rival] < fit[best] - params.fits_alike else "fits alike"
+    fits = "fits better" if fit[rival] < fit[best] - params.fits_alike else "fits as well"
     return f"; {candidates[rival].candidate_id} {fits}, but {said}"

@@ -47,3 +47,8 @@ def delivered_asset(
         warnings=(*warnings, *(f"{generator} mesh: {note}" for note in notes)),
         assumes=assumes,
     )
+
+
+def first_line(error: Exception) -> str:
+    """What a model's own code raised, in a line: of CUDA it is often a page."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -44,6 +44,17 @@ class Params:
     least_steps: int = param(5, "count", "heights that show it")
     least_points: int = param(8, "count", "of a post at each of them")
     to_edge_m: float = param(0.06, "m", "from the thing's end, within which a slab reaches it")
+    edge_m: tuple[float, float] = param(
+        (0.02, 0.16),
+        "m",
+        "below a slab, between which its edge is looked for: the first two centimetres may be its rounded edge",
+    )
+    edge_step_m: float = param(0.01, "m", "of height in which points of an edge are counted", gt=0)
+    edge_ends: float = param(0.3, "share", "of the points of an edge's first step, below which it has ended")
+    seat_m: float = param(0.002, "m", "that a post reaches into its slab")
+    outside_m: float = param(0.02, "m", "outside its slab, that a post may stand")
+    line_m: float = param(0.01, "m", "off a post's line, from where a height counts half")
+    steady_m: float = param(0.02, "m", "off it at most heights, beyond which there is no post")
     closed: float = param(0.5, "share", "of the height below a slab filled wider than a post: a side")
     inwards: tuple[float, float, float] = param(
         (0.0, 0.25, 0.5), "share", "of the way to a slab's middle, where a leg may stand"
@@ -124,11 +135,12 @@ def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) 
     at_edge = ((points[:, :2] < low + params.rim_m) | (points[:, :2] > high - params.rim_m)).any(axis=1)
     in_corner = ((points[:, :2] < low + params.corner_m) | (points[:, :2] > high - params.corner_m)).all(axis=1)
     below = level - points[near & at_edge & ~in_corner, 2]
-    counts = np.histogram(below, bins=np.arange(0.02, 0.16, 0.01))[0]  # the first two centimetres may be its rounded edge
+    counts = np.histogram(below, bins=np.arange(*params.edge_m, params.edge_step_m))[0]
     if counts[0] < params.least_rim:
         return params.slab_m
-    ends = np.flatnonzero(counts < 0.3 * counts[0])
-    return float(np.clip(0.02 + 0.01 * (ends[0] if len(ends) else len(counts)), *params.slab_range_m))
+    ends = np.flatnonzero(counts < params.edge_ends * counts[0])
+    steps = ends[0] if len(ends) else len(counts)
+    return float(np.clip(params.edge_m[0] + params.edge_step_m * steps, *params.slab_range_m))
 
 
 def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
@@ -194,8 +206,8 @@ def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: t
     if line is None:
         return None
     lean, offset = line
-    top = np.append(lean * slab.low[2] + offset, slab.low[2] + 0.002)
-    inside = (top[:2] > slab.low[:2] - 0.02).all() and (top[:2] < slab.high[:2] + 0.02).all()
+    top = np.append(lean * slab.low[2] + offset, slab.low[2] + params.seat_m)
+    inside = (top[:2] > slab.low[:2] - params.outside_m).all() and (top[:2] < slab.high[:2] + params.outside_m).all()
     width = float(np.clip(np.median(widths), *params.post_range_m))
     return Post(top, lean, width, floor, True) if inside and (np.abs(lean) < params.lean).all() else None
 
@@ -211,8 +223,8 @@ def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
     for _ in range(10):
         solution = np.linalg.lstsq(system * weight[:, None], middles[:, :2] * weight[:, None], rcond=None)[0]
         off = np.linalg.norm(system @ solution - middles[:, :2], axis=1)
-        weight = 1.0 / np.sqrt(1.0 + (off / 0.01) ** 2)
-    return (solution[0], solution[1]) if np.median(off) < 0.02 else None
+        weight = 1.0 / np.sqrt(1.0 + (off / params.line_m) ** 2)
+    return (solution[0], solution[1]) if np.median(off) < params.steady_m else None
 
 
 def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post:
@@ -228,7 +240,7 @@ def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner
             )
     inset = params.post_m / 2
     at = [slab.high[k] - inset if corner[k] else slab.low[k] + inset for k in (0, 1)]
-    return Post(np.array([*at, slab.low[2] + 0.002]), np.zeros(2), params.post_m, floor, False)
+    return Post(np.array([*at, slab.low[2] + params.seat_m]), np.zeros(2), params.post_m, floor, False)
 
 
 def _where_not_empty(carving: Carving, slab: BoxPart, post: Post, shares: Sequence[float]) -> Post | None:

@@ -91,12 +91,10 @@ def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reac
         return None
     y = (bins + 0.5) * params.bin_m
     gap = np.array([np.median(behind[index == k]) for k in bins])
-    misfits = []
-    for k in range(1, len(bins) - 1):
-        wall = np.median(gap[k:] + y[k:])  # what is behind is upright: the gap shrinks by as much as y grows
-        beyond = np.abs(gap[k:] + y[k:] - wall).sum() if wall - y[k] > params.least_gap_m else np.inf
-        misfits.append(float(np.abs(gap[:k]).sum() + beyond))
+    walls = [float(np.median(gap[k:] + y[k:])) for k in range(1, len(bins) - 1)]  # upright: the gap shrinks as y grows
+    misfits = [np.abs(gap[:k]).sum() + np.abs(gap[k:] + y[k:] - wall).sum() for k, wall in enumerate(walls, 1)]
     best = int(np.argmin(misfits)) + 1
-    if misfits[best - 1] > params.clearer * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
+    to_the_wall = walls[best - 1] - y[best] < params.least_gap_m  # the face ends where the wall begins
+    if to_the_wall or misfits[best - 1] > params.clearer * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
         return None
     return float(y[best - 1]), float(y[best] - params.bin_m / 2)

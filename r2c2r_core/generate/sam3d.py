@@ -23,7 +23,7 @@ from r2c2r_core.arrays import Points
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed
 from r2c2r_core.generate.consistency import self_consistency, sensor_depth
 from r2c2r_core.generate.cutout import bounded, usable_views
-from r2c2r_core.generate.delivered import delivered_asset
+from r2c2r_core.generate.delivered import delivered_asset, first_line
 from r2c2r_core.generate.evidence import Evidence, View
 from r2c2r_core.generate.meshfile import parts_of
 from r2c2r_core.generate.protocol import MeshGenerator
@@ -62,7 +62,7 @@ class Sam3dObjects(MeshGenerator):
         try:
             mesh, posed = _sample(self._pipeline, view, model_seed)
         except Exception as error:  # whatever CUDA, spconv or the mesh extraction raise: it costs this sample only
-            raise GenerationFailed(f"{name}: SAM 3D failed on {candidate_id}: {_first_line(error)}") from error
+            raise GenerationFailed(f"{name}: SAM 3D failed on {candidate_id}: {first_line(error)}") from error
         return delivered_asset(
             parts_of([mesh]),
             object_name=name,
@@ -99,7 +99,7 @@ def _pipeline(weights: Path) -> Any:
         raise
     except Exception as error:  # file, CUDA and configuration errors of every kind: each means that it cannot be used here
         raise BackendUnavailable(
-            f"generator 'sam3d': {path} cannot be loaded ({_first_line(error)})", hint="check the folder and the GPU's memory"
+            f"generator 'sam3d': {path} cannot be loaded ({first_line(error)})", hint="check the folder and the GPU's memory"
         ) from error
 
 
@@ -170,7 +170,3 @@ def _judged(posed: Points, faces: np.ndarray, evidence: Evidence) -> dict[str, f
 
 def _numbers(tensor: Any) -> np.ndarray:
     return np.asarray(tensor.detach().cpu().numpy(), dtype=np.float64).reshape(-1)
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 GENERATORS: Registry[MeshGenerator] = Registry(
     "generator",
     group="r2c2r.generators",
+    protocol=MeshGenerator,
     own=(
         Backend(
             name="completion",
@@ -62,7 +63,7 @@ GENERATORS: Registry[MeshGenerator] = Registry(
             name="remote",
             target="r2c2r_core.generate.remote:Remote",
             server="R2C2R_GENERATOR_URL",
-            licence="that of the generator served",
+            licence="as the remote generator's",
             summary="a generator on another machine: serve_worker.py, or TRELLIS as NVIDIA NIM",
         ),
     ),

@@ -10,7 +10,7 @@ from typing import Any
 
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed
 from r2c2r_core.generate.cutout import rgba_cutout
-from r2c2r_core.generate.delivered import delivered_asset
+from r2c2r_core.generate.delivered import delivered_asset, first_line
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.meshfile import parts_of
 from r2c2r_core.generate.protocol import MeshGenerator
@@ -34,7 +34,7 @@ class Trellis(MeshGenerator):
         try:
             mesh = _textured(_sample(self._pipeline, sampling))
         except Exception as error:  # whatever CUDA, spconv or the mesh extraction raise: it costs this sample only
-            raise GenerationFailed(f"{name}: TRELLIS failed on {candidate_id}: {_first_line(error)}") from error
+            raise GenerationFailed(f"{name}: TRELLIS failed on {candidate_id}: {first_line(error)}") from error
         return delivered_asset(
             parts_of([mesh]),
             object_name=name,
@@ -61,7 +61,7 @@ def _pipeline(weights: Path) -> Any:
         pipeline.cuda()
     except Exception as error:  # hub, file and CUDA errors of every kind: each means that it cannot be used here
         raise BackendUnavailable(
-            f"generator 'trellis': {weights} cannot be loaded ({_first_line(error)})",
+            f"generator 'trellis': {weights} cannot be loaded ({first_line(error)})",
             hint="check the folder, that DINOv2 is in torch.hub's cache, and that the GPU has 16 GB",
         ) from error
     return pipeline
@@ -94,7 +94,3 @@ def _textured(outputs: dict[str, Any]) -> Any:
     return postprocessing_utils.to_glb(
         outputs["gaussian"][0], outputs["mesh"][0], simplify=_SIMPLIFY, texture_size=_TEXTURE_PX, verbose=False
     )
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -124,6 +124,10 @@ def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
     sine = float(np.linalg.norm(axis))
     if sine < _PARALLEL:  # equal or opposite: any perpendicular axis serves
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+    if cosine < 0:  # near opposites a cross product loses its direction: half a turn first, and the small rest
+        axis = axis - float(axis @ a) * a
+        half_turn = 2.0 * np.outer(axis, axis) / float(axis @ axis) - np.eye(3)
+        return np.asarray(rotation_between(-a, b) @ half_turn)
     x, y, z = axis / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross  # Rodrigues

@@ -74,4 +74,4 @@ class DepthNoise:
 
     def seen_through(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
         """Where depth was measured behind z by more than a margin and the noise: nothing opaque is at z."""
-        return np.asarray(seen_m > z_m + self._reach(z_m, margin_m))
+        return np.asarray((seen_m > 0) & (seen_m > z_m + self._reach(z_m, margin_m)))  # z < 0: behind the camera

@@ -1,15 +1,38 @@
 """Depth images: which pixels can be believed, how they are stored, and a filled copy for display."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Mask
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.tuning import param, tuned
 
 DEPTH_STEP_M = 0.00025  # of the stored uint16: a quarter of the finest sensor step, and 16.4 m of range
 _FAR = np.float32(1e6)
-_GRAZING_DEG = 84.0  # between a ray and a surface across it, from where depth says nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Which depth pixels are believed."""
+
+    grazing_deg: float = param(84.0, "deg", "between a ray and a surface across it, from where depth says nothing", le=90)
+    least_step_m: float = param(
+        0.05,
+        "m",
+        "between two surfaces, at 0 m",
+        source="handles stand out by 3 to 5 cm and are a pixel or two wide: keep every one",
+    )
+    step_more: float = param(0.006, "m", "and more of it at 1 m: noise grows with the squared distance")
+    most_noise_m: float = param(0.015, "m", "of depth that is no step, at 0 m")
+    noise_more: float = param(
+        0.004, "m", "and more of it at 1 m, likewise", source="three sigma of a Kinect: 1.4 mm/m² one sigma"
+    )
+    inside: float = param(0.2, "share", "of a step, that a mixed pixel lies off both its sides")
+    ridge: float = param(0.3, "share", "of that noise, within which pixels are one ridge")
+    growth: float = param(1.5, "ratio", "of the range of twice the window to that of a step: a slope's doubles")
 
 
 def usable_depth(
@@ -37,7 +60,7 @@ def ridges(depth_m: DepthMetres) -> Mask:
     """Pixels on what is up to four wide and stands before farther surface on both sides, along a row or a column."""
     valid = depth_m > 0
     for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
-    step, margin = _least_step(depth_m), 0.3 * _most_margin(depth_m)
+    step, margin = _least_step(depth_m), tuned(Params).ridge * _most_noise(depth_m)
     found = np.zeros(depth_m.shape, dtype=bool)
     for axis in (0, 1):
         low, _ = _range(for_min, for_max, 2, across=axis == 1)
@@ -55,16 +78,16 @@ def flying_pixels(depth_m: DepthMetres, camera: Intrinsics) -> Mask:
     """
     valid = depth_m > 0
     for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
-    flying = np.zeros(depth_m.shape, dtype=bool)
-    least_step, most_margin = _least_step(depth_m), _most_margin(depth_m)
+    params, flying = tuned(Params), np.zeros(depth_m.shape, dtype=bool)
+    least_step, most_noise = _least_step(depth_m), _most_noise(depth_m)
     for across, focal in ((True, camera.fx), (False, camera.fy)):
         low, high = _range(for_min, for_max, 2, across)
         wide_low, wide_high = _range(for_min, for_max, 4, across)
         step = high - low
-        margin = np.minimum(0.2 * step, most_margin)
+        margin = np.minimum(params.inside * step, most_noise)
         between = (depth_m > low + margin) & (depth_m < high - margin)
-        flying |= between & (step > least_step) & (wide_high - wide_low < 1.5 * step)
-        flying |= _steepness(depth_m, across) * focal > depth_m * np.tan(np.radians(_GRAZING_DEG))
+        flying |= between & (step > least_step) & (wide_high - wide_low < params.growth * step)
+        flying |= _steepness(depth_m, across) * focal > depth_m * np.tan(np.radians(params.grazing_deg))
     return flying & valid
 
 
@@ -97,13 +120,15 @@ def _farthest_beside(for_max: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _least_step(depth_m: DepthMetres) -> DepthMetres:
-    """Between two surfaces, metres: handles stand out by 3 to 5 cm and are only a pixel or two wide: keep every one."""
-    return np.float32(0.05) + np.float32(0.006) * depth_m * depth_m
+    """Between two surfaces, metres."""
+    params = tuned(Params)
+    return np.float32(params.least_step_m) + np.float32(params.step_more) * depth_m * depth_m
 
 
-def _most_margin(depth_m: DepthMetres) -> DepthMetres:
-    """Of noise, metres, which grows with the squared distance (Kinect: 1.4 mm/m^2 one sigma)."""
-    return np.float32(0.015) + np.float32(0.004) * depth_m * depth_m
+def _most_noise(depth_m: DepthMetres) -> DepthMetres:
+    """Metres."""
+    params = tuned(Params)
+    return np.float32(params.most_noise_m) + np.float32(params.noise_more) * depth_m * depth_m
 
 
 def _range(for_min: np.ndarray, for_max: np.ndarray, radius: int, across: bool) -> tuple[np.ndarray, np.ndarray]:

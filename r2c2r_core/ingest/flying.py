@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Mask
-from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.geometry.camera import project, sample_nearest, unproject
 from r2c2r_core.ingest.store import write_depth
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.progress import SILENT, Progress
@@ -36,6 +36,12 @@ class Params:
     )
     edge_px: int = param(3, "px", "from a step, within which flying pixels lie", ge=1)
     step: float = param(0.04, "ratio", "of a step to the depth")
+    least_step_m: float = param(0.02, "m", "of a step, besides")
+    noise_m: float = param(0.015, "m", "by which two frames' depth of one surface may differ: noise and poses, at 0 m")
+    noise_more: float = param(0.006, "m", "and more of it at 1 m: the noise of depth by parallax grows with its square")
+    through: float = param(2.0, "ratio", "of it, that a judge must see behind a pixel")
+    there: float = param(1.5, "ratio", "of it, within which a judge sees the pixel's surface itself")
+    nearest_m: float = param(0.05, "m", "from a judge, at least")
 
 
 class Depths(NamedTuple):
@@ -65,7 +71,7 @@ def drop_flying(frames: Sequence[Frame], images: FrameImages, store: Path, progr
 
 def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame, Depths]]) -> Mask:
     """Pixels beside a step that at least four judges see through and none sees there itself."""
-    flying = np.zeros(depths.metres.shape, dtype=bool)
+    params, flying = tuned(Params), np.zeros(depths.metres.shape, dtype=bool)
     rows, columns = np.nonzero(_beside_steps(depths))
     if not len(rows) or not judges:
         return flying
@@ -74,25 +80,14 @@ def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame,
     through, support = np.zeros(len(rows), np.int64), np.zeros(len(rows), np.int64)
     for judge, seen in judges:
         there = judge.world_from_camera.inverse.apply(points)
-        place = project(there, judge.depth_camera)
-        z = there[:, 2]
-        with np.errstate(invalid="ignore"):
-            inside = (
-                (z > 0.05)
-                & (place >= 0).all(axis=1)
-                & (place < [judge.depth_camera.width, judge.depth_camera.height]).all(axis=1)
-            )
-        column, row = (np.where(inside, place[:, k], 0).astype(np.int64) for k in (0, 1))
-        tolerance = 0.015 + 0.006 * z**2
-        least, greatest = seen.least[row, column], seen.greatest[row, column]
-        through += inside & seen.all_known[row, column] & (least > z + 2.0 * tolerance)
-        support += (
-            inside
-            & (least < z + tolerance)
-            & (greatest > z - tolerance)
-            & (np.abs(seen.metres[row, column] - z) < 1.5 * tolerance)
-        )
-    wrong = (through >= tuned(Params).least_through) & (support == 0)
+        uv, z = project(there, judge.depth_camera), there[:, 2]
+        inside = sample_nearest(seen.metres, uv)[1] & (z > params.nearest_m)
+        metres, least, greatest, all_known = (sample_nearest(image, uv)[0] for image in seen)
+        tolerance = params.noise_m + params.noise_more * z**2
+        through += inside & all_known & (least > z + params.through * tolerance)
+        near = np.abs(metres - z) < params.there * tolerance
+        support += inside & (least < z + tolerance) & (greatest > z - tolerance) & near
+    wrong = (through >= params.least_through) & (support == 0)
     flying[rows[wrong], columns[wrong]] = True
     return flying
 
@@ -132,6 +127,6 @@ def judges_of(frames: Sequence[Frame], position: int) -> list[int]:
 def _beside_steps(depths: Depths) -> Mask:
     params = tuned(Params)
     known = depths.metres > 0
-    step = known & ((depths.greatest > depths.least + 0.02 + params.step * depths.metres) | ~depths.all_known)
+    step = known & ((depths.greatest > depths.least + params.least_step_m + params.step * depths.metres) | ~depths.all_known)
     size = 2 * params.edge_px - 1
     return known & (cv2.dilate(step.astype(np.uint8), np.ones((size, size), np.uint8)) > 0)

@@ -61,6 +61,12 @@ class IngestConfig:
         gt=0,
         le=10_000,
     )
+    scale: float = setting(
+        1.0,
+        "factor on every length of the recording, depth and camera path alike, as a tape says",
+        ge=0.2,
+        le=5,
+    )
     register_depth: bool = setting(
         False, "whether depth that does not lie on the colour images is moved there, by the fit that `r2c2r info` names"
     )
@@ -121,7 +127,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         images=images,
         up_capture=recording.up_capture if own_world else None,
         other_ups=recording.other_ups if own_world else (),
-        notices=(*registered, *recording.notices, *thinned, *unsure, *bad, *settled.notices),
+        notices=(*_scaled(config.scale), *registered, *recording.notices, *thinned, *unsure, *bad, *settled.notices),
         poses=settled.evidence,
         depth_noise=noise,
     )
@@ -178,7 +184,7 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     jpeg, sharpness = stored_jpeg(recording.colour_of(frame), frame.rgb_name, size)
     raw = recording.depth_of(frame)
     depth = usable_depth(
-        raw.metres * np.float32(config.depth_scale),
+        raw.metres * np.float32(config.depth_scale * config.scale),
         raw.confidence,
         frame.depth_camera,
         least_confidence=least_confidence,
@@ -187,14 +193,19 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     )
     write_rgb(store, frame.index, jpeg)
     write_depth(store, frame.index, depth)
+    given = frame.capture_from_camera or Rigid3()  # settled once all frames are there
     return Frame(
         index=frame.index,
         timestamp_s=frame.timestamp_s,
         rgb_camera=frame.rgb_camera,
         depth_camera=frame.depth_camera,
-        world_from_camera=frame.capture_from_camera or Rigid3(),  # settled once all frames are there
+        world_from_camera=replace(given, translation=config.scale * given.translation),
         sharpness=sharpness,
     )
+
+
+def _scaled(scale: float) -> tuple[str, ...]:
+    return () if scale == 1.0 else (f"every length was multiplied by {scale:.4f}, as a person measured",)
 
 
 def _settle_poses(

@@ -4,7 +4,9 @@ A new kind is a line here and, where it is built in a new way, a file in synthes
 Sizes are those of the front or of the whole object without handles, as people who sell or standardise such things give them.
 """
 
-from r2c2r_core.kitchen.category import Category, Size
+from functools import partial
+
+from r2c2r_core.kitchen.category import Category, Place, Size
 from r2c2r_core.model import materials
 from r2c2r_core.plugins import added
 
@@ -29,6 +31,19 @@ _OWN = "own estimate of household things as sold"
 DEPTHS_SOLD_M = (0.30, 0.37, 0.48, 0.58, 0.62, 0.75)
 """Of cabinets with their fronts: carcasses of 28, 35, 46, 56, 60 and 73 cm are what most makers list."""
 
+_OFTEN = "how often: own estimate of a fitted kitchen of some fifteen fronts"
+
+
+def _below_worktop(per_kitchen: float) -> Place:
+    return Place((0.0, 0.85), 0.95, per_kitchen, f"EN 1116: working heights of 850 and 900 mm, more for tall people; {_OFTEN}")
+
+
+def _hung(per_kitchen: float) -> Place:
+    return Place(
+        (1.15, 2.3), 2.6, per_kitchen, f"worktops end at 0.95 m, and nothing hangs closer above them than this; {_OFTEN}"
+    )
+
+
 _BASE_DEPTH = Size(0.28, 0.58, 0.80, f"{_CARCASSES}; 61-63 cm in US stock units")
 _BASE_HEIGHT = Size(0.35, 0.72, 0.92, f"{_UNITS}, less a plinth of 10-15 cm")
 _DOOR_WIDTH = Size(0.20, 0.60, 0.95, f"{_UNITS}; doors end at 0.6 m, two of them unparted at 0.95 m")
@@ -50,6 +65,7 @@ def _thing(
     on_floor: bool = False,
     on_legs: bool = False,
     flat_top: bool = False,
+    place: Place | None = None,
 ) -> Category:
     """A loose thing, as deep as wide."""
     across = Size(*width, _OWN)
@@ -68,8 +84,14 @@ def _thing(
         open_vessel=open_vessel,
         on_legs=on_legs,
         flat_top=flat_top,
+        place=place,
     )
 
+
+_base_unit = partial(Category, kind="front", depth=_BASE_DEPTH, height=_BASE_HEIGHT, material=materials.CHIPBOARD)
+_wall_unit = partial(Category, kind="front", depth=_WALL_DEPTH, height=_WALL_HEIGHT, material=materials.CHIPBOARD)
+_machine = partial(Category, kind="front", one_front=True)  # a machine shows one front whatever lines it carries
+_appliance = partial(Category, kind="appliance", stands=True)
 
 _FRONTS = (
     Category(
@@ -82,31 +104,25 @@ _FRONTS = (
         depth=_BASE_DEPTH,
         height=Size(0.08, 0.20, 0.45, f"{_BASE_HEIGHT.source}, in two to five rows"),
         material=materials.CHIPBOARD,
+        place=_below_worktop(5.0),
     ),
-    Category(
+    _base_unit(
         name="drawer_stack",
         aliases=("drawers", "chest_of_drawers", "drawer_unit", "drawer_cabinet", "stack_of_drawers", "drawer_chest"),
-        kind="front",
         opens="drawer",
         fixture="drawer_stack",
         one_front=True,
         several_fronts=True,
         width=Size(0.25, 0.60, 1.25, _UNITS),
-        depth=_BASE_DEPTH,
-        height=_BASE_HEIGHT,
-        material=materials.CHIPBOARD,
     ),
-    Category(
+    _base_unit(
         name="cabinet",
         aliases=("door", "cabinet_door", "cupboard", "base_cabinet", "base_unit", "floor_cabinet", "single_door_cabinet"),
-        kind="front",
         opens="side",
         hinge="left",
         fixture="cabinet",
         width=_DOOR_WIDTH,
-        depth=_BASE_DEPTH,
-        height=_BASE_HEIGHT,
-        material=materials.CHIPBOARD,
+        place=_below_worktop(4.0),
     ),
     Category(
         name="tall_cabinet",
@@ -120,16 +136,13 @@ _FRONTS = (
         height=Size(0.92, 2.0, 2.4, "European lists: 1.4, 2.0 and 2.2 m; US stock 84, 90 and 96 in"),
         material=materials.CHIPBOARD,
     ),
-    Category(
+    _base_unit(
         name="double_door_cabinet",
         aliases=("double_door", "double_cabinet", "two_door_cabinet", "cabinet_double", "double_base_cabinet"),
-        kind="front",
         opens="pair",
         fixture="double_door_cabinet",
         width=_PAIR_WIDTH,
-        depth=_BASE_DEPTH,
-        height=_BASE_HEIGHT,
-        material=materials.CHIPBOARD,
+        place=_below_worktop(1.0),
     ),
     Category(
         name="sliding_door",
@@ -146,103 +159,85 @@ _FRONTS = (
         height=Size(0.28, 0.75, 2.6, f"{_SLIDING}; base units the most"),
         material=materials.CHIPBOARD,
     ),
-    Category(
+    _wall_unit(
         name="wall_cabinet",
         aliases=(
             *("upper_cabinet", "wall_unit", "upper", "hanging_cabinet", "overhead_cabinet", "top_cabinet"),
             *("wall_cupboard", "upper_cupboard", "hanging_cupboard"),
         ),
-        kind="front",
         opens="side",
         hinge="left",
         fixture="wall_cabinet",
         width=Size(0.20, 0.60, 1.0, _UNITS),
-        depth=_WALL_DEPTH,
-        height=_WALL_HEIGHT,
-        material=materials.CHIPBOARD,
+        flap=True,
+        place=_hung(4.0),
     ),
-    Category(
+    _wall_unit(
         name="double_door_wall_cabinet",
         aliases=("double_wall_cabinet", "two_door_wall_cabinet", "double_upper_cabinet", "double_door_upper_cabinet"),
-        kind="front",
         opens="pair",
         fixture="double_door_cabinet:HANGING",
         width=_PAIR_WIDTH,
-        depth=_WALL_DEPTH,
-        height=_WALL_HEIGHT,
-        material=materials.CHIPBOARD,
+        place=_hung(1.0),
     ),
-    Category(
+    _base_unit(
         name="sink_cabinet",
         aliases=("sink", "sink_unit", "sink_base", "sink_base_cabinet"),
-        kind="front",
         opens="side",
         hinge="left",
         fixture="sink_cabinet",
         wider=(0.65, "double_sink_cabinet"),  # European lists hang one door on sink units up to 0.6 m wide
         width=Size(0.40, 0.60, 1.25, _UNITS),
-        depth=_BASE_DEPTH,
-        height=_BASE_HEIGHT,
-        material=materials.CHIPBOARD,
     ),
-    Category(
+    _base_unit(
         name="double_sink_cabinet",
         aliases=("two_door_sink_cabinet", "double_door_sink_cabinet", "double_sink"),
-        kind="front",
         opens="pair",
         fixture="sink_cabinet:DOUBLE",
         width=_PAIR_WIDTH,
-        depth=_BASE_DEPTH,
-        height=_BASE_HEIGHT,
-        material=materials.CHIPBOARD,
     ),
-    Category(
+    _machine(
         name="oven",
         aliases=("wall_oven", "built_in_oven", "baking_oven"),
-        kind="front",
         opens="bottom",
         hinge="bottom",
         fixture="oven",
-        one_front=True,
         width=Size(0.42, 0.60, 0.95, _OVENS),
         depth=Size(0.40, 0.58, 0.80, f"{_OVENS}; {_CARCASSES}"),
         height=Size(
             0.38, 0.68, 0.95, f"{_OVENS}; the middle between a front of 0.595 m and a range's, for people call both so"
         ),
         material=materials.OVEN,
+        dark=True,
+        place=_below_worktop(0.5),
     ),
-    Category(
+    _machine(
         name="range",
         aliases=("stove", "cooker", "kitchen_range", "range_cooker", "gas_stove", "electric_stove"),
-        kind="front",
         opens="bottom",
         hinge="bottom",
         fixture="oven",
-        one_front=True,
         width=Size(0.42, 0.60, 1.0, _OVENS),
         depth=Size(0.40, 0.62, 0.80, _OVENS),
         height=Size(0.38, 0.72, 0.95, f"{_OVENS}; its front begins over the plinth or a drawer"),
         material=materials.OVEN,
     ),
-    Category(
+    _machine(
         name="dishwasher",
-        kind="front",
         opens="bottom",
         hinge="bottom",
         fixture="dishwasher",
-        one_front=True,
         width=Size(0.38, 0.60, 0.68, _DISHWASHERS),
         depth=Size(0.40, 0.58, 0.80, _DISHWASHERS),
         height=Size(0.50, 0.74, 0.92, f"{_DISHWASHERS}; its door alone 0.65-0.78 m"),
         material=materials.DISHWASHER,
+        place=_below_worktop(0.5),
     ),
-    Category(
+    _machine(
         name="washing_machine",
         aliases=("washer", "clothes_washer", "tumble_dryer", "clothes_dryer", "dryer", "washer_dryer"),
-        kind="front",
         opens="fixed",
         fixture="solid",
-        one_front=True,
         width=Size(0.50, 0.60, 0.75, _LAUNDRY),
         depth=Size(0.40, 0.60, 0.88, _LAUNDRY),
         height=Size(0.65, 0.85, 1.0, _LAUNDRY),
@@ -261,42 +256,40 @@ _FRONTS = (
     ),
 )
 _APPLIANCES = (
-    Category(
+    _appliance(
         name="refrigerator",
         aliases=("fridge", "single_door_refrigerator", "single_door_fridge"),
-        kind="appliance",
         opens="side",
         hinge="right",
         fixture="refrigerator",
+        over_drawer="refrigerator_drawer",
         wider=(0.8, "side_by_side_refrigerator"),  # single doors end at 0.7 m, side-by-side models begin at 0.83 m
         width=Size(0.42, 0.60, 1.25, _PAIRED),
         depth=_FRIDGE_DEPTH,
         height=_FRIDGE_HEIGHT,
         material=materials.REFRIGERATOR,
-        stands=True,
+        place=Place((0.0, 0.5), 2.4, 1.0, f"on the floor, a plinth or a drawer; {_OFTEN}"),
     ),
-    Category(
+    _appliance(
         name="side_by_side_refrigerator",
         aliases=(
             *("french_door_refrigerator", "double_door_refrigerator", "american_fridge", "side_by_side_fridge"),
             *("french_door_fridge", "double_door_fridge", "american_refrigerator"),
         ),
-        kind="appliance",
         opens="pair",
         fixture="refrigerator:SIDE_BY_SIDE",
+        over_drawer="refrigerator_drawer:PAIR",
         width=Size(0.60, 0.91, 1.25, _PAIRED),
         depth=Size(0.45, 0.70, 0.95, _FRIDGES),
         height=_FRIDGE_HEIGHT,
         material=materials.REFRIGERATOR,
-        stands=True,
     ),
-    Category(
+    _appliance(
         name="fridge_freezer",
         aliases=(
             *("two_door_refrigerator", "two_door_fridge", "refrigerator_freezer", "top_freezer_refrigerator", "combi_fridge"),
             *("bottom_freezer_refrigerator", "fridge_freezer_combination"),
         ),
-        kind="appliance",
         opens="side",
         hinge="right",
         fixture="fridge_freezer",
@@ -305,12 +298,10 @@ _APPLIANCES = (
         depth=_FRIDGE_DEPTH,
         height=_FRIDGE_HEIGHT,
         material=materials.REFRIGERATOR,
-        stands=True,
     ),
-    Category(
+    _appliance(
         name="freezer",
         aliases=("upright_freezer", "deep_freezer"),
-        kind="appliance",
         opens="side",
         hinge="right",
         fixture="refrigerator",
@@ -318,20 +309,20 @@ _APPLIANCES = (
         depth=Size(0.45, 0.62, 0.95, _FRIDGES),
         height=Size(0.75, 1.40, 2.20, _FRIDGES),
         material=materials.REFRIGERATOR,
-        stands=True,
     ),
-    Category(
+    _appliance(
         name="microwave",
         aliases=("microwave_oven", "countertop_microwave"),
-        kind="appliance",
         opens="side",
         hinge="left",
+        hinge_share=0.98,  # keypad and latch are on the right of all but a few of them
         fixture="microwave",
         width=Size(0.36, 0.49, 0.77, _MICROWAVES),
         depth=Size(0.25, 0.38, 0.50, f"{_MICROWAVES}; 0.30-0.48 m deep: a wall behind it may be farther"),
         height=Size(0.21, 0.28, 0.46, _MICROWAVES),
         material=materials.MICROWAVE,
-        stands=True,
+        dark=True,
+        place=Place((0.7, 1.5), 2.0, 0.5, f"on worktops, shelves and in tall units; {_OFTEN}"),
     ),
     Category(
         name="hood",
@@ -369,18 +360,23 @@ _FIXED = (
         material=materials.CHIPBOARD,
     ),
 )
+_ON_WORKTOP = Place((0.3, 2.0), 2.3, 2.0, f"worktops, tables and shelves; {_OFTEN}")
+_ON_FLOOR = Place((0.0, 0.15), 1.2, 1.0, f"their own heights; {_OFTEN}")
 _THINGS = (
     _thing("object", (0.02, 0.10, 0.4), (0.02, 0.20, 0.4), "thing", "rigid"),
     _thing(
         *("bottle", (0.05, 0.075, 0.13), (0.16, 0.25, 0.34), "flask"),
         material=materials.BOTTLE,
         round=True,
+        place=_ON_WORKTOP,
     ),
     _thing("can", (0.05, 0.075, 0.11), (0.08, 0.12, 0.13), "tin", material=materials.CAN, round=True),
     _thing("jar", (0.05, 0.085, 0.15), (0.06, 0.12, 0.22), round=True),
     _thing("glass", (0.05, 0.085, 0.11), (0.07, 0.12, 0.22), round=True),
     _thing("tumbler", (0.05, 0.085, 0.11), (0.07, 0.12, 0.13), round=True, open_vessel=True),
-    _thing("mug", (0.06, 0.085, 0.14), (0.05, 0.095, 0.13), material=materials.MUG, round=True, open_vessel=True),
+    _thing(
+        "mug", (0.06, 0.085, 0.14), (0.05, 0.095, 0.13), material=materials.MUG, round=True, open_vessel=True, place=_ON_WORKTOP
+    ),
     _thing("cup", (0.06, 0.085, 0.13), (0.05, 0.075, 0.13), "teacup", material=materials.CUP, round=True, open_vessel=True),
     _thing("bowl", (0.08, 0.16, 0.30), (0.03, 0.07, 0.15), material=materials.BOWL, round=True, open_vessel=True),
     _thing("plate", (0.15, 0.25, 0.32), (0.01, 0.025, 0.05), "dish", material=materials.PLATE),
@@ -400,12 +396,23 @@ _THINGS = (
     _thing("box", (0.04, 0.15, 0.36), (0.03, 0.2, 0.36), "carton", material=materials.BOX),
     _thing("book", (0.1, 0.2, 0.36), (0.01, 0.03, 0.36)),
     _thing("bag", (0.1, 0.25, 0.36), (0.1, 0.3, 0.36)),
-    _thing("bin", (0.15, 0.3, 0.5), (0.25, 0.5, 1.0), "trash", "trash_can", "garbage_can", "waste_basket", on_floor=True),
+    _thing(
+        "bin",
+        (0.15, 0.3, 0.5),
+        (0.25, 0.5, 1.0),
+        "trash",
+        "trash_can",
+        "garbage_can",
+        "waste_basket",
+        on_floor=True,
+        place=_ON_FLOOR,
+    ),
     _thing(
         *("chair", (0.32, 0.45, 0.8), (0.6, 0.88, 1.1), "armchair", "highchair", "wheelchair"),
         material=materials.CHAIR,
         on_floor=True,
         on_legs=True,
+        place=_ON_FLOOR,
     ),
     _thing("stool", (0.28, 0.38, 0.6), (0.3, 0.65, 1.0), "barstool", "footstool", on_floor=True, on_legs=True, flat_top=True),
     _thing("table", (0.4, 1.2, 2.0), (0.4, 0.75, 1.1), on_floor=True, on_legs=True, flat_top=True),

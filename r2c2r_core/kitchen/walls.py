@@ -1,13 +1,11 @@
-"""How deep a front is when nobody sees it: to which of the walls behind it, else the usual; for every stage. And the floor."""
+"""The walls behind a front, for every stage, and the floor under it. How deep a front is: `kitchen.depth`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.kitchen.category import Size
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.tuning import param, tuned
 
@@ -22,24 +20,6 @@ class Params:
         "between the normals of a front and of the wall behind it",
         source="measured on the sample kitchens: built-in fronts 0.2 degrees, free-standing appliances 5",
     )
-
-
-class FrontDepth(NamedTuple):
-    """How far a front reaches back, before anything shows it."""
-
-    wall_m: float | None  # to the nearest wall that a thing of its category may stand against
-    usual_m: float  # of its category
-
-    @property
-    def depth_m(self) -> float:
-        """To the wall where there is one."""
-        return self.usual_m if self.wall_m is None else self.wall_m
-
-
-def front_depth(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> FrontDepth:
-    """The depth of a front with this middle and unit normal (world), of a category as deep as this."""
-    to_wall = next((d for d in distances_behind(walls, middle, outward) if depth.holds(d)), None)
-    return FrontDepth(to_wall, depth.usual)
 
 
 def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -> list[float]:

@@ -280,7 +280,7 @@ def _machine_body(
         spans += [(low[0], high[0], z, bottom), (low[0], left, bottom, top), (right, high[0], bottom, top)]
         z = top
     patches += facing_quads([*spans, (low[0], high[0], z, high[2])], low[1], thing.body, object_id)
-    inner = [patch for each in compartments for patch in hollow_patches(each, object_id)]
+    inner = [patch for each in compartments for patch in hollow_patches(each)]  # masks are of what moves, and of the outside
     inner += [patch for name, each in seen.items() for patch in tray_patches(each, name, object_id)]
     return patches + shifted(inner, centre)
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.ingest.doctor.pairs import Views
 from r2c2r_core.tuning import param, tuned
 
@@ -48,14 +49,11 @@ def cover(points_world: Points, views: Views) -> Cover:
 
 def _sight(points: Points, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Whether each view sees each point (v, n), the unit directions to the camera (v, n, 3), and the distances."""
-    rows, columns = views.depth_m.shape[1:]
     least, more = tuned(Params).behind
-    offset = points[None] - views.translation[:, None]
-    there = offset @ views.rotation
-    z = np.maximum(there[..., 2], 0.05)
-    uv = there[..., :2] / z[..., None] * views.focal[:, None] + views.centre[:, None]
-    inside = (there[..., 2] > 0.05) & (uv >= 0).all(axis=2) & (uv < (columns, rows)).all(axis=2)
-    column, row = (np.where(inside, uv[..., axis], 0).astype(np.int64) for axis in (0, 1))
-    measured = views.depth_m[np.arange(len(views.position))[:, None], row, column]
+    seen = np.zeros((len(views.position), len(points)), dtype=bool)
+    for view, depth_m in enumerate(views.depth_m):
+        z, measured, inside = look_up(points, views.world_from_camera(view), views.camera(view), depth_m)
+        seen[view] = inside & (np.abs(measured - z) < least + more * z)
+    offset = views.translation[:, None] - points[None]
     distance = np.linalg.norm(offset, axis=2)
-    return inside & (np.abs(measured - z) < least + more * z), -offset / np.maximum(distance, 1e-6)[..., None], distance
+    return seen, offset / np.maximum(distance, 1e-6)[..., None], distance

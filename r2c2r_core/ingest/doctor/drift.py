@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2c2r_core.geometry.camera import depth_points, unproject
 from r2c2r_core.ingest.doctor.pairs import Disagreement, Pairs, Views, compare, overlaps, spread, tolerance_m
 from r2c2r_core.tuning import param, tuned
 
@@ -17,6 +18,9 @@ class Params:
     overlap: float = param(0.3, "share", "of a view that another must see again")
     damping: float = param(0.02, "ratio", "to the mean weight: directions that the surface does not tell stay where they are")
     least_points: int = param(80, "count", "that both views see")
+    step: tuple[float, float] = param(
+        (0.05, 0.05), "m", "between neighbours, from where they are two surfaces: and for each metre"
+    )
 
 
 def revisits(views: Views, most: int) -> Pairs:
@@ -81,23 +85,20 @@ def _step(
 
 def _points(views: Views, view: int) -> np.ndarray:
     """Camera-frame points (n, 3) of a view."""
-    z = views.point_z[view][:, None]
-    return np.hstack([(views.point_uv[view] - views.centre[view]) / views.focal[view] * z, z])
+    return unproject(views.point_uv[view], views.point_z[view], views.camera(view))
 
 
 def _surface(views: Views, view: int) -> tuple[np.ndarray, np.ndarray]:
     """Normals, NaN where unknown or across a step, and points (h, w, 3) of a view's depth image, in its camera frame."""
     depth = views.depth_m[view].astype(np.float64)
-    rows, columns = depth.shape
-    u, v = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
-    (fx, fy), (cx, cy) = views.focal[view], views.centre[view]
-    points = np.stack([(u - cx) / fx * depth, (v - cy) / fy * depth, depth], axis=-1)
+    points = depth_points(depth, views.camera(view))
     points[depth == 0] = np.nan
+    least, more = tuned(Params).step
     across, down = np.full_like(points, np.nan), np.full_like(points, np.nan)
     across[:, 2:-2] = points[:, 4:] - points[:, :-4]
     down[2:-2] = points[4:] - points[:-4]
     normals = np.cross(across, down)
-    step = np.maximum(np.abs(across[..., 2]), np.abs(down[..., 2])) > 0.05 + 0.05 * depth
+    step = np.maximum(np.abs(across[..., 2]), np.abs(down[..., 2])) > least + more * depth
     normals[step] = np.nan
     with np.errstate(invalid="ignore"):
         return normals / np.linalg.norm(normals, axis=-1, keepdims=True), points

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.tuning import param, tuned
 
@@ -50,6 +52,15 @@ class Views:
     translation: Centres
     point_uv: Float[np.ndarray, "views points 2"]  # pixels of known depth, spread over the image
     point_z: Float[np.ndarray, "views points"]  # 0 where a view has fewer points
+
+    def camera(self, view: int) -> Intrinsics:
+        """Of its thinned depth image."""
+        (fx, fy), (cx, cy), (rows, columns) = self.focal[view], self.centre[view], self.depth_m.shape[1:]
+        return Intrinsics(fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy), width=columns, height=rows)
+
+    def world_from_camera(self, view: int) -> Rigid3:
+        """Where it was taken."""
+        return Rigid3(self.rotation[view], self.translation[view])
 
     def posed(self, rotation: Rotations, translation: Centres) -> "Views":
         """The same images from other places."""

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import Intrinsics, pixel_rays
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.tuning import param, tuned
 
@@ -190,7 +190,7 @@ def _depth_edges(depth_m: DepthMetres, camera: Intrinsics) -> tuple[np.ndarray, 
             row, column = np.nonzero(jump)
             border = np.stack([column + 0.5, row + 0.5], axis=1)
             border[:, 1 - axis] += apart / 2
-            rays.append((border - (camera.cx, camera.cy)) / (camera.fx, camera.fy))
+            rays.append(pixel_rays(border, camera)[:, :2])
             depths.append(near[jump])
     return np.concatenate(rays), np.concatenate(depths)
 

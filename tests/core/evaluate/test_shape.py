@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,3 +39,10 @@ def test_the_overlap_does_not_depend_on_the_world() -> None:
     world = Rigid3(rotation_between(np.array([0.0, 0.0, 1.0]), np.array([0.3, -0.5, 0.8])), np.array([4.0, -2.0, 1.0]))
     moved = [box(tuple(t.dimensions_m), world @ t.world_from_object) for t in (a, b)]
     assert box_iou(*moved) == pytest.approx(box_iou(a, b), abs=1e-9)
+
+
+def test_the_yaw_of_a_round_thing_costs_nothing_its_place_does() -> None:
+    bottle = replace(box((0.08, 0.08, 0.3), at(0.0, 0.3)), turns_freely=True)
+    assert box_iou(bottle, box((0.08, 0.08, 0.3), at(0.0, 1.1))) == pytest.approx(1.0, abs=1e-6)
+    aside = Rigid3(rotation_about_z(1.1), at(0.0, 0.3).apply(np.array([[0.04, 0.0, 0.0]]))[0])
+    assert box_iou(bottle, box((0.08, 0.08, 0.3), aside)) == pytest.approx(1 / 3, abs=1e-6)

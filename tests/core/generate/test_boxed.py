@@ -9,7 +9,7 @@ from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate import boxed
 from r2c2r_core.generate.completion import Completion
 from r2c2r_core.generate.evidence import gather_evidence
-from r2c2r_core.generate.rear_edge import rear_edge
+from r2c2r_core.generate.rear_edge import _change_point, rear_edge
 from r2c2r_core.generate.variation import draw_variation, whole_pool
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
 from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
@@ -139,3 +139,12 @@ def test_a_rear_edge_that_no_frame_shows_stays_where_it_was_thought(appliance_sc
     low, high = np.array([-0.23, -0.17, -0.14]), np.array([0.23, 0.17, 0.14])
     blind = [replace(view, depth_m=np.zeros_like(view.depth_m)) for view in evidence.pool]
     assert rear_edge(low, high, blind, track.box.world_from_object) == high[1]
+
+
+@pytest.mark.parametrize(("wall_m", "ends"), [(0.30, False), (0.36, True)])
+def test_a_face_that_ends_at_the_wall_has_no_rear_edge_before_it(wall_m, ends):
+    """A refrigerator stands against the wall: rays beyond its side meet the wall where that begins."""
+    y = np.arange(-0.2, 0.40, 0.001)
+    noise = np.random.default_rng(0).normal(0, 0.002, len(y))
+    found = _change_point(y, np.where(y < 0.30, 0.0, wall_m - y) + noise, thought=0.30, reach_m=0.08)
+    assert (found == pytest.approx((0.295, 0.300), abs=0.011)) if ends else found is None

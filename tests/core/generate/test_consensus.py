@@ -67,7 +67,7 @@ def test_among_like_shapes_the_fit_to_masks_and_depth_decides():
     ]
     chosen = choose_candidate(alike)
     assert chosen.chosen_id == "c1"
-    assert "0.95" in chosen.reason
+    assert "95 %" in chosen.reason
     assert "10 mm" in chosen.reason
 
 
@@ -145,11 +145,14 @@ def guesses(*changes):
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        ({"unseen_error_m": 0.34}, "c1 fits alike, but what nobody saw of it is 34 cm off the likeliest"),
-        ({"mask_iou": 0.93, "unseen_error_m": 0.34}, "c1 fits better, but what nobody saw of it is 34 cm off the likeliest"),
-        ({"stands": 0.0}, "c1 fits alike, but it would tip over"),
+        ({"unseen_error_m": 0.34}, "c1 fits as well, but its side that was not filmed is 34 cm from where it is most likely"),
+        (
+            {"mask_iou": 0.93, "unseen_error_m": 0.34},
+            "c1 fits better, but its side that was not filmed is 34 cm from where it is most likely",
+        ),
+        ({"stands": 0.0}, "c1 fits as well, but it would tip over"),
         ({"mask_iou": 0.92, "carved": 1.0}, "c1 fits better, but it copies the masks with their errors"),
-        ({"faces": 80_000.0}, "c1 fits alike, but it has 80000 faces"),
+        ({"faces": 80_000.0}, "c1 fits as well, but it has 80000 faces"),
     ],
 )
 def test_the_reason_says_what_decided_against_the_candidate_that_fits_as_well(other, said):
@@ -168,7 +171,7 @@ def test_proportions_are_given_only_where_they_count():
 def test_where_the_fit_decided_the_reason_says_no_more():
     """The rank is that of the fit: what nobody saw has no part in it."""
     reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
-    assert "(fit 1 of 2)" in reason
+    assert "the best of 2 by fit" in reason
     assert "but" not in reason
 
 

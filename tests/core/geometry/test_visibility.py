@@ -60,5 +60,5 @@ def test_a_depth_agrees_or_is_nearer_or_further_and_only_one_of_them() -> None:
 
 
 def test_unknown_depth_says_nothing() -> None:
-    noise, nothing, z = DepthNoise(), np.zeros(3), np.array([0.5, 1.0, 2.0])
+    noise, nothing, z = DepthNoise(), np.zeros(4), np.array([-1.0, 0.5, 1.0, 2.0])  # the first one is behind the camera
     assert not (noise.occluded(nothing, z, 0.0) | noise.agrees(nothing, z, 0.0) | noise.seen_through(nothing, z, 0.0)).any()

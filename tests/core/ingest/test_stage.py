@@ -4,6 +4,7 @@ import errno
 import json
 import stat
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -384,3 +385,15 @@ def test_metadata_with_a_wrong_type_is_an_error_not_a_crash(scan, tmp_path):
         broken = rewritten(scan, tmp_path / "d.r3d", lambda n, c, m=metadata_json: m.encode() if n == "metadata" else c)
         with pytest.raises(CaptureError):
             read(broken, tmp_path)
+
+
+def test_a_scale_multiplies_every_length_alike_and_is_noticed(scan, tmp_path):
+    capture = read(scan, tmp_path)
+    larger = read_capture(scan, tmp_path / "larger", replace(QUICK, scale=1.25))
+    for one, other in zip(capture.frames, larger.frames, strict=True):
+        assert np.allclose(other.world_from_camera.translation, 1.25 * one.world_from_camera.translation, atol=0.01)
+        assert np.allclose(other.world_from_camera.rotation, one.world_from_camera.rotation, atol=0.01)
+    sizes = [np.ptp(one.surface.vertices_world, axis=0) for one in (capture, larger)]
+    assert sizes[1] == pytest.approx(1.25 * sizes[0], rel=0.02)  # a voxel of 3 cm is no larger
+    assert "every length was multiplied by 1.2500, as a person measured" in larger.notices
+    assert not any("multiplied" in notice for notice in capture.notices)

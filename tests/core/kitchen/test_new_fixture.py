@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from r2c2r_core.generate.priors import depths_behind
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen import categories
 from r2c2r_core.kitchen.category import Category, Size
+from r2c2r_core.kitchen.depth import depths_behind
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model import materials
 from r2c2r_core.segment.things.thing import sized_as

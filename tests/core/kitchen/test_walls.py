@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from r2c2r_core.generate.priors import depths_behind
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.kitchen.depth import depths_behind, front_depth
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.kitchen.walls import depths_in, distances_behind, front_depth
+from r2c2r_core.kitchen.walls import depths_in, distances_behind
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.segment.fronts.front import depth_behind as depth_behind_front
 from r2c2r_core.synthesize.dimensions import depth_behind as depth_behind_box

@@ -1,0 +1,88 @@
+"""Each usual mistake in reading a recording, made on purpose, is named; a recording without one is left alone."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL
+from r2c2r_core.ingest.doctor.hypotheses import find_convention, find_scale
+from r2c2r_core.ingest.doctor.pairs import Views, far_pairs, neighbours
+from tests.core.ingest.doctor.corner import views_of
+
+Damage = Callable[[Views], Views]
+
+
+def inverted(views: Views) -> Views:
+    rotation = np.swapaxes(views.rotation, 1, 2)
+    return views.posed(rotation, -np.einsum("vij,vj->vi", rotation, views.translation))
+
+
+def transposed(views: Views) -> Views:
+    return views.posed(np.swapaxes(views.rotation, 1, 2), views.translation)
+
+
+def flipped(views: Views) -> Views:
+    return views.posed(views.rotation @ CAMERA_CV_FROM_GL, views.translation)
+
+
+def quaternions_reordered(views: Views) -> Views:
+    quat_xyzw = Rotation.from_matrix(views.rotation).as_quat()
+    return views.posed(Rotation.from_quat(quat_xyzw[:, [3, 0, 1, 2]]).as_matrix(), views.translation)
+
+
+@pytest.mark.parametrize(
+    ("damage", "cause"),
+    [
+        (inverted, "poses_inverted"),
+        (transposed, "rotation_transposed"),
+        (flipped, "camera_axes"),
+        (quaternions_reordered, "quaternion_order"),
+    ],
+)
+def test_a_wrong_convention_is_named_and_put_right(damage: Damage, cause: str) -> None:
+    views = views_of(16)
+    finding, mended = find_convention(damage(views), neighbours(views), ())
+    assert finding is not None
+    assert finding.cause == cause
+    assert finding.agreement_so > finding.agreement_given + 0.1
+    np.testing.assert_allclose(mended.rotation, views.rotation, atol=1e-9)
+    np.testing.assert_allclose(mended.translation, views.translation, atol=1e-9)
+
+
+def test_poses_of_other_frames_are_named_by_how_far_they_are_off() -> None:
+    views = views_of(16)
+    late = views.posed(np.roll(views.rotation, 3, axis=0), np.roll(views.translation, 3, axis=0))
+    finding, _ = find_convention(late, neighbours(views), [(3, (views.rotation, views.translation))])
+    assert finding is not None
+    assert finding.cause == "frames_shifted"
+    assert "3 later" in finding.text
+
+
+def test_a_recording_that_was_read_rightly_has_no_finding() -> None:
+    views = views_of(16)
+    finding, same = find_convention(views, neighbours(views), ())
+    assert finding is None
+    assert same is views
+    assert find_scale(views, far_pairs(views, 12)) is None
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.85, 1.18, 5.0])
+def test_depth_of_another_scale_is_named_with_its_factor(factor: float) -> None:
+    views = views_of(16)
+    pairs = far_pairs(views, 12)
+    wrong = replace(views, depth_m=views.depth_m / factor, point_z=views.point_z / factor)
+    finding = find_scale(wrong, pairs)
+    assert finding is not None
+    assert finding.cause == "depth_scale"
+    assert finding.factor == pytest.approx(factor, rel=0.03)  # three hundredths of the step between tried scales and noise
+    assert finding.error_so_mm is not None
+    assert finding.error_so_mm < 20
+
+
+def test_without_a_wide_baseline_no_scale_is_called_wrong() -> None:
+    views = views_of(16)
+    wrong = replace(views, depth_m=views.depth_m / 1.2, point_z=views.point_z / 1.2)
+    assert find_scale(wrong, far_pairs(views, 12)[:3]) is None
