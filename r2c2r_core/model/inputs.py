@@ -94,8 +94,12 @@ class ObjectOverride:
     joint_lower: float | None = None  # of its only joint; rad or m
     joint_upper: float | None = None
     joints: Mapping[str, JointLimits] = field(default_factory=dict)  # by the joint's name or its part's
+    states: Mapping[str, Mapping[int, float]] = field(default_factory=dict)  # by joint as above, by frame: rad or m
     rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
     regenerate: int = 0  # times a reviewer asked for further candidates
+    built_as: str | None = None  # the category whose body and joints it takes, whatever it is called
+    left_out: bool = False  # of what is made from the scan unclicked: it is none of the scene
+    colour: tuple[float, float, float] | None = None  # RGB 0..1, of what no mesh dresses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -22,6 +22,9 @@ from r2c2r_core.arrays import Vector3
 Source = Literal["measured", "at_least", "inferred", "default", "person"]
 """Where a number comes from. `at_least` is said of limits only: the largest opening that was seen, without a stop."""
 
+DOOR, DRAWER = "door", "drawer"
+"""Parts of what has a drawer below its door."""
+
 MotionKind = Literal["revolute", "prismatic", "fixed"]
 
 
@@ -57,7 +60,7 @@ class JointMotion:
     is the point of its axis nearest to that. `fixed` has neither axis nor pivot, and its states are all 0.
     """
 
-    part: str = ""  # which leaf of an object of several: "left", "right", "drawer"; "" where there is one
+    part: str = ""  # which leaf of an object of several: "left", "right", DOOR, DRAWER; "" where there is one
     kind: MotionKind
     axis_world: Vector3 | None  # unit; opening turns about it, or goes along it
     pivot_world: Vector3 | None

@@ -21,6 +21,7 @@ class LoaderResult:
     loader: str
     state: Literal["passed", "failed", "not tried"]
     detail: str
+    steps_per_s: tuple[tuple[int, float], ...] = ()  # worlds at once, and steps of all of them in a second of this machine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +54,24 @@ class ThingResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Gap:
+    """Distances from points of one surface to another."""
+
+    median_m: float
+    p95_m: float  # 95 % of the points lie nearer
+    most_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColliderFit:
+    """How far what an engine touches of a link lies from what is drawn of it."""
+
+    link: str
+    drawn_to_collider: Gap
+    collider_to_drawn: Gap
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """The proof that goes into every bundle."""
 
@@ -65,6 +84,7 @@ class Certificate:
     realtime_factor: float  # simulated seconds per second of one processor core
     things: tuple[ThingResult, ...] = ()
     together_penetration_m: float = float("nan")  # deepest overlap when all joints open at once
+    colliders: tuple[ColliderFit, ...] = ()
     left_out: dict[str, str] = field(default_factory=dict)  # objects that could not be written, with one line each
 
 

@@ -1,5 +1,6 @@
 """An articulated scene: fixtures made of panels, then dressed in the fitted meshes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -9,6 +10,8 @@ from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.model.motion import JointMotion, Source
 
 JointType = Literal["revolute", "prismatic"]
+InsidePart = Literal["depth", "shelves"]
+"""What of the space behind a front may have been seen: how deep it is (of a drawer, its tray), and where its shelves are."""
 Role = Literal["front", "handle", "carcass", "inner"]
 """What a board is to the unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
 body, or something inside that no camera sees (a shelf, a divider, a drawer's tray)."""
@@ -97,6 +100,7 @@ class SceneObject:
     warnings: tuple[str, ...]
     warp_residual_paper_m: float | None = None  # what the paper's affine map leaves of its own four corners, for comparison
     final_from_placed: Rigid3 = field(default_factory=Rigid3)  # how layout and person moved it: a world motion
+    inside_sources: Mapping[InsidePart, Source] = field(default_factory=dict)  # measured, or the fixture's own: default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -42,6 +42,7 @@ class FrontPanel:
     confidence: float  # 0..1
     roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
     edges: tuple[float, ...] = ()  # probability of each edge: left, right, top, bottom; empty where a person drew it
+    right: float = 1.0  # probability that all of them are within 10 mm
     seam: float = 0.0  # probability of the likeliest seam inside it that was not cut
     slides: float = 0.0  # probability that it slides sideways, over what it stands before
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, Strict
 
 from r2c2r_core.model.contradiction import ContradictionRule
+from r2c2r_core.model.handle import HandleKind
 from r2c2r_core.model.motion import Source
 from r2c2r_core.schema.document import Document
 from r2c2r_core.schema.prompts import PromptsFilePoint, Version
@@ -73,6 +74,71 @@ class ManifestMotion(Document):
     inside: ManifestInside | None = Field(description="what was seen behind it")
 
 
+class ManifestRange(Document):
+    """How far a number may be varied for training."""
+
+    distribution: Literal["uniform", "loguniform", "normal"] = Field(
+        description="uniform or loguniform between the ends; normal: about the written value, cut off at them"
+    )
+    low: float = Field(description="the least, in the number's unit")
+    high: float = Field(description="the most")
+    sigma: float | None = Field(description="standard deviation of a normal distribution; null of another")
+    source: Literal["measured", "sourced", "default"] = Field(description="its spread was measured, is published, or a choice")
+    why: str = Field(description="by what")
+
+
+class ManifestJointRanges(Document):
+    """Of one joint."""
+
+    damping: ManifestRange = Field(description="N m s/rad or N s/m")
+    friction: ManifestRange = Field(description="N m or N")
+    armature: ManifestRange = Field(description="kg m2 or kg")
+    upper: ManifestRange = Field(description="rad or m")
+
+
+class ManifestObjectRanges(Document):
+    """Of one object."""
+
+    mass_kg: ManifestRange = Field(description="of all its links; scale them together")
+    friction: ManifestRange = Field(description="of its surfaces")
+    dimensions_m: list[ManifestRange] = Field(min_length=3, max_length=3, description="width, depth, height")
+    colour: ManifestRange = Field(description="added to each of red, green and blue, 0 to 1")
+
+
+class ManifestRoom(Document):
+    """Free lengths round a closed handle in m, at most 0.3: every collider of the scene and the floor counted."""
+
+    before_m: float = Field(description="for a hand of 40 x 90 mm that backs off; for a push, a fingertip of 20 mm")
+    beside_m: tuple[float, float] = Field(strict=False, description="for a finger, from the grip's faces along -y and +y")
+    depth_m: tuple[float, float] = Field(strict=False, description="how deep a finger goes beside it, from its outer face")
+
+
+class ManifestLabels(Document):
+    """What a link or a handle means; the same labels stand in every format."""
+
+    category: str = Field(description="of its object, as a person called it")
+    part: Literal["body", "door", "drawer", "sliding_door", "handle"] = Field(description="what it is to the object")
+    disposition: list[Literal["openable", "graspable", "pushable"]] = Field(description="what can be done to it")
+
+
+class ManifestHandle(Document):
+    """What a hand opens a joint with, closed, in the world; its frame is a gripper's that holds it (x, y, z below)."""
+
+    name: str = Field(description="of the site in scene.xml, the prim in scene.usda, the node in scene.glb")
+    kind: HandleKind = Field(description="bar (room behind it), knob (solid down to the front) or push (nothing to hold)")
+    link: str = Field(description="the link it is a part of")
+    labels: ManifestLabels = Field(description="what it means")
+    centre: _Three = Field(description="m; of a push: on the front's face, by its free edge")
+    axis: _Three = Field(description="unit: x, along the grip or the edge")
+    closing: _Three = Field(description="unit: y, the way fingers close")
+    approach: _Three = Field(description="unit: z, into the front")
+    opening: _Three = Field(description="unit: where the centre first moves as the joint opens")
+    size_m: _Three = Field(description="of the grip along x, y (what fingers close on) and z; a push: its edge, 0, 0")
+    protrusion_m: float = Field(description="from the front's outer face to the grip's")
+    gap_m: float = Field(description="between the grip and the front, where fingers hook in")
+    room: ManifestRoom = Field(description="what is free round it")
+
+
 class ManifestJoint(Document):
     """One joint; 0 is closed, positive opens by the right-hand rule about or along the axis."""
 
@@ -89,6 +155,8 @@ class ManifestJoint(Document):
     confidence: float | None = Field(description="of the hinge's side, 0 to 1; null where there is no choice")
     motion: ManifestMotion | None = Field(default=None, description="as it was filmed; null where it was not seen to move")
     blocked_by: list[ManifestBlocker] = Field(default_factory=list, description="what is in its way when it opens")
+    randomize: ManifestJointRanges | None = Field(default=None, description="how far its numbers may be varied")
+    handles: list[ManifestHandle] = Field(default_factory=list, description="what it is opened with")
 
 
 class ManifestMask(Document):
@@ -185,8 +253,13 @@ class ManifestObject(Document):
     world_from_object: _Pose = Field(description="4x4; origin at the box's centre, front at -Y, +Z up")
     joint: ManifestJoint | None = Field(description="the first of its joints; null where nothing moves")
     joints: list[ManifestJoint] = Field(description="all of its joints")
+    labels: dict[str, ManifestLabels] = Field(default_factory=dict, description="what each of its links means")
     movable: bool = Field(description="whether it stands free")
     dimension_source: _Sources = Field(description="where width, depth and height come from")
+    inside_source: dict[Literal["depth", "shelves"], Source] = Field(
+        default_factory=dict,
+        description="where what its fronts close comes from: measured, seen behind an open front; default, its category's",
+    )
     layout_move_m: float | None = Field(description="m by which the layout moved it")
     mask: ManifestMask | None = Field(description="null for what was made from the scan without clicks")
     candidates: list[ManifestCandidate] = Field(description="meshes that were proposed")
@@ -197,6 +270,7 @@ class ManifestObject(Document):
     seen: ManifestSeen | None = Field(default=None, description="what was seen of it; null where that is not known")
     meshes: ManifestMeshes = Field(description="its files")
     mass_kg: float = Field(gt=0, description="kg of all its links")
+    randomize: ManifestObjectRanges | None = Field(default=None, description="how far its numbers may be varied")
     warnings: list[str] = Field(description="what every stage said about it")
 
 
@@ -227,6 +301,9 @@ class Manifest(Document):
     capture: ManifestCapture = Field(description="the recording")
     world_from_capture: _Pose = Field(description="4x4: the levelled world from the recording's own")
     objects: list[ManifestObject] = Field(description="what the scene holds")
+    states: dict[str, dict[str, float]] = Field(
+        default_factory=dict, description="where each joint stands in closed, ajar and open: keyframes of scene.xml"
+    )
     contradictions: list[ManifestContradiction] = Field(
         default_factory=list, description="what the segmenter's masks, sizes and places contradict"
     )

@@ -8,13 +8,13 @@ from pydantic import AfterValidator, Field, Strict, model_validator
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.model.inputs import HingeSide, JointLimits, ObjectOverride, Overrides
 from r2c2r_core.schema.document import Document
-from r2c2r_core.schema.prompts import MOST_OBJECTS, Version
+from r2c2r_core.schema.prompts import MOST_FRAMES, MOST_OBJECTS, Version
 
 MOST_BATCHES = 20  # of further candidates
 LARGEST_M, SMALLEST_M = 10.0, 0.001  # of a thing in a kitchen
 FARTHEST_M = 1000.0  # from the recording's origin, as readers believe it
 FULL_TURN = 6.3  # rad, or m: no door turns further, no drawer slides as far
-_MOST_REJECTED, _MOST_WALLS, MOST_JOINTS = 1000, 100, 100
+_MOST_REJECTED, _MOST_WALLS, MOST_JOINTS, MOST_MARKS = 1000, 100, 100, 1000
 _RIGID = 0.03  # what rounding to two decimals does to a rotation
 
 
@@ -56,14 +56,32 @@ Pose: TypeAlias = Annotated[list[_Row], Field(min_length=4, max_length=4), After
 Direction: TypeAlias = Annotated[_Three, AfterValidator(_is_direction)]
 Wall: TypeAlias = Annotated[_Three, AfterValidator(_is_wall)]
 Limits: TypeAlias = Annotated[tuple[Opening | None, Opening | None], Strict(False), AfterValidator(_is_ordered)]
+CategoryName: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
+_Share: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
+Colour: TypeAlias = Annotated[tuple[_Share, _Share, _Share], Strict(False)]
 CandidateId: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
+JointName: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
 
 SIZE_SAID = f"[width, depth, height]: three numbers of metres, positive, at most {LARGEST_M:g}"
 POSE_SAID = f"a 4x4 world_from_object: a rotation, and a translation within {FARTHEST_M:g} m"
 LIMITS_SAID = f"[lower, upper] in rad or m within ±{FULL_TURN:g}, null for what stays computed"
 JOINTS_SAID = f"a table of joints, each by its name or its part's, with {LIMITS_SAID}"
+STATES_SAID = "a table of joints as under joints, each with the frames in which a person marked how far it stands open"
 HINGE_SAID = "left, right, top or bottom, as seen by a person facing the front; of a sliding door: where it slides to"
+BUILT_AS_SAID = "a category of the table, whose body and joints it takes, whatever it is called"
+LEFT_OUT_SAID = "true leaves out a worktop or plinth that was made from the scan and nobody clicked"
+COLOUR_SAID = "[red, green, blue] from 0 to 1, of a worktop or plinth that was made from the scan"
 BATCHES_SAID = f"0 to {MOST_BATCHES}: how often further candidates were asked for"
+
+
+class MarkedState(Document):
+    """How far a joint stands open in one frame."""
+
+    frame: int = Field(ge=0, lt=MOST_FRAMES, description="the frame's number")
+    state: Opening = Field(description=f"rad or m within ±{FULL_TURN:g}; 0 is closed")
+
+
+Marks: TypeAlias = Annotated[list[MarkedState], Field(max_length=MOST_MARKS)]
 
 
 class ObjectCorrections(Document):
@@ -76,15 +94,19 @@ class ObjectCorrections(Document):
     dimensions_m: Dimensions | None = Field(default=None, description=SIZE_SAID)
     pose: Pose | None = Field(default=None, description=POSE_SAID)
     joint_limits: Limits | None = Field(default=None, description=f"{LIMITS_SAID}: of the object's only joint")
-    joints: dict[Annotated[str, Field(min_length=1, max_length=200)], Limits] | None = Field(
+    joints: dict[JointName, Limits] | None = Field(
         default=None,
         max_length=MOST_JOINTS,
         description=JOINTS_SAID,
     )
+    states: dict[JointName, Marks] | None = Field(default=None, max_length=MOST_JOINTS, description=STATES_SAID)
     rejected: list[CandidateId] = Field(
         default_factory=list, max_length=_MOST_REJECTED, description="a list of the ids of candidates that a reviewer rejected"
     )
     regenerate: int = Field(default=0, ge=0, le=MOST_BATCHES, description=BATCHES_SAID)
+    built_as: CategoryName | None = Field(default=None, description=BUILT_AS_SAID)
+    left_out: bool = Field(default=False, description=LEFT_OUT_SAID)
+    colour: Colour | None = Field(default=None, description=COLOUR_SAID)
 
     def override(self, candidate: str | None) -> ObjectOverride:
         """The noun of the pipeline, with the candidate as the caller found it."""
@@ -97,8 +119,12 @@ class ObjectCorrections(Document):
             joint_lower=lower,
             joint_upper=upper,
             joints={name: JointLimits(*limits) for name, limits in (self.joints or {}).items()},
+            states={name: {mark.frame: mark.state for mark in marks} for name, marks in (self.states or {}).items()},
             rejected=tuple(self.rejected),
             regenerate=self.regenerate,
+            built_as=self.built_as,
+            left_out=self.left_out,
+            colour=self.colour,
         )
 
 

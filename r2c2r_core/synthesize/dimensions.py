@@ -16,9 +16,9 @@ from r2c2r_core.geometry.boxes import upright_box
 from r2c2r_core.geometry.free_boxes import powell_box, smallest_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.kitchen.category import Category, Size
+from r2c2r_core.kitchen.depth import FrontDepth, believable, front_depth
 from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.kitchen.walls import FrontDepth, front_depth
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import MeshAsset
@@ -40,7 +40,6 @@ class Params:
     """How large an object is and how it stands."""
 
     samples: int = param(6000, "count", "points drawn on a mesh's surface", ge=100)
-    to_wall_m: float = param(0.03, "m", "between a back and the wall it is taken to stand against")
     level: float = param(0.7, "cosine", "rise of an axis, from which on it is the one that points up")
     sure_share: float = param(0.08, "share", "of a depth: one that is known this well was measured")
     sure_m: float = param(0.004, "m", "of a depth: one that is known this well was measured")
@@ -256,19 +255,10 @@ def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarra
 def _believable_depth(
     capture: Capture, track: MaskTrack, spec: Category, low: Vector3, high: Vector3, rotation: np.ndarray
 ) -> tuple[Vector3, Vector3, Source]:
-    """The depth, up to the wall where it ends near or beyond it, and within what the category allows."""
-    depth = float(high[1] - low[1])
-    low, high = low.copy(), high.copy()
+    """The box as deep as can be, and whether that is more than a usual depth."""
     behind = depth_behind(capture, rotation, low, high, spec.depth)
-    source: Source = "inferred"
-    # The sides of a free-standing appliance are seen: it may stand a little off the wall, but not in it
-    near = tuned(Params).to_wall_m if track.kind == "front" else 0.0
-    if behind.wall_m is not None and depth > behind.wall_m - near:
-        depth = behind.wall_m
-    if not spec.depth.holds(depth):
-        depth, source = behind.depth_m, "default" if behind.wall_m is None else "inferred"
-    high[1] = low[1] + depth
-    return low, high, source
+    depth, usual = believable(float(high[1] - low[1]), behind, spec.depth, seen_apart=track.kind != "front")
+    return low, np.array([high[0], low[1] + depth, high[2]]), "default" if usual else "inferred"
 
 
 def depth_behind(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> FrontDepth:

@@ -5,6 +5,7 @@ Of a leaf that slides, its side is where it slides to: away from its pull as a h
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 
@@ -27,6 +28,8 @@ class Params:
         "of half the width: a handle nearer to the middle does not tell its side",
         source="backends.md 2.8: handles at 0.38-0.56 did not",
     )
+    flap_wide: float = param(1.15, "ratio", "of width to height, from where a front may be a flap")
+    flap_low: float = param(0.4, "share", "of half the height, below which a flap's handle is")
     adjacent_m: float = param(0.06, "m", "between two doors that may open as a pair")
     certain_off_centre: float = param(
         0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
@@ -80,7 +83,7 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
             hinges[item.name] = seen
         elif item.spec.opens == "bottom":
             hinges[item.name] = Hinge(side="bottom", source="inferred", reason="the category opens downwards", confidence=None)
-        elif item.spec.opens == "sideways":
+        elif item.spec.opens == "sideways" or item.spec.hinge_share > params.in_pairs:
             hinges[item.name] = _by_category(item, "nothing in the scan tells the side")
         else:
             undecided.append(item)
@@ -123,9 +126,12 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
         side: HingeSide = "left" if x > 0 else "right"
         trust = handle.confidence * min(abs(x) / (params.certain_off_centre * half[0]), 1.0)
         reason = f"the handle is on the {'right' if x > 0 else 'left'}"
-        return Hinge(side=side, source="inferred", reason=reason, confidence=_worth(float(trust)), by_handle=True)
-    wide = item.dimensions_m[0] > 1.15 * item.dimensions_m[2]
-    if item.spec.name == "wall_cabinet" and wide and not handle.is_vertical and z < -0.4 * half[1]:
+        right = _of_its_kind(item, side, _worth(float(trust)))
+        if right < 0.5:
+            return _by_category(item, f"{reason}, as far as it shows, but nearly all are hinged there", 1 - right)
+        return Hinge(side=side, source="inferred", reason=reason, confidence=right, by_handle=True)
+    wide = item.dimensions_m[0] > params.flap_wide * item.dimensions_m[2]
+    if item.spec.flap and wide and not handle.is_vertical and z < -params.flap_low * half[1]:
         reason = "a wide flap with its handle at the lower edge"
         return Hinge(side="top", source="inferred", reason=reason, confidence=_worth(handle.confidence), by_handle=True)
     return None
@@ -135,6 +141,12 @@ def _worth(trust: float) -> float:
     """The share of sides that a handle trusted so (0..1) tells right; one that says nothing leaves two sides."""
     params = tuned(Params)
     return calibrated(0.5 + 0.5 * trust, params.slope, params.offset)
+
+
+def _of_its_kind(item: MeasuredObject, side: HingeSide, seen: float) -> float:
+    """The probability of a side that what was seen gives (0..1), with how often its kind is hinged there (Bayes' rule)."""
+    usual = item.spec.hinge_share if side == item.spec.hinge else 1 - item.spec.hinge_share
+    return calibrated(seen, 1.0, log(usual / (1 - usual)))
 
 
 def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hinges: dict[str, Hinge]) -> Hinge:
@@ -150,9 +162,9 @@ def _from_neighbours(item: MeasuredObject, objects: Sequence[MeasuredObject], hi
     return _by_category(item, "nothing in the scan tells the side")
 
 
-def _by_category(item: MeasuredObject, reason: str) -> Hinge:
+def _by_category(item: MeasuredObject, reason: str, confidence: float | None = None) -> Hinge:
     assert item.spec.hinge is not None  # of every category with a single door
-    return Hinge(side=item.spec.hinge, source="default", reason=reason, confidence=0.5)
+    return Hinge(side=item.spec.hinge, source="default", reason=reason, confidence=confidence or item.spec.hinge_share)
 
 
 def _paired(

@@ -10,12 +10,21 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import Box, ConvexPiece, Inertial
 from r2c2r_core.tuning import param, tuned
 
+_GRAVITY = 9.81  # m/s2
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """Bounds of masses."""
 
     lightest_kg: float = param(0.01, "kg", "of a body", source="lighter bodies make contact solvers stiff", gt=0)
+    shut: float = param(
+        2.0,
+        "ratio",
+        "of the friction of a hinge to the torque by which its leaf's weight would open it",
+        source="own choice: springs and stays of lift-up doors keep them shut",
+        ge=1,
+    )
 
 
 def inertial_of_boxes(boxes: Sequence[Box], density_kg_m3: float) -> Inertial:
@@ -46,6 +55,16 @@ def weighing(inertial: Inertial, usual_kg: tuple[float, float] | None) -> Inerti
         return inertial
     scale = min(max(inertial.mass_kg, usual_kg[0]), usual_kg[1]) / inertial.mass_kg
     return Inertial(mass_kg=inertial.mass_kg * scale, com_link=inertial.com_link, inertia=inertial.inertia * scale)
+
+
+def friction_shut(friction: float, axis: Vector3, leaf: Inertial) -> float:
+    """A hinge's friction (N m) that keeps its closed leaf where it is: a leaf hung on its upper outer edge would swing open.
+
+    `axis` is that of opening, the leaf's frame has its origin on it and +Z up.
+    """
+    weight = np.array([0.0, 0.0, -_GRAVITY * leaf.mass_kg])
+    opening = float(axis @ np.cross(leaf.com_link, weight))
+    return max(friction, tuned(Params).shut * opening)
 
 
 def _box_inertia(mass_kg: float, size_m: Vector3, rotation: np.ndarray) -> np.ndarray:

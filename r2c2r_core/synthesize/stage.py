@@ -1,8 +1,8 @@
 """Placements to an articulated scene of primitives (paper sections 4.4-4.5)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -17,28 +17,32 @@ from r2c2r_core.model.materials import JointFeel
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.motion import JointMotion, Source
 from r2c2r_core.model.placement import Placement
-from r2c2r_core.model.scene import ArticulatedScene, Joint, Link, SceneObject
+from r2c2r_core.model.scene import ArticulatedScene, InsidePart, Joint, Link, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
-from r2c2r_core.synthesize.filmed import as_filmed, filmed, opened_as, opening
+from r2c2r_core.synthesize.filmed import as_filmed, drawer_below, filmed, inside_seen, opened_as, opening, widest
 from r2c2r_core.synthesize.fixtures.boards import Boards
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
-from r2c2r_core.synthesize.fixtures.spec import Motion, Order, Part
+from r2c2r_core.synthesize.fixtures.spec import Build, Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
 from r2c2r_core.synthesize.laps import lapped, with_hidden_edges
 from r2c2r_core.synthesize.layout import arrange, with_outliers
+from r2c2r_core.synthesize.marked import as_marked, part_of
 from r2c2r_core.synthesize.opening import open_all
-from r2c2r_core.synthesize.physics import inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
+from r2c2r_core.synthesize.physics import friction_shut, inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
 from r2c2r_core.synthesize.slabs import Slab
-from r2c2r_core.synthesize.surroundings import standing_clear, surroundings_of
+from r2c2r_core.synthesize.surroundings import as_said, standing_clear, surroundings_of
 from r2c2r_core.synthesize.things import Solid, convex_pieces
 from r2c2r_core.tuning import Changes
 
 Outliers = Literal["leave-out", "keep"]
 _WOOD = (0.80, 0.76, 0.70)
+
+
+Said = TypeVar("Said")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +112,9 @@ def build_scene(
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
     said: list[str] = []
     made = surroundings_of(capture, list(arranged.values()), said) if config.surroundings else []
-    opened += standing_clear(opened, made, _painted, capture.room.walls, kept, said)
+    found, sized = as_said(made, overrides)
+    opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
+    opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person said, whatever it touches
     return ArticulatedScene(
         name=capture.name,
         objects=tuple(opened),
@@ -127,7 +133,7 @@ def _measured(
     config: SynthesizeConfig,
 ) -> MeasuredObject:
     """Its size and pose, and what a person should know of it so far."""
-    spec, notice = named(track.category)
+    spec, notice = named(override.built_as or track.category)
     item = measure_object(capture, track, placement, asset, spec, override, seed=config.seed, box_search=config.box)
     spec, moved = opened_as(item.spec, item.motions, item.placed_pose)
     notices = [one for one in (notice, moved) if one]
@@ -146,16 +152,26 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         handles=item.handles,
         laps=item.laps,
         carcass=carcass,
+        inside=inside_seen(item),
+        below=drawer_below(item),
     )
     build = fixture.build(order)
     base, *movers = build.parts
-    seen = {motion.part: filmed(item, motion) for motion in build.motions}
+    marks, unmarked = _by_part(item.name, [motion.part for motion in build.motions], override.states)
+    seen = {
+        motion.part: as_marked(
+            filmed(item.motions, item.placed_pose, motion), marks.get(motion.part, {}), motion, item.placed_pose
+        )
+        for motion in build.motions
+    }
     motions = {motion.part: as_filmed(motion, seen[motion.part], item.placed_pose) for motion in build.motions}
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
     said, unheard = _limits_said(item.name, list(motions), override)
     joints = [_joint(item, motion, fixture.feel, hinge, said.get(part), seen[part]) for part, motion in motions.items()]
-    warnings = [*item.warnings, *build.notes, *unheard, *(line for joint in joints if (line := _open_ended(joint)))]
+    leaves = {link.name: link for link in links}
+    joints = [_kept_shut(joint, leaves[joint.child]) for joint in joints]
+    warnings = [*item.warnings, *build.notes, *unheard, *unmarked, *(line for joint in joints if (line := _open_ended(joint)))]
     if hinge is not None and hinge.source == "default":
         said_of = "slides to the" if item.spec.opens == "sideways" else "hinge on the"
         warnings.append(f"{said_of} {hinge.side} by default: {hinge.reason}")
@@ -172,7 +188,14 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         warp_residual_m=None,
         warnings=tuple(warnings),
         final_from_placed=item.world_from_object @ item.placed_pose.inverse,
+        inside_sources=_inside_sources(build),
     )
+
+
+def _inside_sources(build: Build) -> dict[InsidePart, Source]:
+    """Of what opens: whether the depth and the shelves behind its front were seen."""
+    parts: tuple[InsidePart, ...] = get_args(InsidePart) if build.motions else ()
+    return {part: "measured" if part in build.as_seen else "default" for part in parts}
 
 
 def _painted(item: MeasuredObject, slab: Slab) -> SceneObject:
@@ -241,18 +264,23 @@ def _limits_said(name: str, parts: Sequence[str], override: ObjectOverride) -> t
         else:
             meant = f"under joints, name any of {', '.join(parts)}" if parts else "it has none"
             unheard.append(f"joint_limits is for an object of one joint and was not used: {meant}")
-    for joint, limits in override.joints.items():
-        part = next((part for part in parts if joint in (part, _joint_name(name, part))), None)
-        if part is None:
-            unheard.append(f"limits of a joint {joint} were not used: its joints are {', '.join(parts) or 'none'}")
-        else:
-            said[part] = limits
-    return said, tuple(unheard)
+    named, unknown = _by_part(name, parts, override.joints)
+    return said | named, (*unheard, *unknown)
+
+
+def _by_part(name: str, parts: Sequence[str], said: Mapping[str, Said]) -> tuple[dict[str, Said], tuple[str, ...]]:
+    """What a person said of joints, each by its own name or its part's, by part; and what no joint could take."""
+    meant = {joint: next((part for part in parts if joint in (part, _joint_name(name, part))), None) for joint in said}
+    there = ", ".join(parts) or "none"
+    unheard = [
+        f"what was said of a joint {joint} was not used: its joints are {there}" for joint, part in meant.items() if not part
+    ]
+    return {part: said[joint] for joint, part in meant.items() if part}, tuple(unheard)
 
 
 def _uppers_said(item: SceneObject, override: ObjectOverride) -> set[str]:
     """Names of the object's joints whose upper limit a person gave."""
-    names = {joint.child.removeprefix(f"{item.name}_"): joint.name for joint in item.joints}
+    names = {part_of(joint, item.name): joint.name for joint in item.joints}
     said, _ = _limits_said(item.name, list(names), override)
     return {names[part] for part, limits in said.items() if limits.upper is not None}
 
@@ -291,6 +319,12 @@ def _joint(
     )
 
 
+def _kept_shut(joint: Joint, leaf: Link) -> Joint:
+    if joint.type == "prismatic":
+        return joint
+    return replace(joint, friction=friction_shut(joint.friction, joint.axis_object, leaf.inertial))
+
+
 def _limits(
     item: MeasuredObject, motion: Motion, said: JointLimits | None, seen: JointMotion | None
 ) -> tuple[float, float, Source]:
@@ -298,16 +332,11 @@ def _limits(
 
     What a person said of one end leaves the other as it was found.
     """
-    upper, source = opening(motion, seen, _most(item, motion))
+    upper, source = opening(motion, seen, widest(motion.axis_object, motion.type, item.dimensions_m))
     if said is None or said == (None, None):
         return 0.0, upper, source
     lower = 0.0 if said.lower is None else said.lower
     return lower, max(lower, upper if said.upper is None else said.upper), "person"
-
-
-def _most(item: MeasuredObject, motion: Motion) -> float:
-    """How far it can open at all: a drawer as deep as its unit, a leaf that slides its own length, a door half a turn."""
-    return np.pi if motion.type == "revolute" else float(np.abs(motion.axis_object) @ item.dimensions_m)
 
 
 def _open_ended(joint: Joint) -> str | None:

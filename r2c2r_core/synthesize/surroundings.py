@@ -1,7 +1,7 @@
 """What closes a kitchen and nobody clicks: worktops and plinths, from the scan, in the way of nothing."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -11,6 +11,8 @@ from r2c2r_core.geometry.boxes import Boxes, box_penetration
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Wall
+from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.motion import Source
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.clearance import gathered, link_boxes, open_freely
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -78,6 +80,30 @@ def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: l
                 boards += plinths(facets, run, objects, boards)
     names = {item.name for item in objects}
     return [*_named("counter", counters, names), *_named("plinth", boards, names)]
+
+
+def as_said(made: Sequence[Surrounding], overrides: Overrides) -> tuple[list[Surrounding], list[Surrounding]]:
+    """What stands where it was found, and what a person sized or moved; what they left out is in neither."""
+    kept = [_corrected(item, overrides.of(item.name)) for item in made if not overrides.of(item.name).left_out]
+    moved = {item.name for item in kept if _is_placed(overrides.of(item.name))}
+    return [item for item in kept if item.name not in moved], [item for item in kept if item.name in moved]
+
+
+def _is_placed(said: ObjectOverride) -> bool:
+    return said.pose is not None or said.dimensions_m is not None
+
+
+def _corrected(item: Surrounding, said: ObjectOverride) -> Surrounding:
+    slab = item.slab if said.colour is None else replace(item.slab, colour=said.colour)
+    if not _is_placed(said):
+        return replace(item, slab=slab)
+    found = item.measured(slab)
+    pose = found.world_from_object if said.pose is None else Rigid3.from_matrix(said.pose)
+    size_m = found.dimensions_m if said.dimensions_m is None else said.dimensions_m
+    centre = pose.rotation.T @ pose.translation
+    sources: tuple[Source, Source, Source] = slab.sources if said.dimensions_m is None else ("person", "person", "person")
+    low, high = centre - size_m / 2, centre + size_m / 2
+    return replace(item, slab=replace(slab, rotation=pose.rotation, low=low, high=high, sources=sources, flush_m=None))
 
 
 def standing_clear(

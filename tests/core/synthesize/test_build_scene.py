@@ -1,6 +1,7 @@
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
+from r2c2r_core.model.motion import Inside
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.synthesize import stage
@@ -171,7 +173,7 @@ def test_limits_of_one_of_several_joints_name_it() -> None:
     left, right = sorted(item.joints, key=lambda joint: joint.name)
     assert (left.lower, left.upper, left.sources["limits"]) == (0.0, 1.0, "person")
     assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "person")
-    assert any("limits of a joint lid were not used: its joints are left_door, right_door" in w for w in item.warnings)
+    assert any("what was said of a joint lid was not used: its joints are left_door, right_door" in w for w in item.warnings)
 
 
 def test_limits_that_name_no_joint_move_none_of_several() -> None:
@@ -244,6 +246,22 @@ def test_a_door_that_was_filmed_open_tells_its_hinge_and_where_it_stops(way: str
     assert any("seen open" in w for w in item.warnings) == (not stop_seen)
 
 
+@pytest.mark.parametrize(("way", "opens_by_itself"), [("top", True), ("bottom", False), ("right", False)])
+def test_no_door_swings_open_by_its_own_weight(way: str, opens_by_itself: bool) -> None:
+    """A leaf hung on its upper outer edge has its weight behind the hinge."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    track = replace(track, motions=(motion({5: 1.0}, way, world_from_front=track.front.world_from_front),))
+    scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
+    model = compile_scene(scene)
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    pull = -float(state.qfrc_bias[0])  # what gravity does to the closed joint
+    assert (pull > 0.1) == opens_by_itself
+    assert model.dof_frictionloss[0] > max(pull, 0.0)
+
+
 def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
     """Within what both are known to, the edge is taken: doors then clear their neighbours."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
@@ -257,6 +275,65 @@ def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
         item = build_scene(capture(), [moved], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
         origins.append(item.joints[0].origin_object[0])
     np.testing.assert_allclose(origins, [-0.25, -0.22], atol=0.003)
+
+
+def test_a_hinge_filmed_near_its_fronts_edge_is_between_them_and_its_leaf_swings_clear() -> None:
+    """Concealed hinges turn inside the edge; a rigid leaf about a line behind its face would swing into its neighbour."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    place = track.front.world_from_front
+    inside = Rigid3(place.rotation, place.apply(np.array([[0.008, 0.008, 0.0]]))[0])
+    track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
+    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+    edge = np.array([-item.dimensions_m[0] / 2, -item.dimensions_m[1] / 2])
+    inwards, behind = item.joints[0].origin_object[:2] - edge
+    assert 0.005 < inwards < 0.008
+    assert 0.002 < behind < 0.008
+    assert np.hypot(inwards, behind) - inwards < 0.0011
+
+
+def test_what_was_seen_behind_an_open_front_is_built_there() -> None:
+    """What was not stays the category's, and says so."""
+    made = {}
+    for category, way, inside in (
+        ("cabinet", "left", Inside(depth_m=0.45, shelves_m=(0.2, 0.41))),
+        ("cabinet", "left", Inside(shelves_m=(0.2,))),
+        ("cabinet", "left", None),
+        ("drawer", "out", Inside(depth_m=0.4)),
+    ):
+        track, placement, asset = placed_unit(Unit("a", category, (0, 0, 0.5), (0.5, 0.58, 0.7)), np.random.default_rng(0))
+        assert track.front is not None
+        seen = replace(motion({5: 0.4}, way, world_from_front=track.front.world_from_front), inside=inside)
+        scene = build_scene(
+            capture(), [replace(track, motions=(seen,))], [placement], [asset], Overrides(objects={}), SynthesizeConfig()
+        )
+        made[inside if way == "left" else "drawer"] = scene.objects[0]
+    both, shelf, none, drawer = made.values()
+    assert [item.inside_sources for item in made.values()] == [
+        {"depth": "measured", "shelves": "measured"},
+        {"depth": "default", "shelves": "measured"},
+        {"depth": "default", "shelves": "default"},
+        {"depth": "measured", "shelves": "default"},
+    ]
+    assert _clear_depth(both, "front", "back") == pytest.approx(0.45, abs=1e-6)
+    assert _clear_depth(shelf, "front", "back") == pytest.approx(_clear_depth(none, "front", "back"), abs=1e-6)
+    assert _clear_depth(drawer, "front", "tray_back") == pytest.approx(0.4, abs=1e-6)
+    floor = _span(both, "bottom", 2)[1]
+    uppers = [_span(both, name, 2)[1] - floor for name in ("shelf_0", "shelf_1")]
+    np.testing.assert_allclose(uppers, [0.2, 0.41], atol=1e-6)
+    assert {box.role for box in both.links[0].boxes if box.name.startswith("shelf")} == {"inner"}
+
+
+def _clear_depth(item: SceneObject, front: str, rear: str) -> float:
+    return float(_span(item, rear, 1)[0] - _span(item, front, 1)[1])
+
+
+def _span(item: SceneObject, board: str, axis: int) -> tuple[float, float]:
+    """From where to where a board reaches along an axis of the object."""
+    link, box = next((link, box) for link in item.links for box in link.boxes if box.name == board)
+    middle = (link.object_from_link @ box.link_from_box).translation[axis]
+    return middle - box.size_m[axis] / 2, middle + box.size_m[axis] / 2
 
 
 @pytest.mark.parametrize(
@@ -290,6 +367,34 @@ def test_each_door_of_a_pair_has_the_motion_of_its_own() -> None:
     left, right = sorted(item.joints, key=lambda joint: joint.name)
     assert (left.motion, left.sources["limits"]) == (None, "default")
     assert (right.motion, right.sources["limits"], right.upper) == (seen, "measured", 1.2)
+
+
+@pytest.mark.parametrize(
+    ("category", "width_m", "doors"),
+    [("refrigerator", 0.7, {"door"}), ("french_door_refrigerator", 0.9, {"left_door", "right_door"})],
+)
+def test_a_drawer_filmed_below_a_refrigerators_doors_is_built_there(category: str, width_m: float, doors: set[str]) -> None:
+    track, placement, asset = placed_unit(
+        Unit("a", category, (0, 0, 0.88), (width_m, 0.65, 1.75), kind="appliance"), np.random.default_rng(0)
+    )
+    assert track.front is not None
+    place = track.front.world_from_front
+    middle = Rigid3(place.rotation, place.apply(np.array([[0.0, 0.0, -0.575]]))[0])
+    seen = motion({5: 0.3}, "out", world_from_front=middle, size_m=(width_m, 0.6), part="drawer")
+    scene = build_scene(
+        capture(), [replace(track, motions=(seen,))], [placement], [asset], Overrides(objects={}), SynthesizeConfig()
+    )
+    item = scene.objects[0]
+    moving = {joint.child.removeprefix("a_"): joint for joint in item.joints}
+    assert set(moving) == doors | {"drawer"}
+    drawer = moving.pop("drawer")
+    assert (drawer.type, drawer.motion) == ("prismatic", seen)
+    assert all(joint.type == "revolute" and joint.motion is None for joint in moving.values())
+    front = next(box for link in item.links if link.name == "a_drawer" for box in link.boxes if box.role == "front")
+    assert front.size_m[2] == pytest.approx(0.6, abs=0.01)
+    model = compile_scene(scene)
+    assert deepest_contact(model) < 5e-4
+    assert max(sweep(scene, model).values()) < 5e-4
 
 
 def test_how_far_a_door_was_seen_open_says_nothing_of_the_other_edge() -> None:

@@ -3,6 +3,7 @@
 import importlib.util
 import itertools
 import tomllib
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
@@ -147,3 +148,14 @@ def closure(requirements: list[str]) -> set[str]:
         extras = ("", *wanted.extras)
         waiting += [r for r in further if r.marker is None or any(r.marker.evaluate({"extra": e}) for e in extras)]
     return {name for name, _ in brought}
+
+
+def test_a_depth_seen_inside_thins_the_front_and_one_that_does_not_fit_is_not_built() -> None:
+    """A machine's door is no thicker than what its clear depth leaves."""
+    machine = CarcassPlan(dimensions_m=np.array([0.6, 0.62, 1.8]), fronts=("door",), front_m=0.05)
+    seen, too_deep = replace(machine, inner_depth_m=0.59), replace(machine, inner_depth_m=0.7)
+    assert (machine.keeps_depth, seen.keeps_depth, too_deep.keeps_depth) == (False, True, False)
+    assert machine.front_board_m == pytest.approx(0.05)
+    assert seen.front_board_m == pytest.approx(0.027)
+    assert seen.rear_y_m - (seen.front_board_m - 0.31) == pytest.approx(0.59)
+    assert too_deep.rear_y_m == machine.rear_y_m

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,18 @@ def test_the_hinge_is_opposite_the_handle(x: float, side: str, from_track: bool,
     items = measured(door("a", 0, Handle(x, 0.1), category, with_track_handle=from_track))
     hinge = choose_hinges(items, Overrides(objects={}))["a"]
     assert (hinge.side, hinge.source) == (side, "inferred")
+
+
+@pytest.mark.parametrize(
+    ("category", "trusted", "side"), [("microwave", 0.3, "left"), ("microwave", 0.99, "right"), ("cabinet", 0.3, "right")]
+)
+def test_what_may_be_a_handle_tells_no_side_of_a_kind_that_is_hinged_on_the_other(
+    category: str, trusted: float, side: str
+) -> None:
+    (item,) = measured(door("a", 0, Handle(-0.2, 0.1), category))
+    assert item.handle is not None
+    item = replace(item, handle=replace(item.handle, confidence=trusted))
+    assert choose_hinges([item], Overrides(objects={}))["a"].side == side
 
 
 def test_a_person_overrules_the_handle() -> None:
