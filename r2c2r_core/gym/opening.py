@@ -1,0 +1,122 @@
+"""r2c2r/Open-v0: open one joint."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import BundleError
+from r2c2r_core.gym.robot_env import Observation, RobotEnv, tool_state
+from r2c2r_core.robot.grasps import BACK_M, Way, best_way
+from r2c2r_core.robot.motion import Travel, travel_of
+from r2c2r_core.robot.opening import OPEN_SHARE, joints_of
+from r2c2r_core.robot.rig import Rig
+
+STATE = 20
+_LOOKS = 21  # along the joint's travel
+
+
+class OpenEnv(RobotEnv):
+    """The joint opened to 90 % of its travel ends the episode; one without a handle starts thrown out by its push latch.
+
+    State (20): the tool in the frame of its grasp on the part (3, m), the approach and stroke axes of that grasp in the world
+    (6), of the tool (6), width in strokes, share opened, its speed a second, whether a pad touches the part, force of the base
+    in 100 N. Reward: 5 times the share gained, and the metres by which the tool came nearer to its grasp; 1 at success.
+    """
+
+    def __init__(
+        self,
+        bundle: str | Path,
+        joint: str,
+        *,
+        observation: Observation = "state",
+        grip_n: float = 40.0,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
+        self.joint = joint
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """A scene, this joint closed, and others that stand ajar in its way; the rest as they stand there."""
+        rig = self.begin(seed, options)
+        if self.joint not in joints_of(rig.model):
+            raise BundleError(f"joint {self.joint}: there is none", hint=f"there are {', '.join(joints_of(rig.model))}")
+        travel = travel_of(rig, self.joint)
+        rig.data.qpos[rig.model.joint(self.joint).qposadr[0]] = 0.0
+        if travel is not None:
+            close_in_the_way(rig, travel)
+        way = None if travel is None else best_way(rig, travel)
+        if travel is None or way is None:
+            raise BundleError(f"joint {self.joint}: nothing of it can be held or pushed", hint="r2c2r check --gripper says why")
+        self.travel: Travel = travel
+        self.way: Way = replace(way, presses=None)
+        rig.data.qpos[travel.address] = way.opens.starts
+        self.put_before(way.opens.world_from_tool(travel, way.opens.starts), 2 * BACK_M)
+        self._before = self._progress()
+        return self.observed(self._state()), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """0.05 s."""
+        self.move(action)
+        now, before = self._progress(), self._before
+        self._before = now
+        done = now[0] >= OPEN_SHARE
+        reward = 5.0 * (now[0] - before[0]) + (before[1] - now[1]) + float(done)
+        return self.observed(self._state()), float(reward), done, False, self._info()
+
+    def view(self) -> tuple[Vector3, Vector3]:
+        """The front."""
+        pose = self.travel.world_from_closed
+        return pose.apply(self.travel.part.front.centre[None])[0], -pose.rotation[:, 1]
+
+    def _progress(self) -> tuple[float, float]:
+        """Share opened, and metres to the grasp."""
+        position = self.travel.position(self.rig)
+        goal = self.way.opens.world_from_tool(self.travel, position).translation
+        return position / self.travel.upper, float(np.linalg.norm(goal - self.rig.world_from_tool.translation))
+
+    def _state(self) -> np.ndarray:
+        rig, travel = self.rig, self.travel
+        goal = self.way.opens.world_from_tool(travel, travel.position(rig))
+        inside = goal.inverse.apply(rig.world_from_tool.translation[None])[0]
+        speed = float(rig.data.qvel[rig.model.joint(self.joint).dofadr[0]]) / travel.upper
+        touching = any(pull.body == travel.part.body and pull.geom in rig.pads for pull in rig.pulls())
+        share = travel.position(rig) / travel.upper
+        rest = [share, speed, float(touching), rig.base_force_n / 100]
+        return np.array([*inside, *goal.rotation[:, 0], *goal.rotation[:, 1], *tool_state(rig), *rest])
+
+    def _info(self) -> dict[str, Any]:
+        share, away_m = self._progress()
+        return {"opened": share, "to_grasp_m": away_m, "success": share >= OPEN_SHARE, "method": self.way.method}
+
+
+def close_in_the_way(rig: Rig, travel: Travel) -> None:
+    """Close the joints whose parts, as they stand ajar, the part would run into."""
+    import mujoco
+
+    scratch, model = mujoco.MjData(rig.model), rig.model
+    own = _joint_moving(model, travel.part.body)
+    for share in np.linspace(0.0, 1.0, _LOOKS):
+        scratch.qpos[:] = rig.data.qpos
+        scratch.qpos[travel.address] = share * travel.upper
+        mujoco.mj_kinematics(model, scratch)
+        mujoco.mj_comPos(model, scratch)
+        mujoco.mj_collision(model, scratch)
+        for pair in scratch.contact.geom[: scratch.ncon]:
+            joints = [_joint_moving(model, int(model.geom_bodyid[geom])) for geom in pair]
+            if own in joints:
+                other = joints[0] if joints[1] == own else joints[1]
+                if other is not None and other != own:
+                    rig.data.qpos[model.jnt_qposadr[other]] = 0.0
+
+
+def _joint_moving(model: Any, body: int) -> int | None:
+    """The hinge or slide that moves a body, if one does."""
+    while body:
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        if count and model.jnt_type[first] in (2, 3) and not model.joint(first).name.startswith("gripper/"):
+            return first
+        body = int(model.body_parentid[body])
+    return None

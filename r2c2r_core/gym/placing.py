@@ -1,0 +1,104 @@
+"""r2c2r/PickPlace-v0: pick up one thing and put it down 10 cm further."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.arrays import Vector3
+from r2c2r_core.errors import BundleError
+from r2c2r_core.gym.robot_env import Observation, RobotEnv, tool_state
+from r2c2r_core.robot.grasps import BACK_M, body_words
+from r2c2r_core.robot.picking import NEAR_M, Pick, plan_pick, things_of
+
+STATE = 20
+_UPRIGHT = np.cos(np.deg2rad(15.0))
+_REST_M_S = 0.02
+
+
+class PickPlaceEnv(RobotEnv):
+    """The thing upright, at rest, let go and within 3 cm of its goal ends the episode, once it was lifted.
+
+    State (20): the tool from its grasp on the thing where that stands now (3, m), the thing from its goal (3), its up axis (3),
+    its velocity (3), the tool's axes (6) and width in strokes, how high it was lifted at most (m). Reward: metres by which the
+    tool came nearer to its grasp, 5 times those by which the thing came nearer to its goal; 1 at success.
+    """
+
+    def __init__(
+        self,
+        bundle: str | Path,
+        thing: str,
+        *,
+        observation: Observation = "state",
+        grip_n: float = 40.0,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
+        self.thing = thing
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """A scene, and the goal 10 cm beside the thing."""
+        import mujoco
+
+        rig = self.begin(seed, options)
+        mujoco.mj_forward(rig.model, rig.data)
+        things = {body_words(rig.model, body): body for body in things_of(rig.model)}
+        body = next((b for name, b in things.items() if name == self.thing or name.startswith(f"{self.thing}_")), None)
+        if body is None:
+            raise BundleError(f"thing {self.thing}: there is none", hint=f"there are {', '.join(things) or 'no free things'}")
+        pick = plan_pick(rig, body)
+        if isinstance(pick, str):
+            raise BundleError(f"thing {self.thing}: {pick}", hint="take another thing or variant")
+        self.pick: Pick = pick
+        self._start = rig.data.xpos[body].copy()
+        self._lifted_m = 0.0
+        self.put_before(pick.grasp, 1.5 * BACK_M)
+        self._before = self._distances()
+        return self.observed(self._state()), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """0.05 s."""
+        self.move(action)
+        self._lifted_m = max(self._lifted_m, float(self._at[2] - self._start[2]))
+        now, before = self._distances(), self._before
+        self._before = now
+        done = self._success()
+        reward = (before[0] - now[0]) + 5.0 * (before[1] - now[1]) + float(done)
+        return self.observed(self._state()), float(reward), done, False, self._info()
+
+    def view(self) -> tuple[Vector3, Vector3]:
+        """The thing's first place, from where the gripper comes."""
+        approach = self.pick.grasp.rotation[:, 0]
+        level = np.array([-approach[0], -approach[1], 0.0])
+        length = float(np.linalg.norm(level))
+        return self._start, level / length if length > 0.1 else np.array([0.0, -1.0, 0.0])
+
+    @property
+    def _at(self) -> Vector3:
+        return np.asarray(self.rig.data.xpos[self.pick.body])
+
+    def _distances(self) -> tuple[float, float]:
+        """Metres from the tool to the grasp, and from the thing to its goal."""
+        tool = self.rig.world_from_tool.translation - (self.pick.grasp.translation + self._at - self._start)
+        return float(np.linalg.norm(tool)), float(np.linalg.norm(self._at - self._start - self.pick.shift))
+
+    def _velocity(self) -> np.ndarray:
+        first = int(self.rig.model.jnt_dofadr[self.rig.model.body_jntadr[self.pick.body]])
+        return np.asarray(self.rig.data.qvel[first : first + 3])
+
+    def _up(self) -> np.ndarray:
+        return np.asarray(self.rig.data.xmat[self.pick.body].reshape(3, 3)[:, 2])
+
+    def _success(self) -> bool:
+        there = self._distances()[1] < NEAR_M and self._up()[2] > _UPRIGHT and self._lifted_m > NEAR_M / 2
+        still = float(np.linalg.norm(self._velocity())) < _REST_M_S
+        return bool(there and still and not any(pull.body == self.pick.body for pull in self.rig.pulls()))
+
+    def _state(self) -> np.ndarray:
+        tool = self.rig.world_from_tool.translation - (self.pick.grasp.translation + self._at - self._start)
+        off = self._at - self._start - self.pick.shift
+        return np.array([*tool, *off, *self._up(), *self._velocity(), *tool_state(self.rig), self._lifted_m])
+
+    def _info(self) -> dict[str, Any]:
+        to_grasp_m, to_goal_m = self._distances()
+        return {"to_grasp_m": to_grasp_m, "to_goal_m": to_goal_m, "lifted_m": self._lifted_m, "success": self._success()}

@@ -1,0 +1,116 @@
+"""A bundle's scene with an arm in it, which stands where it is told."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.robot import panda
+from r2c2r_core.robot.kinematics import Chain, chain_of, solve
+from r2c2r_core.robot.motion import about
+from r2c2r_core.robot.rig import PREFIX, Rig, compiled_with, hand_of
+
+_FOLLOWED = 2  # iterations from one command to the next
+_FOUND = 60  # from anywhere
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class Stand(NamedTuple):
+    """Where the arm stands on the floor, and how high its root is lifted."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    lift_m: float
+
+    @property
+    def world_from_base(self) -> Rigid3:
+        """Of the arm's root."""
+        return Rigid3(about(_UP, self.yaw_rad), np.array([self.x_m, self.y_m, self.lift_m]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Arm(Rig):
+    """The arm: its joints are driven through springs to the angles that bring its tool somewhere."""
+
+    chain: Chain
+    angles: np.ndarray  # (7,) addresses in qpos
+    drives: np.ndarray  # (7,) actuators
+    mocap: int  # of its root
+    start: np.ndarray  # (7,) the angles from which `put` looks for others; written to
+
+    def stand(self, stand: Stand, start: np.ndarray) -> None:
+        """Set its base down, and the angles it begins with."""
+        base = stand.world_from_base
+        self.data.mocap_pos[self.mocap] = base.translation
+        self.data.mocap_quat[self.mocap] = (np.cos(stand.yaw_rad / 2), 0.0, 0.0, np.sin(stand.yaw_rad / 2))
+        self.start[:] = start
+
+    @property
+    def world_from_base(self) -> Rigid3:
+        """Where its root is."""
+        w, _, _, z = self.data.mocap_quat[self.mocap]
+        return Rigid3(about(_UP, 2 * float(np.arctan2(z, w))), self.data.mocap_pos[self.mocap].copy())
+
+    @property
+    def base_force_n(self) -> float:
+        """What it pulls or pushes everything with."""
+        import mujoco
+
+        net, force, contacts = np.zeros(3), np.zeros(6), self.data.contact
+        for number, (a, b) in enumerate(contacts.geom[: self.data.ncon]):
+            if (a in self.own) != (b in self.own):
+                mujoco.mj_contactForce(self.model, self.data, number, force)
+                net += (1.0 if a in self.own else -1.0) * force[:3] @ contacts.frame[number].reshape(3, 3)
+        return float(np.linalg.norm(net))
+
+    def meets_itself(self) -> bool:
+        """Whether links of it overlap now."""
+        contacts = self.data.contact
+        return any(
+            a in self.own and b in self.own and contacts.dist[number] < 0
+            for number, (a, b) in enumerate(contacts.geom[: self.data.ncon])
+        )
+
+    def put(self, pose: Rigid3, width_m: float) -> None:
+        """Bring the tool somewhere at once, from the angles it starts with."""
+        self.bend(self._angles(pose, self.start, _FOUND), width_m)
+        self.data.ctrl[self.drives] = self.data.qpos[self.angles]
+        self.data.ctrl[self.width] = width_m
+
+    def bend(self, angles: np.ndarray, width_m: float) -> None:
+        """Set its joints."""
+        self.data.qpos[self.angles] = angles
+        self.data.qpos[self.fingers] = width_m / 2
+
+    def command(self, pose: Rigid3, width_m: float) -> None:
+        """Where the tool is to be driven: on from the angles that were commanded last."""
+        self.data.ctrl[self.drives] = self._angles(pose, self.data.ctrl[self.drives], _FOLLOWED)
+        self.data.ctrl[self.width] = width_m
+
+    def _angles(self, pose: Rigid3, start: np.ndarray, iterations: int) -> np.ndarray:
+        return solve(self.chain, (self.world_from_base.inverse @ pose).matrix[None], start[None], iterations).angles[0]
+
+
+def arm_in(scene: Path, change: Callable[[Any], None] | None = None) -> Arm:
+    """The arm in a scene.xml, at the origin.
+
+    Raises ValueError where scene.xml is none, BackendUnavailable without the extra.
+    """
+    import mujoco
+
+    model = compiled_with(scene, panda.panda_spec(), change)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    names = tuple(PREFIX + name for name in panda.JOINTS)
+    return Arm(
+        chain=chain_of(model, names, f"{PREFIX}tool", panda.RESTS),
+        angles=np.array([model.joint(name).qposadr[0] for name in names]),
+        drives=np.array([model.actuator(name).id for name in names]),
+        mocap=int(model.body(PREFIX + panda.ROOT).mocapid[0]),
+        start=np.array(panda.RESTS),
+        **hand_of(model, data, PREFIX + panda.ROOT),
+    )

@@ -1,0 +1,22 @@
+"""The arms that may try every joint of a bundle; the first is none, which needs nothing and is the default."""
+
+from typing import Any
+
+from r2c2r_core.registry import Backend, Registry
+
+NO_ARM = "none"
+
+ARMS: Registry[Any] = Registry(
+    seam="arm",
+    own=(
+        Backend(name=NO_ARM, target="", licence="", summary="no arm tries the joints"),
+        Backend(
+            name="panda",
+            target="r2c2r_core.robot.panda:panda_spec",
+            extra="arm",
+            needs=("pybullet_data",),
+            licence="Apache-2.0 (its description, which pybullet's wheel ships)",
+            summary="a Franka Panda opens what it reaches; the floor plan shows where it stands (half a minute)",
+        ),
+    ),
+)

@@ -1,0 +1,90 @@
+"""Where a moving part is at each position of its joint, and where the tool goes with it."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.robot.handles import Part, part_of
+from r2c2r_core.robot.rig import Rig
+
+_HINGE = 3  # mjtJoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Travel:
+    """One joint's way, in the world."""
+
+    part: Part
+    hinged: bool
+    axis: Vector3
+    anchor: Vector3  # on the axis
+    world_from_closed: Rigid3  # of the part's body
+    upper: float  # rad or m, from the closed position
+    address: int  # of its position in qpos
+
+    def world_from_body(self, position: float) -> Rigid3:
+        """The part's pose there."""
+        if not self.hinged:
+            return Rigid3(self.world_from_closed.rotation, self.world_from_closed.translation + position * self.axis)
+        turn = about(self.axis, position)
+        shift = self.anchor + turn @ (self.world_from_closed.translation - self.anchor)
+        return Rigid3(turn @ self.world_from_closed.rotation, shift)
+
+    def radius_of(self, point_body: Vector3) -> float:
+        """Metres that a point of the part travels per radian, or per metre."""
+        if not self.hinged:
+            return 1.0
+        arm = self.world_from_closed.apply(point_body[None])[0] - self.anchor
+        return float(np.linalg.norm(np.cross(self.axis, arm)))
+
+    def position(self, rig: Rig) -> float:
+        """Of the joint now."""
+        return float(rig.data.qpos[self.address])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hold:
+    """A grasp: where the tool stands on the part, and how the wrist goes with it."""
+
+    body_from_tool: Rigid3
+    wide_m: float  # between the pads on the way there
+    held_m: float  # between the pads when they touch
+    starts: float = 0.0  # position of the joint from which on it holds
+    follow: float = 1.0  # how much of a hinge's turn the wrist follows; less, and the bar turns between the pads
+
+    def world_from_tool(self, travel: Travel, position: float, back_m: float = 0.0) -> Rigid3:
+        """The tool's pose at a position of the joint, or `back_m` before it along the approach."""
+        pose = travel.world_from_body(position) @ self.body_from_tool
+        rotation = pose.rotation
+        if travel.hinged and self.follow < 1.0:
+            rotation = about(travel.axis, (self.follow - 1.0) * position) @ rotation
+        return Rigid3(rotation, pose.translation - back_m * rotation[:, 0])
+
+
+def travel_of(rig: Rig, joint: str) -> Travel | None:
+    """The way of a joint of the rig's scene; None where nothing it moves has a board."""
+    import mujoco
+
+    part = part_of(rig.model, joint)
+    if part is None:
+        return None
+    entry = rig.model.joint(joint)
+    data = mujoco.MjData(rig.model)
+    mujoco.mj_kinematics(rig.model, data)
+    return Travel(
+        part=part,
+        hinged=int(entry.type[0]) == _HINGE,
+        axis=data.xaxis[entry.id].copy(),
+        anchor=data.xanchor[entry.id].copy(),
+        world_from_closed=Rigid3(data.xmat[part.body].reshape(3, 3).copy(), data.xpos[part.body].copy()),
+        upper=float(entry.range[1]),
+        address=int(entry.qposadr[0]),
+    )
+
+
+def about(axis: Vector3, angle: float) -> Matrix3:
+    """Rotation about a unit axis by the right-hand rule."""
+    return np.asarray(cv2.Rodrigues(np.asarray(axis, dtype=np.float64) * angle)[0])

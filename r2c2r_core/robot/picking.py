@@ -1,0 +1,216 @@
+"""The gripper picks up a free-standing thing and puts it down 10 cm further."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.robot.grasps import BACK_M, MARGIN_M
+from r2c2r_core.robot.opening import Watch
+from r2c2r_core.robot.ramps import approach_from, ramp, wait
+from r2c2r_core.robot.rig import STROKE_M, TIP_M, Rig, tool_rotation
+
+FURTHER_M = 0.10
+NEAR_M = 0.03  # to where it was to be put, to have been put there
+_UPRIGHT = np.cos(np.deg2rad(15.0))
+_LIFT_M = 0.06
+_DEEP_M = 0.035  # of a thing between the fingers, at most
+_UP = np.array([0.0, 0.0, 1.0])
+_TURNS = np.deg2rad(np.arange(0.0, 360.0, 30.0))
+_TOUCH_M = 0.001
+_NEAR_PADS_M = 0.025  # of their middle: what of a thing held from above tells its width
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pick:
+    """Where to hold a thing and where to put it."""
+
+    body: int
+    grasp: Rigid3  # world_from_tool when the pads close
+    shift: Vector3  # to its new place
+    wide_m: float
+    held_m: float
+    address: int  # of its free joint in qpos
+
+
+class Put(NamedTuple):
+    """How it went."""
+
+    lifted_m: float
+    off_m: float  # from where it was to stand
+    upright: float  # cosine of its tilt
+
+    @property
+    def done(self) -> bool:
+        """Whether it stands where it was to be put."""
+        return bool(self.lifted_m > _LIFT_M / 2 and self.off_m < NEAR_M and self.upright > _UPRIGHT)
+
+
+def things_of(model: Any) -> list[int]:
+    """Bodies that stand free."""
+    return [int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0]
+
+
+def plan_pick(rig: Rig, body: int) -> Pick | str:
+    """The first grasp and place with nothing in the way; otherwise why there is none."""
+    shifts = list(_free_places(rig, body))
+    if not shifts:
+        return "no free place 10 cm further on what it stands on"
+    narrow = False
+    for pick in _grasps(rig, body, shifts[0]):
+        narrow = True
+        for shift in shifts:
+            if not _in_the_way(rig, placed := replace(pick, shift=shift)):
+                return placed
+    return (
+        "blocked: no way for the gripper to it" if narrow else f"wider than {1000 * (STROKE_M - 2 * MARGIN_M):.0f} mm all round"
+    )
+
+
+def pick_and_place(rig: Rig, pick: Pick, watch: Watch | None = None) -> Put:
+    """From the rig's reset state."""
+    start, highest = rig.world_from_body(pick.body), 0.0
+    rig.put(_back(pick.grasp, BACK_M), pick.wide_m)
+    for pose, width in commands(rig, pick):
+        rig.command(pose, width)
+        rig.step()
+        highest = max(highest, float(rig.data.xpos[pick.body][2] - start.translation[2]))
+        if watch is not None:
+            watch(rig)
+    end = rig.world_from_body(pick.body)
+    upright = float((end.rotation @ start.rotation.T @ _UP)[2])
+    return Put(highest, float(np.linalg.norm(end.translation - start.translation - pick.shift)), upright)
+
+
+def commands(rig: Rig, pick: Pick) -> Iterator[tuple[Rigid3, float]]:
+    """Poses and widths: there, hold, lift, across, down, let go, back, a moment's rest."""
+    above, over, there = (
+        Rigid3(pick.grasp.rotation, pick.grasp.translation + shift)
+        for shift in (_LIFT_M * _UP, _LIFT_M * _UP + pick.shift, pick.shift)
+    )
+    for pose in approach_from(rig, pick.grasp, BACK_M):
+        yield pose, pick.wide_m
+    yield from wait(rig, (pick.grasp, 0.0), 0.5)
+    for start, end in ((pick.grasp, above), (above, over), (over, there)):
+        for share in ramp(rig, 0.8):
+            yield Rigid3(start.rotation, start.translation + share * (end.translation - start.translation)), 0.0
+    yield from wait(rig, (there, 0.0), 0.2)
+    yield from wait(rig, (there, pick.wide_m), 0.4)
+    for share in ramp(rig, 0.8):
+        yield _back(there, share * BACK_M), pick.wide_m
+    yield from wait(rig, (_back(there, BACK_M), pick.wide_m), 0.4)
+
+
+def _grasps(rig: Rig, body: int, shift: Vector3) -> Iterator[Pick]:
+    """Every grasp whose stroke holds the thing: from each side at half its height, then from above."""
+    points = _points_world(rig, body)
+    low, high = points.min(axis=0), points.max(axis=0)
+    for tilt in (0.0, 0.5, np.pi / 2):
+        for turn in _TURNS:
+            level = np.array([np.cos(turn), np.sin(turn), 0.0])
+            stroke = np.cross(_UP, level)
+            approach = np.cos(tilt) * level - np.sin(tilt) * _UP
+            deep = points @ approach
+            reach = min(float(np.ptp(deep)) / 2, _DEEP_M - TIP_M if tilt > 1.0 else np.inf)  # of the pads' middle
+            held = points[np.abs(deep - deep.min() - reach) < max(_NEAR_PADS_M, float(np.ptp(deep)) / 2 if tilt < 1.0 else 0.0)]
+            across = held @ stroke
+            if not len(held) or float(np.ptp(across)) > STROKE_M - 2 * MARGIN_M:
+                continue
+            width, middle = float(np.ptp(across)), (low + high) / 2
+            place = middle + ((across.max() + across.min()) / 2 - middle @ stroke) * stroke
+            place = place + (deep.min() + reach - place @ approach) * approach
+            yield Pick(
+                body=body,
+                grasp=Rigid3(tool_rotation(approach, stroke), place),
+                shift=shift,
+                wide_m=STROKE_M,
+                held_m=width,
+                address=int(rig.model.jnt_qposadr[rig.model.body_jntadr[body]]),
+            )
+
+
+def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
+    """Shifts after which the thing stands on its support and touches nothing else."""
+    import mujoco
+
+    model, points = rig.model, _points_world(rig, body)
+    foot = points[points[:, 2] < points[:, 2].min() + 0.01]
+    address = model.jnt_qposadr[model.body_jntadr[body]]
+    scratch = mujoco.MjData(model)
+    for turn in _TURNS:
+        shift = FURTHER_M * np.array([np.cos(turn), np.sin(turn), 0.0])
+        scratch.qpos[:] = rig.data.qpos
+        scratch.qpos[address : address + 3] += shift + 0.004 * _UP
+        _place(model, scratch)
+        met = {
+            int(b)
+            for pair in scratch.contact.geom[: scratch.ncon]
+            for b in model.geom_bodyid[pair]
+            if body in model.geom_bodyid[pair]
+        }
+        if not met and all(_stands(model, scratch, point + shift, body) for point in foot[:: max(len(foot) // 8, 1)]):
+            yield shift
+
+
+def _stands(model: Any, data: Any, point: Vector3, body: int) -> bool:
+    """Whether something lies just below a point."""
+    import mujoco
+
+    hit = np.zeros(1, np.int32)
+    groups = np.array([0, 0, 0, 1, 0, 0], np.uint8)  # colliders
+    away = mujoco.mj_ray(model, data, point + 0.02 * _UP, -_UP, groups, 1, body, hit, None)
+    return 0 <= away < 0.03
+
+
+def _in_the_way(rig: Rig, pick: Pick) -> bool:
+    """Whether the gripper overlaps anything, the thing between its pads left out, where it takes it or where it puts it."""
+    import mujoco
+
+    scratch = mujoco.MjData(rig.model)
+    probe = replace(rig, data=scratch)
+    start = rig.data.qpos.copy()
+    for moved in (np.zeros(3), pick.shift):
+        for back_m, width in ((BACK_M, pick.wide_m), (BACK_M / 2, pick.wide_m), (0.0, pick.wide_m)):
+            scratch.qpos[:] = start
+            scratch.qpos[pick.address : pick.address + 3] += moved
+            pose = _back(pick.grasp, back_m)
+            probe.put(Rigid3(pose.rotation, pose.translation + moved), width)
+            _place(rig.model, scratch)
+            for number, (a, b) in enumerate(scratch.contact.geom[: scratch.ncon]):
+                if (a in rig.own) != (b in rig.own) and scratch.contact.dist[number] < -_TOUCH_M:
+                    return True
+    return False
+
+
+def _points_world(rig: Rig, body: int) -> Points:
+    """Corners and vertices of the thing's colliders, in the world."""
+    model, data = rig.model, rig.data
+    _place(model, data)
+    found = []
+    for geom in range(model.ngeom):
+        if model.geom_bodyid[geom] != body or not model.geom_contype[geom]:
+            continue
+        mesh = int(model.geom_dataid[geom])
+        if mesh >= 0:
+            first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+            local = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
+        else:
+            signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            local = model.geom_aabb[geom][:3] + signs * model.geom_aabb[geom][3:]
+        found.append(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    return np.concatenate(found)
+
+
+def _place(model: Any, data: Any) -> None:
+    import mujoco
+
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+
+
+def _back(pose: Rigid3, metres: float) -> Rigid3:
+    return Rigid3(pose.rotation, pose.translation - metres * pose.rotation[:, 0])

@@ -1,0 +1,208 @@
+"""A bundle's scene with a gripper in it: its bodies by name, its commands, and what it touches."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.transforms import Rigid3
+
+GRIPPER = Path(__file__).with_name("gripper.xml")
+STROKE_M = 0.08
+TIP_M = 0.010  # from the tool's origin to the fingers' tips
+HALF_PAD_M = 0.009  # of a fingertip's breadth
+GRIPS_N = (20.0, 40.0)
+CONTROL_STEPS = 5  # of the simulation between two commands
+PREFIX = "gripper/"
+_AXES = ("x", "y", "z", "yaw", "pitch", "roll")
+
+
+class Pull(NamedTuple):
+    """One contact of the gripper."""
+
+    body: int  # that it touches; 0 is the world
+    geom: int  # of the gripper
+    force_n: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rig(ABC):
+    """The compiled scene, and where in it the numbers of whatever holds the two fingers are."""
+
+    model: Any
+    data: Any
+    fingers: np.ndarray  # (2,) addresses in qpos
+    width: int  # the fingers' actuator
+    tool: int  # the site between the pads
+    own: frozenset[int]  # the robot's geoms
+    pads: frozenset[int]
+
+    @abstractmethod
+    def put(self, pose: Rigid3, width_m: float) -> None:
+        """Set the tool down somewhere, at rest: before anything starts."""
+
+    @abstractmethod
+    def command(self, pose: Rigid3, width_m: float) -> None:
+        """Where the tool is to be driven, by bounded forces, and how wide the fingers."""
+
+    @property
+    @abstractmethod
+    def base_force_n(self) -> float:
+        """What it pulls or pushes the tool with."""
+
+    @property
+    def world_from_tool(self) -> Rigid3:
+        """Where the pads are."""
+        return Rigid3(self.data.site_xmat[self.tool].reshape(3, 3).copy(), self.data.site_xpos[self.tool].copy())
+
+    @property
+    def width_m(self) -> float:
+        """Between the pads."""
+        return float(self.data.qpos[self.fingers].sum())
+
+    def world_from_body(self, body: int) -> Rigid3:
+        """Of any body."""
+        return Rigid3(self.data.xmat[body].reshape(3, 3).copy(), self.data.xpos[body].copy())
+
+    def grip_with(self, force_n: float) -> None:
+        """The most that either pad presses with."""
+        self.model.actuator_forcerange[self.width] = (-force_n, force_n)
+
+    def step(self) -> None:
+        """One command's time."""
+        import mujoco
+
+        mujoco.mj_step(self.model, self.data, CONTROL_STEPS)
+
+    @property
+    def step_s(self) -> float:
+        """Seconds of one command."""
+        return float(self.model.opt.timestep) * CONTROL_STEPS
+
+    def pulls(self) -> Iterator[Pull]:
+        """Everything the robot touches now."""
+        import mujoco
+
+        force = np.zeros(6)
+        contacts = self.data.contact
+        for number, (a, b) in enumerate(contacts.geom[: self.data.ncon]):
+            if (a in self.own) != (b in self.own):
+                mine, other = (a, b) if a in self.own else (b, a)
+                mujoco.mj_contactForce(self.model, self.data, number, force)
+                yield Pull(int(self.model.geom_bodyid[other]), int(mine), float(np.linalg.norm(force[:3])))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gripper(Rig):
+    """A gripper that floats: its base moves in six directions."""
+
+    axes: np.ndarray  # (6,) addresses in qpos of x, y, z, yaw, pitch, roll
+    drives: np.ndarray  # (6,) their actuators
+
+    @property
+    def base_force_n(self) -> float:
+        """What the base pulls or pushes with."""
+        return float(np.linalg.norm(self.data.actuator_force[self.drives[:3]]))
+
+    def put(self, pose: Rigid3, width_m: float) -> None:
+        """Set the gripper down somewhere, at rest."""
+        self.data.qpos[self.axes] = axes_of(pose, self.data.qpos[self.axes[3]])
+        self.data.qpos[self.fingers] = width_m / 2
+        self.command(pose, width_m)
+
+    def command(self, pose: Rigid3, width_m: float) -> None:
+        """Where the base is to be driven, and how wide the fingers."""
+        self.data.ctrl[self.drives] = axes_of(pose, self.data.qpos[self.axes[3]])
+        self.data.ctrl[self.width] = width_m
+
+
+def gripper_in(scene: Path, change: Callable[[Any], None] | None = None) -> Gripper:
+    """The gripper in a scene.xml, parked at the origin; `change` edits the scene's MjSpec before.
+
+    Raises ValueError where scene.xml is none.
+    """
+    import mujoco
+
+    model = compiled_with(scene, mujoco.MjSpec.from_file(str(GRIPPER)), change)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return Gripper(
+        axes=np.array([model.joint(PREFIX + name).qposadr[0] for name in _AXES]),
+        drives=np.array([model.actuator(PREFIX + name).id for name in _AXES]),
+        **hand_of(model, data, f"{PREFIX}base"),
+    )
+
+
+def compiled_with(scene: Path, robot: Any, change: Callable[[Any], None] | None = None) -> Any:
+    """The model of a scene.xml with a robot's MjSpec in it; its names are prefixed.
+
+    The pads' friction needs elliptic cones: with pyramids a held bar creeps out (MuJoCo, "Solver parameters: impratio").
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec.from_file(str(scene))
+    if change is not None:
+        change(spec)
+    spec.attach(robot, frame=spec.worldbody.add_frame(), prefix=PREFIX)
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10.0
+    return spec.compile()
+
+
+def hand_of(model: Any, data: Any, base: str) -> dict[str, Any]:
+    """What every rig has: the model, its fingers, its tool and its geoms; `base` is the robot's first body."""
+    root = model.body(base).id
+    own = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == root]
+    return {
+        "model": model,
+        "data": data,
+        "fingers": np.array([model.joint(PREFIX + name).qposadr[0] for name in ("left", "right")]),
+        "width": int(model.actuator(f"{PREFIX}width").id),
+        "tool": int(model.site(f"{PREFIX}tool").id),
+        "own": frozenset(own),
+        "pads": frozenset(g for g in own if model.geom(g).name.endswith("_pad")),
+    }
+
+
+def axes_of(pose: Rigid3, near_yaw: float = 0.0) -> np.ndarray:
+    """x, y, z, yaw, pitch, roll of a pose: R = Rz(yaw) Ry(pitch) Rx(roll), the yaw on the turn nearest to `near_yaw`."""
+    r = pose.rotation
+    pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
+    if np.hypot(r[0, 0], r[1, 0]) < 1e-6:  # straight up or down: yaw and roll are one
+        yaw, roll = near_yaw, _roll_left(r, near_yaw, float(pitch))
+    else:
+        yaw, roll = np.arctan2(r[1, 0], r[0, 0]), np.arctan2(r[2, 1], r[2, 2])
+    yaw += 2 * np.pi * np.round((near_yaw - yaw) / (2 * np.pi))
+    return np.array([*pose.translation, yaw, pitch, roll])
+
+
+def pose_of(axes: np.ndarray) -> Rigid3:
+    """The pose that the six axes give."""
+    yaw, pitch, roll = axes[3:]
+    return Rigid3(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), np.array(axes[:3], dtype=np.float64))
+
+
+def tool_rotation(approach: Vector3, stroke: Vector3) -> Matrix3:
+    """The tool's axes in the world: x along the approach, y along the stroke."""
+    x = approach / np.linalg.norm(approach)
+    y = stroke - (stroke @ x) * x
+    y /= np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def _about(axis: int, angle: float) -> Matrix3:
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.eye(3)
+    turn[[i, j], [i, j]] = c
+    turn[i, j], turn[j, i] = -s, s
+    return turn
+
+
+def _roll_left(rotation: Matrix3, yaw: float, pitch: float) -> float:
+    rest = (_about(2, yaw) @ _about(1, pitch)).T @ rotation
+    return float(np.arctan2(rest[2, 1], rest[1, 1]))

@@ -1,0 +1,70 @@
+"""Why the gripper could not do it, in a sentence, and whose doing that is."""
+
+from typing import Any, Literal, NamedTuple
+
+from r2c2r_core.robot.grasps import Way, body_words
+from r2c2r_core.robot.motion import Travel
+from r2c2r_core.robot.opening import CLOSED_SHARE, OPEN_SHARE, Measured
+from r2c2r_core.robot.rig import STROKE_M
+
+Blame = Literal["scan", "world", "gripper", "arm"]
+"""The scan: such a kitchen is hardly built, so what was reconstructed is doubted. The world: such kitchens are, and this
+gripper does not fit there. The gripper: its pads or its strength. The arm: it is too short, or not strong
+or nimble enough there."""
+
+_REACHED_M = 0.012
+_HELD = 0.5
+_SLIPPED_M = 0.03
+_LEANS_N = 2.0
+
+
+class Verdict(NamedTuple):
+    """What failed, and whose doing it is."""
+
+    why: str
+    blame: Blame
+
+
+def unholdable(travel: Travel | None) -> Verdict:
+    """Of a joint that no way was found for."""
+    if travel is None or travel.part.bar is None:
+        return Verdict("nothing of it is a board that a finger could hold or push: its colliders are meshes", "scan")
+    across, _, upright = 1000 * travel.part.bar.size
+    size = f"{across:.0f} mm wide and {upright:.0f} mm high"
+    return Verdict(f"handle too thick: {size}, the gripper opens {1000 * STROKE_M:.0f} mm", "scan")
+
+
+def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verdict | None:
+    """None where the joint was opened and closed."""
+    if measured.opened >= OPEN_SHARE and measured.closed <= CLOSED_SHARE:
+        return None
+    done = (
+        f"opens {100 * measured.opened:.0f} % of the way"
+        if measured.opened < OPEN_SHARE
+        else f"opens, but {100 * measured.closed:.0f} % of the way is left when it is closed"
+    )
+    obstacle = _obstacle(travel, way, measured)
+    if obstacle == travel.part.body:
+        stands = 1000 * travel.part.protrusion_m
+        return Verdict(
+            f"handle too close to the front: it stands out {stands:.0f} mm, the fingers meet the front; {done}", "scan"
+        )
+    if obstacle is not None:
+        name = body_words(model, obstacle)
+        blame: Blame = "scan" if obstacle == 0 else "world"
+        return Verdict(f"blocked by {name}: the gripper meets it; {done}", blame)
+    if not measured.reach_m <= _REACHED_M:
+        return Verdict(f"not reached: the fingers close {1000 * measured.reach_m:.0f} mm beside the handle; {done}", "gripper")
+    if measured.held < _HELD or measured.slip_m > _SLIPPED_M:
+        return Verdict(f"slipped: the pads went {1000 * measured.slip_m:.0f} mm along the handle; {done}", "gripper")
+    return Verdict(f"joint too stiff, or its part meets another: {measured.force_n:.0f} N of the gripper; {done}", "scan")
+
+
+def _obstacle(travel: Travel, way: Way, measured: Measured) -> int | None:
+    """The body that was most in the way: leant on, or foreseen."""
+    leant = {body: force for body, force in measured.touched.items() if force > _LEANS_N}
+    if leant:
+        return max(leant, key=lambda body: leant[body])
+    if way.clashes:
+        return max(way.clashes, key=lambda body: way.clashes[body])
+    return None

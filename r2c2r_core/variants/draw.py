@@ -1,0 +1,116 @@
+"""What is different in a variant: drawn at random from what the bundle says it does not know, and from stated ranges."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.variants.textures import TEXTURES
+
+GUESSED = 0.02
+"""Standard deviation, share of a side, where it was inferred or a category's default: own choice, 12 mm of 0.6 m."""
+LEAST_MEASURED = 0.001  # where the bundle names no spread of its own
+MOST_SIGMAS = 2.0
+MASS = (0.8, 1.25)  # times; own choice: boards of one size weigh 600 to 800 kg/m3
+DAMPING = (0.5, 2.0)  # times; own choice: within it every joint still comes to rest
+FRICTION = (0.5, 2.0)  # times the joint's dry friction, own choice
+SURFACE = (0.3, 0.7)  # sliding friction of surfaces: wood and laminate in friction tables
+AJAR, AJAR_MOST = 0.2, 0.3  # how many joints stand open at first, and how far, of their travel
+SHIFT_M = 0.25  # of a free thing on its support, at most
+TINT = 0.12  # of each colour channel
+RETEXTURED = 0.5  # share of variants whose fronts get a procedural surface
+
+KIND_OF = {
+    "counter": "stone",
+    "refrigerator": "metal",
+    "dishwasher": "metal",
+    "oven": "metal",
+    "hood": "metal",
+    "microwave": "metal",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What is different of one object."""
+
+    name: str
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of width, depth, height; the front stays, and the underside
+    mass: float = 1.0
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    texture: str | None = None  # of TEXTURES; None: the scan's own
+    shift_m: tuple[float, float] = (0.0, 0.0)  # of a free thing, level
+    turn_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variation:
+    """What is different of a scene."""
+
+    changes: tuple[Change, ...]
+    damping: Mapping[str, float]  # times, by joint
+    friction: Mapping[str, float]
+    ajar: Mapping[str, float]  # share of its travel at which a joint stands at first
+    surface: float
+
+
+def draw(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> Variation:
+    """One variation of the objects of a manifest."""
+    fronts = _finish(rng, "wood") if rng.random() < RETEXTURED else (None, _tint(rng))
+    stone = _finish(rng, "stone") if rng.random() < RETEXTURED else (None, _tint(rng))
+    changes = tuple(_change(rng, entry, fronts, stone) for entry in objects)
+    joints = [joint["name"] for entry in objects for joint in entry["joints"]]
+    return Variation(
+        changes=changes,
+        damping={name: _times(rng, DAMPING) for name in joints},
+        friction={name: _times(rng, FRICTION) for name in joints},
+        ajar={name: float(rng.uniform(0.0, AJAR_MOST)) for name in joints if rng.random() < AJAR},
+        surface=float(rng.uniform(*SURFACE)),
+    )
+
+
+Finish = tuple[str | None, tuple[float, float, float]]
+
+
+def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, stone: Finish) -> Change:
+    kind = KIND_OF.get(entry["category"], "thing" if entry["movable"] else "wood")
+    texture, tint = {"wood": fronts, "stone": stone}.get(kind, (None, _tint(rng)))
+    level = rng.uniform(-SHIFT_M, SHIFT_M, 2) if entry["movable"] else np.zeros(2)
+    return Change(
+        name=entry["name"],
+        scale=_scale(rng, entry),
+        mass=_times(rng, MASS),
+        tint=tint,
+        texture=texture,
+        shift_m=(float(level[0]), float(level[1])),
+        turn_rad=float(rng.uniform(-np.pi, np.pi)) if entry["movable"] else 0.0,
+    )
+
+
+def _scale(rng: np.random.Generator, entry: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Sides times 1 give or take their standard deviation, at most two of them; a free thing keeps its shape."""
+    spread = (entry["placement"] or {}).get("spread") or {}
+    measured = max(spread.get("scale") or 0.0, LEAST_MEASURED)
+    sources = entry["dimension_source"]
+    sigmas = [measured if source in ("measured", "person") else GUESSED for source in sources]
+    steps = np.clip(rng.normal(size=3), -MOST_SIGMAS, MOST_SIGMAS)
+    if entry["movable"]:
+        steps, sigmas = np.full(3, steps[0]), [measured] * 3
+    width, depth, height = (float(1.0 + sigma * step) for sigma, step in zip(sigmas, steps, strict=True))
+    return width, depth, height
+
+
+def _finish(rng: np.random.Generator, kind: str) -> Finish:
+    names = [name for name, texture in TEXTURES.items() if texture.kind == kind]
+    return str(rng.choice(names)), _tint(rng)
+
+
+def _tint(rng: np.random.Generator) -> tuple[float, float, float]:
+    red, green, blue = (float(value) for value in 1.0 - rng.uniform(0.0, 2 * TINT, 3))
+    return red, green, blue
+
+
+def _times(rng: np.random.Generator, ends: tuple[float, float]) -> float:
+    """Log-uniform."""
+    return float(np.exp(rng.uniform(*np.log(ends))))

@@ -1,0 +1,90 @@
+"""Whether a variant is fit: it loads, stands free of contact, its joints meet nothing, its things stand on something."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, free_bodies, joint_names, movers_of, touches
+from r2c2r_core.variants.draw import Variation
+
+_POSITIONS = 7  # of each joint's sweep: as many as a door's edge needs not to jump over a board
+_DROP_M = 0.02  # below a thing's foot, within which its support is
+
+
+def colliders_of(root: ET.Element, folder: Path) -> Any:
+    """The compiled variant without what is only seen; raises ValueError where MuJoCo cannot.
+
+    `folder` is the bundle's: the meshes are read from there.
+    """
+    import mujoco
+
+    bare = ET.fromstring(ET.tostring(root))
+    for parent in list(bare.iter()):
+        for child in list(parent):
+            if child.get("class") == "visual" and child.tag == "geom":
+                parent.remove(child)
+    asset = bare.find("asset")
+    used = {geom.get("mesh") for geom in bare.iter("geom")}
+    if asset is not None:
+        for part in list(asset):
+            if part.tag in ("texture", "material") or (part.tag == "mesh" and part.get("name") not in used):
+                asset.remove(part)
+    for geom in bare.iter("geom"):
+        geom.attrib.pop("material", None)
+    compiler = bare.find("compiler")
+    assert compiler is not None
+    compiler.set("meshdir", str(folder))
+    return mujoco.MjSpec.from_string(ET.tostring(bare, encoding="unicode")).compile()
+
+
+def start_of(model: Any, variation: Variation) -> np.ndarray:
+    """Joint positions (qpos) with the joints ajar that stand so."""
+    qpos = np.array(model.qpos0)
+    for name, share in variation.ajar.items():
+        joint = model.joint(name)
+        qpos[joint.qposadr[0]] = share * float(joint.range[1])
+    return qpos
+
+
+def unfit(model: Any, start: Mapping[str, float]) -> str | None:
+    """Why the variant is rejected; None where it is fit. `start` holds the positions of joints that stand ajar."""
+    import mujoco
+
+    scratch, free = mujoco.MjData(model), free_bodies(model)
+    for touch in touches(model, start, scratch):
+        if touch.depth_m > ALLOWED_PENETRATION_M and not _resting(touch.bodies, free, touch.depth_m):
+            return "a thing meets something" if set(touch.bodies) & free else "parts overlap at the start"
+    if not all(_stands(model, scratch, body) for body in free):
+        return "a thing hangs over an edge"
+    for name in joint_names(model):
+        movers, upper = movers_of(model, name), float(model.joint(name).range[1])
+        for position in np.linspace(0.0, upper, _POSITIONS):
+            for touch in touches(model, {name: float(position)}, scratch):
+                if touch.depth_m > ALLOWED_PENETRATION_M and movers & set(touch.bodies) and not free & set(touch.bodies):
+                    return "a joint runs into something"
+    return None
+
+
+def _resting(bodies: tuple[int, int], free: set[int], depth_m: float) -> bool:
+    """Of a thing on its support: two bodies of which one is free, barely in one another."""
+    return len(set(bodies) & free) == 1 and depth_m <= 2 * ALLOWED_PENETRATION_M
+
+
+def _stands(model: Any, data: Any, body: int) -> bool:
+    """Whether something lies below the thing's foot, under its middle and a third of the way to its sides."""
+    import mujoco
+
+    geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body and model.geom_contype[g]]
+    centres = np.array([data.geom_xpos[g] for g in geoms])
+    reach = max(float(np.linalg.norm(model.geom_aabb[g][3:5])) for g in geoms) / 2
+    low = min(float(data.geom_xpos[g][2] - abs(data.geom_xmat[g].reshape(3, 3)[2]) @ model.geom_aabb[g][3:]) for g in geoms)
+    middle, hit = centres.mean(axis=0), np.zeros(1, np.int32)
+    for x, y in ((0, 0), (reach, 0), (-reach, 0), (0, reach), (0, -reach)):
+        at = np.array([middle[0] + x, middle[1] + y, low + _DROP_M])
+        away = mujoco.mj_ray(model, data, at, np.array([0.0, 0.0, -1.0]), None, 1, body, hit, None)
+        if not 0 <= away < 2 * _DROP_M:
+            return False
+    return True

@@ -1,0 +1,156 @@
+"""Variants of a bundle for training: each a small MJCF beside one copy of the bundle, whose meshes and textures all share."""
+
+import json
+import shutil
+import xml.etree.ElementTree as ET
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.disk import explained_io
+from r2c2r_core.errors import BundleError, InputError, StageError
+from r2c2r_core.export.archive import opened_bundle
+from r2c2r_core.export.lint import lint
+from r2c2r_core.export.rules.table import UNSAFE
+from r2c2r_core.export.simulate import simulate
+from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.variants.draw import Variation, draw
+from r2c2r_core.variants.judge import colliders_of, start_of, unfit
+from r2c2r_core.variants.overlay import add_start, varied
+from r2c2r_core.variants.textures import write_textures
+from r2c2r_core.variants.wall import WALL, write_wall
+
+VARIANTS_VERSION = 1
+CERTIFIED = 20  # variants, at random, that the whole simulation certificate looks at
+NOT_VARIED = ("arm", "gripper", "pictures")  # of the bundle: what was seen in it, which variants do not repeat
+_ATTEMPTS = 40  # at one variant, each drawn anew
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variants:
+    """What was made."""
+
+    folder: Path
+    names: tuple[str, ...]
+    rejected: dict[str, int]  # why, and how many draws
+    certified: dict[str, bool]  # of the ones that were looked at wholly
+
+    @property
+    def wall(self) -> Path:
+        """The picture of the first of them."""
+        return self.folder / "wall.jpg"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Base:
+    """The bundle that is varied."""
+
+    folder: Path
+    scene: ET.Element
+    objects: tuple[dict[str, Any], ...]
+    halves: dict[str, np.ndarray]  # of each object's sides
+    links: dict[str, str]  # object by body
+
+
+def make_variants(bundle: Path, count: int, seed: int, folder: Path, *, progress: Progress = SILENT) -> Variants:
+    """Write `count` variants of a bundle to a new folder; the same bundle and seed give the same ones.
+
+    Raises BundleError on a bundle without what is needed, and StageError where no draw in 40 is fit.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty", hint="name a new folder")
+    with explained_io(folder):
+        base = _copied(bundle, folder / "base")
+        write_textures(folder / "textures")
+        (folder / "variants").mkdir()
+        rejected: Counter[str] = Counter()
+        entries = []
+        for index in progress.part(0.0, 0.7).each(range(count), "variant"):
+            variation, root, reasons = _fit_variant(base, seed, index)
+            rejected.update(reasons)
+            name = f"{index:05d}"
+            (folder / "variants" / f"{name}.xml").write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+            entries.append({"name": name, "draws": len(reasons) + 1, **_described(variation)})
+        chosen = sorted(np.random.default_rng([seed, count]).permutation(count)[:CERTIFIED])
+        names = tuple(f"{index:05d}" for index in range(count))
+        certified = {
+            names[index]: _passes(folder / "variants" / f"{names[index]}.xml")
+            for index in progress.part(0.7, 0.95).each(chosen, "certifying variant")
+        }
+        made = Variants(folder=folder, names=names, rejected=dict(sorted(rejected.items())), certified=certified)
+        write_wall([folder / "variants" / f"{name}.xml" for name in names[:WALL]], made.wall)
+        _write_manifest(made, seed, entries)
+    progress.at(1.0, "variants")
+    return made
+
+
+def base_of(folder: Path) -> Base:
+    """A bundle's folder, read for varying; raises BundleError where it lacks scene.xml or its manifest."""
+    try:
+        scene = ET.fromstring((folder / "scene.xml").read_text(encoding="utf-8"))
+        objects = tuple(json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["objects"])
+    except (OSError, ValueError, KeyError, ET.ParseError) as error:
+        raise BundleError(f"{folder}: no bundle to vary ({error})", hint="give one that r2c2r run wrote") from error
+    names = sorted((entry["name"] for entry in objects), key=len, reverse=True)
+    links = {}
+    for body in scene.iter("body"):
+        owner = next((name for name in names if body.get("name", "").startswith(f"{name}_")), None)
+        if owner is not None:
+            links[body.get("name", "")] = owner
+    halves = {entry["name"]: np.array(entry["dimensions_m"]) / 2 for entry in objects}
+    return Base(folder=folder, scene=scene, objects=objects, halves=halves, links=links)
+
+
+def _copied(bundle: Path, folder: Path) -> Base:
+    if not bundle.exists():
+        raise BundleError(f"{bundle}: there is no such file", hint="give a bundle: a .zip or its folder")
+    with opened_bundle(bundle) as opened:
+        unsafe = [found for found in lint(opened) if found.rule in UNSAFE]
+        if unsafe:
+            raise BundleError(f"{bundle}: {unsafe[0].message}", hint="a bundle that names files outside itself is not varied")
+        shutil.copytree(opened, folder, ignore=lambda within, _: NOT_VARIED if Path(within) == opened else ())
+    return base_of(folder)
+
+
+def _fit_variant(base: Base, seed: int, index: int) -> tuple[Variation, ET.Element, list[str]]:
+    """The first fit draw, and why the ones before it were none."""
+    reasons: list[str] = []
+    for attempt in range(_ATTEMPTS):
+        variation = draw(np.random.default_rng([seed, index, attempt]), base.objects)
+        root = varied(base.scene, variation, base.halves, base.links)
+        model = colliders_of(root, base.folder)
+        start = start_of(model, variation)
+        ajar = {name: float(start[model.joint(name).qposadr[0]]) for name in variation.ajar}
+        why = unfit(model, ajar)
+        if why is None:
+            add_start(root, start)
+            return variation, root, reasons
+        reasons.append(why)
+    said = ", ".join(f"{count} times {why}" for why, count in Counter(reasons).most_common())
+    raise StageError(f"variant {index}: none of {_ATTEMPTS} draws is fit ({said})", hint="check the bundle: r2c2r check")
+
+
+def _passes(scene: Path) -> bool:
+    """Whether the simulation certificate finds no error."""
+    return not any(found.severity == "error" for found in simulate(scene).findings)
+
+
+def _described(variation: Variation) -> dict[str, Any]:
+    """What was varied, rounded as for a reader."""
+    return json.loads(json.dumps(asdict(variation)), parse_float=lambda text: round(float(text), 5))
+
+
+def _write_manifest(made: Variants, seed: int, entries: list[dict[str, Any]]) -> None:
+    document = {
+        "version": VARIANTS_VERSION,
+        "seed": seed,
+        "count": len(made.names),
+        "base": "base",
+        "rejected": made.rejected,
+        "certified": made.certified,
+        "variants": entries,
+    }
+    (made.folder / "variants.json").write_text(json.dumps(document) + "\n", encoding="utf-8")

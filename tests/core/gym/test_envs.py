@@ -1,0 +1,133 @@
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from r2c2r_core.errors import BundleError
+from tests.core.robot.scenes import Bar, scene
+from tests.core.robot.test_picking import scene as table
+
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'r2c2r[gym]'")
+
+import r2c2r_core.gym  # noqa: E402, F401  # registers the environments
+from r2c2r_core.gym.scripted import scripted_actions  # noqa: E402
+
+
+@pytest.fixture
+def door(tmp_path: Path) -> Path:
+    return scene(tmp_path, bar=Bar()).parent
+
+
+@pytest.fixture
+def block(tmp_path: Path) -> Path:
+    return table(tmp_path).parent
+
+
+def _open(bundle: Path, **options: Any) -> Any:
+    return gymnasium.make("r2c2r/Open-v0", bundle=bundle, joint="front_joint", **options)
+
+
+def _pick(bundle: Path, **options: Any) -> Any:
+    return gymnasium.make("r2c2r/PickPlace-v0", bundle=bundle, thing="block", **options)
+
+
+@pytest.mark.parametrize("observation", ["state", "rgbd"])
+def test_both_pass_gymnasiums_checker(tmp_path: Path, observation: str) -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    for env in (
+        _open(scene(tmp_path / "a", bar=Bar()).parent, observation=observation, render_mode="rgb_array"),
+        _pick(table(tmp_path / "b").parent, observation=observation, render_mode="rgb_array"),
+    ):
+        check_env(env.unwrapped)
+
+
+def test_a_seed_gives_an_episode_again_and_another_another(door: Path) -> None:
+    def episode(seed: int) -> list[Any]:
+        env = _open(door)
+        first, _ = env.reset(seed=seed)
+        env.action_space.seed(seed)
+        return [first, *(env.step(env.action_space.sample())[0] for _ in range(5))]
+
+    np.testing.assert_array_equal(episode(3), episode(3))
+    assert not np.array_equal(episode(3)[0], episode(4)[0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_scripted_policy_opens_the_door(door: Path, seed: int) -> None:
+    assert _succeeds(_open(door), seed)
+
+
+def test_the_scripted_policy_opens_what_has_no_handle(tmp_path: Path) -> None:
+    assert _succeeds(_open(scene(tmp_path, kind="drawer").parent), 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_scripted_policy_moves_the_thing(block: Path, seed: int) -> None:
+    assert _succeeds(_pick(block), seed)
+
+
+def test_doing_nothing_solves_neither(door: Path) -> None:
+    env = _open(door)
+    env.reset(seed=0)
+    rewards = [env.step(np.zeros(7, np.float32))[1] for _ in range(20)]
+    assert not env.unwrapped._info()["success"]
+    assert abs(sum(rewards)) < 0.05
+
+
+def test_many_at_once(door: Path) -> None:
+    envs = gymnasium.make_vec("r2c2r/Open-v0", num_envs=2, vectorization_mode="sync", bundle=door, joint="front_joint")
+    first, _ = envs.reset(seed=0)
+    after, rewards, *_ = envs.step(envs.action_space.sample())
+    assert first.shape == after.shape == (2, 20)
+    assert rewards.shape == (2,)
+    assert not np.array_equal(first[0], first[1])
+
+
+def test_an_episode_takes_the_variant_it_is_told(tmp_path: Path) -> None:
+    (tmp_path / "variants").mkdir()
+    for name, frictionloss in (("00000", 0.1), ("00001", 5.0)):
+        shutil.copy(scene(tmp_path, bar=Bar(), frictionloss=frictionloss), tmp_path / "variants" / f"{name}.xml")
+    env = _open(tmp_path)
+    for name, frictionloss in (("00000", 0.1), ("00001", 5.0)):
+        env.reset(seed=0, options={"variant": name})
+        rig = env.unwrapped.rig
+        assert rig.model.dof_frictionloss[rig.model.joint("front_joint").dofadr[0]] == frictionloss
+    with pytest.raises(BundleError, match="variant 7"):
+        env.reset(seed=0, options={"variant": "7"})
+
+
+def test_what_is_not_there_is_said(door: Path, tmp_path: Path) -> None:
+    with pytest.raises(BundleError, match="joint lid: there is none; there are front_joint"):
+        gymnasium.make("r2c2r/Open-v0", bundle=door, joint="lid").reset()
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BundleError, match=r"neither scene\.xml nor variants/"):
+        gymnasium.make("r2c2r/Open-v0", bundle=tmp_path / "empty", joint="lid")
+
+
+def test_segmentation_names_what_it_shows(block: Path) -> None:
+    env = _pick(block, observation="rgbd")
+    seen, _ = env.reset(seed=0)
+    labels = env.unwrapped.labels()
+    shown = {labels.get(int(number), "nothing") for number in np.unique(seen["segmentation"])}
+    assert "gripper/base" in shown
+
+
+def _succeeds(env: Any, seed: int) -> bool:
+    _, info = env.reset(seed=seed)
+    for action in _actions(env):
+        assert env.action_space.contains(action)
+        _, _, terminated, truncated, info = env.step(action)
+        if terminated or truncated:
+            break
+    return bool(json.loads(json.dumps(info))["success"])
+
+
+def _actions(env: Any) -> Iterator[np.ndarray]:
+    return scripted_actions(env.unwrapped)

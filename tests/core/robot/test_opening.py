@@ -1,0 +1,98 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.robot.certificate import certify_with_gripper
+from r2c2r_core.robot.grasps import best_way
+from r2c2r_core.robot.opening import OPEN_SHARE, attempt, reset
+from tests.core.robot.scenes import Bar, rig_and_travel, scene
+
+LEVEL = Bar(wide=0.16, high=0.012)
+
+
+@pytest.mark.parametrize(
+    ("kind", "bar", "method"),
+    [
+        ("hinge", Bar(), "pinch"),
+        ("hinge", LEVEL, "pinch"),
+        ("drawer", LEVEL, "pinch"),
+        ("sliding", Bar(), "pinch"),
+        ("hinge", None, "push"),
+        ("drawer", None, "push"),
+        ("sliding", None, "drag"),
+    ],
+)
+@pytest.mark.parametrize("turned", [0.0, 2.5])
+def test_it_opens_and_closes_what_it_can_hold(tmp_path: Path, kind: str, bar: Bar | None, method: str, turned: float) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, kind=kind, bar=bar, turned=turned)).grips
+    assert grip.passed, grip
+    assert grip.method == method
+    assert grip.opened >= OPEN_SHARE
+    assert grip.left_open <= 0.02
+
+
+def test_friction_alone_holds_the_handle(tmp_path: Path) -> None:
+    """A flat-sided bar pulled straight out leaves smooth pads behind: nothing else ties the gripper to it."""
+    rig, travel = rig_and_travel(scene(tmp_path, kind="drawer", bar=LEVEL))
+    way = best_way(rig, travel)
+    assert way is not None
+    for geom in rig.pads:
+        rig.model.geom_friction[geom] = 0.005
+    reset(rig)
+    assert attempt(rig, travel, way).opened < 0.1
+
+
+def test_the_base_gives_no_more_than_it_says(tmp_path: Path) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, kind="drawer", bar=LEVEL, frictionloss=400.0)).grips
+    assert not grip.passed
+    assert grip.opened < 0.2  # MuJoCo's dry friction creeps under a steady pull
+    assert grip.force_n <= np.sqrt(3) * 80.0 + 1e-6
+
+
+def test_a_stiff_joint_is_named(tmp_path: Path) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, kind="hinge", bar=Bar(), frictionloss=60.0)).grips
+    assert not grip.passed
+    assert "stiff" in grip.why or "slipped" in grip.why
+    assert grip.grip_n == 40.0
+
+
+def test_a_handle_thicker_than_the_stroke_is_named(tmp_path: Path) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(wide=0.12, high=0.12))).grips
+    assert (grip.passed, grip.blame) == (False, "scan")
+    assert grip.why == "handle too thick: 120 mm wide and 120 mm high, the gripper opens 80 mm"
+
+
+def test_what_stands_out_and_is_not_described_as_a_handle_is_none(tmp_path: Path) -> None:
+    path = scene(tmp_path, bar=Bar())
+    _, travel = rig_and_travel(path)
+    assert travel.part.bar is not None
+    np.testing.assert_allclose(travel.part.bar.size, (0.012, 0.01, 0.16))
+    path.write_text(path.read_text().replace('name="handle" type="box"', 'name="handle" type="sphere"'))
+    _, travel = rig_and_travel(path)
+    assert travel.part.bar is None
+
+
+def test_what_stands_in_the_way_is_named(tmp_path: Path) -> None:
+    post = '<body name="post" pos="-0.16 -0.36 0"><geom size="0.3 0.01 0.4"/></body>'
+    (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(), beside=post)).grips
+    assert (grip.passed, grip.blame) == (False, "world")
+    assert grip.why.startswith("blocked by post")
+
+
+def test_the_wrist_need_not_turn_with_a_bar_that_turns_in_its_grip(tmp_path: Path) -> None:
+    """A level bar on an upright hinge: with a wall where the wrist would go, it stays behind and the bar turns in the pads."""
+    free, travel = rig_and_travel(scene(tmp_path, bar=LEVEL))
+    way = best_way(free, travel)
+    assert way is not None
+    assert way.opens.follow == 1.0
+    wall = '<body name="wall" pos="0.42 -0.6 0"><geom size="0.01 0.3 0.5"/></body>'
+    rig, travel = rig_and_travel(scene(tmp_path, bar=LEVEL, beside=wall))
+    way = best_way(rig, travel)
+    assert way is not None
+    assert way.opens.follow < 1.0
+
+
+def test_the_same_scene_goes_the_same_way(tmp_path: Path) -> None:
+    path = scene(tmp_path, bar=Bar())
+    assert certify_with_gripper(path) == certify_with_gripper(path)

@@ -1,0 +1,75 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.robot.certificate import certify_with_gripper, gripper_to_json
+from r2c2r_core.robot.rig import gripper_in
+from r2c2r_core.robot.view import aimed, look, surfaces_of
+
+TABLE = '<body name="table"><geom class="hard" type="box" size="0.4 0.4 0.02" pos="0 0 0.48"/></body>'
+
+
+def scene(folder: Path, *, radius: float = 0.03, half: float = 0.1, table: str = TABLE) -> Path:
+    (folder / "scene.xml").write_text(f"""
+<mujoco>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="0.002" integrator="implicitfast"/>
+  <default><default class="hard"><geom group="3" friction="0.5 0.01 0.001"/></default></default>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 0.05"/>
+    {table}
+    <body name="block" pos="0 0 {0.5 + half}">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="0.8" diaginertia="0.003 0.003 0.001"/>
+      <geom class="hard" type="box" size="{radius} {radius} {half}"/>
+    </body>
+  </worldbody>
+</mujoco>""")
+    return folder / "scene.xml"
+
+
+@pytest.mark.parametrize("half", [0.03, 0.1])
+def test_a_thing_is_put_down_ten_centimetres_further(tmp_path: Path, half: float) -> None:
+    certificate = certify_with_gripper(scene(tmp_path, half=half))
+    (grip,) = certificate.grips
+    assert grip.passed, grip
+    assert grip.off_m < 0.01
+    assert json.loads(json.dumps(gripper_to_json(certificate)))["things_moved"] == 1
+
+
+def test_a_thing_wider_than_the_stroke_is_left(tmp_path: Path) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, radius=0.05)).grips
+    assert (grip.passed, grip.why) == (False, "wider than 76 mm all round")
+
+
+def test_a_thing_is_not_put_where_nothing_holds_it(tmp_path: Path) -> None:
+    small = '<body name="table"><geom class="hard" type="box" size="0.05 0.05 0.02" pos="0 0 0.48"/></body>'
+    (grip,) = certify_with_gripper(scene(tmp_path, table=small)).grips
+    assert (grip.passed, grip.why) == (False, "no free place 10 cm further on what it stands on")
+
+
+def test_a_film_and_a_sheet_are_written(tmp_path: Path) -> None:
+    from PIL import Image
+
+    (grip,) = certify_with_gripper(scene(tmp_path), tmp_path / "films").grips
+    assert grip.film == "block"
+    with Image.open(tmp_path / "films" / "block.gif") as film:
+        assert film.n_frames > 10  # type: ignore[attr-defined]
+    with Image.open(tmp_path / "films" / "block.jpg") as sheet:
+        assert sheet.size == (4 * 208, 2 * 156)
+
+
+def test_a_picture_shows_each_body_where_it_is(tmp_path: Path) -> None:
+    import numpy as np
+
+    rig = gripper_in(scene(tmp_path).with_name("scene.xml"), lambda spec: [setattr(g, "group", 2) for g in spec.geoms])
+    camera, camera_from_world = aimed(np.array([0.0, -1.5, 0.6]), np.array([0.0, 0.0, 0.6]), (160, 120), 0.8)
+    rig.data.qpos[rig.axes[2]] = 3.0  # the gripper out of sight
+    import mujoco
+
+    mujoco.mj_forward(rig.model, rig.data)
+    seen = look(surfaces_of(rig.model), rig.model, rig.data, camera, camera_from_world)
+    assert seen.body[60, 80] == rig.model.body("block").id
+    assert seen.depth_m[60, 80] == pytest.approx(1.47, abs=2e-3)  # the rasteriser's depth at this distance
+    assert seen.body[2, 2] == -1
