@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from r2c2r_core.export.collider_fit import collider_fits
 from r2c2r_core.export.lint import lint
 from r2c2r_core.export.loaders import EVERY_LOADER, try_loaders
 from r2c2r_core.export.openings import NEEDED_OPENING, opening_free
@@ -11,10 +12,11 @@ from r2c2r_core.export.reading import Urdf, read_urdf
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.table import UNSAFE, finding
 from r2c2r_core.export.simulate import Simulation, simulate
-from r2c2r_core.model.report import Blocker, Certificate, Finding, LoaderResult, ThingResult
+from r2c2r_core.model.report import Blocker, Certificate, ColliderFit, Finding, Gap, LoaderResult, ThingResult
 from r2c2r_core.progress import SILENT, Progress
 
 CERTIFICATE_VERSION = 1
+FAR_COLLIDER_M = 0.02  # own choice: a grasp planned on what is drawn misses by as much
 
 _NOT_SIMULATED = Simulation()
 
@@ -27,7 +29,7 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
     """
     progress.at(0.0, "reading the bundle")
     findings = lint(folder)
-    things: tuple[ThingResult, ...] = ()
+    things, colliders = tuple[ThingResult, ...](), tuple[ColliderFit, ...]()
     if any(finding.rule in UNSAFE for finding in findings):
         refused = "not given to it: the bundle names files outside itself"
         loaders = tuple(LoaderResult(loader=name, state="not tried", detail=refused) for name in EVERY_LOADER)
@@ -37,8 +39,9 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
         loaders = try_loaders(folder, urdf, sapien_python, progress=progress.part(0.05, 0.4))
         mjcf = folder / "scene.xml"
         simulation = simulate(mjcf, progress=progress.part(0.4, 1.0)) if mjcf.is_file() else _NOT_SIMULATED
-        things = _things(urdf, BundleFiles(folder=folder), simulation)
-    findings = (*findings, *simulation.findings, *_closed_openings(things))
+        files = BundleFiles(folder=folder)
+        things, colliders = _things(urdf, files, simulation), collider_fits(urdf, files)
+    findings = (*findings, *simulation.findings, *_closed_openings(things), *_far_colliders(colliders))
     failed = any(f.severity == "error" for f in findings) or any(loader.state == "failed" for loader in loaders)
     progress.at(1.0, "certificate passed" if not failed else "certificate failed")
     return Certificate(
@@ -51,6 +54,7 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
         realtime_factor=simulation.realtime_factor,
         things=things,
         together_penetration_m=simulation.together_penetration_m,
+        colliders=colliders,
     )
 
 
@@ -62,7 +66,15 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
         "findings": [
             {"rule": f.rule, "severity": f.severity, "where": f.where, "message": f.message} for f in certificate.findings
         ],
-        "loaders": [{"loader": r.loader, "state": r.state, "detail": r.detail} for r in certificate.loaders],
+        "loaders": [
+            {
+                "loader": r.loader,
+                "state": r.state,
+                "detail": r.detail,
+                "steps_per_s": {str(worlds): round(speed, 1) for worlds, speed in r.steps_per_s},
+            }
+            for r in certificate.loaders
+        ],
         "joints": [
             {
                 "joint": j.joint,
@@ -76,6 +88,14 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
         "things": [
             {"name": t.name, "drift_m": _number(t.drift_m), "opening_free": _optional(t.opening_free)}
             for t in certificate.things
+        ],
+        "colliders": [
+            {
+                "link": fit.link,
+                "drawn_to_collider": _gap_to_json(fit.drawn_to_collider),
+                "collider_to_drawn": _gap_to_json(fit.collider_to_drawn),
+            }
+            for fit in certificate.colliders
         ],
         "rest_penetration_m": _number(certificate.rest_penetration_m),
         "together_penetration_m": _number(certificate.together_penetration_m),
@@ -108,6 +128,23 @@ def _closed_openings(things: tuple[ThingResult, ...]) -> tuple[Finding, ...]:
         for thing in things
         if thing.opening_free is not None and thing.opening_free < NEEDED_OPENING
     )
+
+
+def _far_colliders(fits: tuple[ColliderFit, ...]) -> tuple[Finding, ...]:
+    return tuple(
+        finding(
+            "collider-far",
+            fit.link,
+            f"5 % of what is drawn lies over {1000 * fit.drawn_to_collider.p95_m:.0f} mm from its colliders, "
+            f"5 % of them over {1000 * fit.collider_to_drawn.p95_m:.0f} mm from what is drawn",
+        )
+        for fit in fits
+        if max(fit.drawn_to_collider.p95_m, fit.collider_to_drawn.p95_m) > FAR_COLLIDER_M
+    )
+
+
+def _gap_to_json(gap: Gap) -> dict[str, Any]:
+    return {"median_m": _number(gap.median_m), "p95_m": _number(gap.p95_m), "most_m": _number(gap.most_m)}
 
 
 def _optional(value: float | None) -> float | None:

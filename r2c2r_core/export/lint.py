@@ -7,6 +7,7 @@ from pathlib import Path
 
 from r2c2r_core.export.reading import read_urdf
 from r2c2r_core.export.rules.agreement import check_agreement
+from r2c2r_core.export.rules.assets import check_assets
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.inertia import check_inertia
 from r2c2r_core.export.rules.joints import check_joints
@@ -26,6 +27,7 @@ def lint(folder: Path) -> tuple[Finding, ...]:
         *check_inertia(urdf, files),
         *check_meshes(urdf, files),
         *check_agreement(urdf, files),
+        *check_assets(urdf, files),
         *check_likeness(files),
     ]
     return tuple(sorted(findings, key=lambda f: f.severity))

@@ -12,20 +12,48 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from r2c2r_core.export.omniverse import validated
 from r2c2r_core.export.readback import Readback, differences, expected_readback, readback_of
 from r2c2r_core.export.reading import Urdf
 from r2c2r_core.model.report import LoaderResult
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.threads import in_threads
 
-EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "SAPIEN", "USD")
-SAPIEN_VARIABLE = "R2C2R_SAPIEN_PYTHON"
-
 _PROBES = Path(__file__).parent / "probes"
 _SECONDS = 180
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Apart:
+    """A loader that lives in a Python environment of its own."""
+
+    variable: str  # of the environment, names that Python
+    module: str  # it must be able to import
+    reads: str
+    probe: str
+    seconds: int = _SECONDS  # it may take
+
+
+APART = {
+    "SAPIEN": Apart(variable="R2C2R_SAPIEN_PYTHON", module="sapien", reads="scene.urdf", probe="sapien_probe.py"),
+    "Drake": Apart(variable="R2C2R_DRAKE_PYTHON", module="pydrake", reads="scene.sdf", probe="drake_probe.py"),
+    "MJX": Apart(  # JAX compiles the step for each scene: 80 s of processor for one of 50 shapes
+        variable="R2C2R_MJX_PYTHON", module="mujoco.mjx", reads="scene.xml", probe="mjx_probe.py", seconds=900
+    ),
+    "MuJoCo Warp": Apart(  # its first run compiles a hundred kernels: 70 s of processor
+        variable="R2C2R_WARP_PYTHON", module="mujoco_warp", reads="scene.xml", probe="warp_probe.py", seconds=900
+    ),
+    "Newton": Apart(variable="R2C2R_NEWTON_PYTHON", module="newton", reads="scene.usda", probe="newton_probe.py", seconds=900),
+    "NVIDIA asset validator": Apart(
+        variable="R2C2R_ASSET_VALIDATOR_PYTHON", module="omni.asset_validator", reads="scene.usda", probe="omniverse_probe.py"
+    ),
+}
+EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "USD", *APART)
 
 
 class _NotThereError(Exception):
@@ -38,14 +66,16 @@ def try_loaders(
     """One verdict a loader."""
     expected = expected_readback(urdf)
     scene = folder / "scene.urdf"
-    python = sapien_python or os.environ.get(SAPIEN_VARIABLE)
+    pythons = {name: os.environ.get(own.variable) for name, own in APART.items()}
+    if sapien_python:
+        pythons["SAPIEN"] = sapien_python
     attempts: tuple[tuple[str, Callable[[], dict[str, Any]]], ...] = (
         ("yourdfpy", lambda: _yourdfpy(scene)),
         ("MuJoCo (URDF)", lambda: _mujoco(scene)),
         ("MuJoCo (MJCF)", lambda: _mujoco(folder / "scene.xml")),
         ("PyBullet", lambda: _pybullet(scene)),
-        ("SAPIEN", lambda: _sapien(scene, python)),
         ("USD", lambda: _usd(folder / "scene.usda")),
+        *((name, partial(_apart, folder, APART[name], python)) for name, python in pythons.items()),
     )
 
     def verdict(loader: tuple[str, Callable[[], dict[str, Any]]]) -> LoaderResult:
@@ -56,7 +86,10 @@ def try_loaders(
 
 def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readback) -> LoaderResult:
     try:
-        found = readback_of(attempt())
+        document = attempt()
+        if "issues" in document:
+            return validated(name, document)
+        found = readback_of(document)
     except _NotThereError as error:
         return LoaderResult(loader=name, state="not tried", detail=str(error))
     except Exception as error:  # a loader may raise anything on a bundle it dislikes: that is its verdict
@@ -65,7 +98,7 @@ def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readbac
     if lines:
         more = f" (and {len(lines) - 3} more)" if len(lines) > 3 else ""
         return LoaderResult(loader=name, state="failed", detail=_one_line(f"{found.version}: {'; '.join(lines[:3])}{more}"))
-    return LoaderResult(loader=name, state="passed", detail=_agreed(found))
+    return LoaderResult(loader=name, state="passed", detail=_agreed(found), steps_per_s=found.steps_per_s)
 
 
 def _agreed(found: Readback) -> str:
@@ -99,15 +132,19 @@ def _pybullet(scene: Path) -> dict[str, Any]:
     return _probe([sys.executable, str(_PROBES / "bullet.py")], scene)
 
 
-def _sapien(scene: Path, python: str | None) -> dict[str, Any]:
+def _apart(folder: Path, own: Apart, python: str | None) -> dict[str, Any]:
+    """What the loader's probe says in its own environment."""
     if not python:
-        raise _NotThereError(f"no environment of its own given: set {SAPIEN_VARIABLE} to its python")
+        raise _NotThereError(f"no environment of its own given: set {own.variable} to its python")
     if not Path(python).is_file():
-        raise _NotThereError(f"{SAPIEN_VARIABLE} names {python}, which is not there")
-    present = subprocess.run([python, "-c", "import sapien"], capture_output=True, timeout=_SECONDS, check=False)
+        raise _NotThereError(f"{own.variable} names {python}, which is not there")
+    present = subprocess.run([python, "-c", f"import {own.module}"], capture_output=True, timeout=_SECONDS, check=False)
     if present.returncode != 0:
-        raise _NotThereError(f"{python} cannot import sapien")
-    return _probe([python, str(_PROBES / "sapien_probe.py")], scene)
+        raise _NotThereError(f"{python} cannot import {own.module}")
+    scene = folder / own.reads
+    if not scene.is_file():
+        raise _NotThereError(f"{scene.name} is not in the bundle: an older version wrote it")
+    return _probe([python, str(_PROBES / own.probe)], scene, own.seconds)
 
 
 def _usd(scene: Path) -> dict[str, Any]:
@@ -119,12 +156,12 @@ def _usd(scene: Path) -> dict[str, Any]:
     return _probe([sys.executable, str(_PROBES / "usd.py")], scene)
 
 
-def _probe(command: list[str], scene: Path) -> dict[str, Any]:
+def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str, Any]:
     """Run a loader in a process and a folder of its own: it may crash, print, and write logs where it stands."""
     with tempfile.TemporaryDirectory() as scratch:
         answer = Path(scratch) / "answer.json"
         words = [*command, str(scene.resolve()), str(answer)]
-        run = subprocess.run(words, capture_output=True, timeout=_SECONDS, check=False, cwd=scratch)
+        run = subprocess.run(words, capture_output=True, timeout=seconds, check=False, cwd=scratch)
         if run.returncode != 0 or not answer.is_file():
             said = run.stderr.decode(errors="replace").strip().splitlines()
             died = f"died of {signal.Signals(-run.returncode).name}" if run.returncode < 0 else "gave up"

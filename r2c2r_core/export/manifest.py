@@ -8,9 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from r2c2r_core.export import randomize
+from r2c2r_core.export.labels import Labels, labels_of, labels_of_handle
 from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.export.randomize import Range
 from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.export.seen import Seen
+from r2c2r_core.export.states import STATES, position
+from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.placement import Placement, Spread
@@ -46,6 +51,10 @@ def manifest_of(
             _object_entry(reconstruction, plan, item, (fits or {}).get(item.name), (seen or {}).get(item.name))
             for item in reconstruction.scene.objects
         ],
+        "states": {
+            name: {body.joint_name: _plain(position(body.joint, name)) for body in plan.bodies if body.joint is not None}
+            for name in STATES
+        },
         "contradictions": [
             {"rule": found.rule, "objects": list(found.objects), "message": found.message, "mend": found.mend}
             for found in reconstruction.contradictions
@@ -83,7 +92,8 @@ def _object_entry(
     reconstruction: Reconstruction, plan: Plan, item: SceneObject, fit: ScanFit | None, seen: Seen | None
 ) -> dict[str, Any]:
     bodies = plan.of(item.name)
-    joints = [_joint_entry(item, body) for body in bodies if body.joint is not None]
+    mass_kg = float(sum(body.link.inertial.mass_kg for body in bodies))
+    joints = [_joint_entry(item, body, plan) for body in bodies if body.joint is not None]
     track = next((t for t in reconstruction.tracks if t.name == item.name), None)
     candidates = next((c for c in reconstruction.candidates if c.object_name == item.name), None)
     placement = next((p for p in reconstruction.placements if p.object_name == item.name), None)
@@ -95,8 +105,10 @@ def _object_entry(
         "world_from_object": _plain((bodies[0].world_from_body @ bodies[0].link.object_from_link.inverse).matrix),
         "joint": joints[0] if joints else None,
         "joints": joints,  # a double door has two
+        "labels": {body.name: _labels_entry(labels_of(body)) for body in bodies},
         "movable": item.movable,
         "dimension_source": list(item.dimension_sources),
+        "inside_source": dict(item.inside_sources),
         "layout_move_m": _plain(reconstruction.scene.layout_moves_m.get(item.name)),
         "mask": None if track is None else _mask_entry(reconstruction, track),
         "candidates": [] if candidates is None else _candidate_entries(candidates),
@@ -109,12 +121,13 @@ def _object_entry(
             "visual": [body.visual_file for body in bodies if body.visual_file is not None],
             "collision": [name for body in bodies for name in body.collision_files],
         },
-        "mass_kg": _plain(sum(body.link.inertial.mass_kg for body in bodies)),
+        "mass_kg": _plain(mass_kg),
+        "randomize": _ranges_entry(randomize.of_object(item, mass_kg, placement)),
         "warnings": [*_warnings(item, track, placement, candidates), *plan.notes(item.name)],
     }
 
 
-def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
+def _joint_entry(item: SceneObject, body: Body, plan: Plan) -> dict[str, Any]:
     joint = body.joint
     assert joint is not None
     return {
@@ -128,6 +141,38 @@ def _joint_entry(item: SceneObject, body: Body) -> dict[str, Any]:
         "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
         "confidence": _plain(joint.confidence),
         "motion": None if joint.motion is None else _motion_entry(joint.motion),
+        "randomize": _ranges_entry(randomize.of_joint(joint)),
+        "handles": [_handle_entry(handle, labels_of_handle(handle, body)) for handle in plan.handles_of(body.name)],
+    }
+
+
+def _ranges_entry(ranges: Mapping[str, Range | list[Range]]) -> dict[str, Any]:
+    return {
+        name: [_plain(asdict(one)) for one in found] if isinstance(found, list) else _plain(asdict(found))
+        for name, found in ranges.items()
+    }
+
+
+def _labels_entry(labels: Labels) -> dict[str, Any]:
+    return {"category": labels.category, "part": labels.part, "disposition": list(labels.disposition)}
+
+
+def _handle_entry(handle: Handle, labels: Labels) -> dict[str, Any]:
+    pose = handle.world_from_handle
+    return {
+        "name": handle.name,
+        "kind": handle.kind,
+        "link": handle.link,
+        "labels": _labels_entry(labels),
+        "centre": _plain(pose.translation),
+        "axis": _plain(pose.rotation[:, 0]),
+        "closing": _plain(pose.rotation[:, 1]),
+        "approach": _plain(pose.rotation[:, 2]),
+        "opening": _plain(handle.opening_world),
+        "size_m": _plain(handle.size_m),
+        "protrusion_m": _plain(handle.protrusion_m),
+        "gap_m": _plain(handle.gap_m),
+        "room": _plain(asdict(handle.room)),
     }
 
 

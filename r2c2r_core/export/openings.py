@@ -23,19 +23,21 @@ def opening_free(link: UrdfLink, files: BundleFiles) -> float | None:
     filled = np.zeros(len(hollow), dtype=bool)
     for shape in link.shapes:
         if shape.kind == "collision":
-            filled |= _inside(hollow, shape.link_from_shape.apply(_corners(shape.box_m, shape.mesh, files)))
+            filled |= inside_hull(hollow, shape.link_from_shape.apply(shape_corners(shape.box_m, shape.mesh, files)))
     return float(1.0 - filled.mean())
 
 
-def _corners(box_m: np.ndarray | None, mesh: str | None, files: BundleFiles) -> Points:
+def shape_corners(box_m: np.ndarray | None, mesh: str | None, files: BundleFiles) -> Points:
+    """Corners of a box or vertices of a mesh, in the shape's frame; none of what cannot be read."""
     if box_m is not None:
         return np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * box_m
     found = files.mesh(mesh) if mesh is not None else None
     return found.vertices if found is not None else np.zeros((0, 3))
 
 
-def _inside(points: Points, corners: Points) -> np.ndarray:
+def inside_hull(points: Points, corners: Points, deeper_m: float = 0.0) -> np.ndarray:
+    """Which points (n,) lie in the convex hull of the corners, deeper than so much."""
     if len(corners) < 4:
         return np.zeros(len(points), dtype=bool)
     planes = ConvexHull(corners, qhull_options="QJ").equations
-    return np.asarray((points @ planes[:, :3].T + planes[:, 3] < 0).all(axis=1))
+    return np.asarray((points @ planes[:, :3].T + planes[:, 3] < -deeper_m).all(axis=1))

@@ -14,6 +14,7 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.walls import floor_height
+from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
 
 WORLD = "world"
@@ -24,6 +25,7 @@ class Body:
     """One link as it is written; geometry in its own frame."""
 
     object_name: str
+    category: str  # of its object, as the person wrote it
     name: str  # link name, starts with the object's name, unique in the bundle
     parent: str  # WORLD or the name of another body
     parent_from_body: Rigid3  # closed
@@ -35,11 +37,12 @@ class Body:
     link: Link
     texture_file: str | None  # relative to the bundle; bodies of one object share equal textures
     is_support: bool = False  # a plate of support.py, no part of the object
+    bundle: str = ""  # the bundle's folder, seen from the file that is written
 
     @property
     def folder(self) -> str:
-        """Folder of its meshes, relative to the bundle."""
-        return f"meshes/{self.object_name}"
+        """Folder of its meshes, relative to the file that is written."""
+        return f"{self.bundle}meshes/{self.object_name}"
 
     @property
     def visual_file(self) -> str | None:
@@ -59,10 +62,19 @@ class Plan:
     name: str
     bodies: tuple[Body, ...]
     floor_z_m: float
+    handles: tuple[Handle, ...] = ()  # of its joints, once `with_handles` has looked
 
     def of(self, object_name: str) -> tuple[Body, ...]:
         """The bodies of one object, its base first."""
         return tuple(body for body in self.bodies if body.object_name == object_name and not body.is_support)
+
+    def body(self, name: str) -> Body:
+        """The body of this name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def handles_of(self, link_name: str) -> tuple[Handle, ...]:
+        """The handles that are parts of one link."""
+        return tuple(handle for handle in self.handles if handle.link == link_name)
 
     def numbers(self, object_name: str) -> list[int]:
         """Places, from 1, of the object's own bodies."""
@@ -105,6 +117,7 @@ def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
         bodies.append(
             Body(
                 object_name=item.name,
+                category=item.category,
                 name=name,
                 parent=WORLD if base else names[parent_link],
                 parent_from_body=object_from_parent.inverse @ link.object_from_link,

@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Image, Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan, facing
 from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
-from r2c2r_core.geometry.camera import Intrinsics, pixel_centres
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.texels import texture_colours
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
@@ -192,9 +192,7 @@ def _floor_behind(
 ) -> tuple[np.ndarray, np.ndarray]:
     """World points (h, w, 3) and depth with the floor plane put where nothing else is seen; 0 is the sky."""
     world_from_camera = camera_from_world.inverse
-    right, down, forward = world_from_camera.rotation.T.astype(np.float32)
-    uv = ((pixel_centres(camera) - [camera.cx, camera.cy]) / camera.fx).astype(np.float32)
-    rays = uv[..., :1] * right + uv[..., 1:] * down + forward  # in the world, of unit depth
+    rays = pixel_rays(pixel_centres(camera), camera).astype(np.float32) @ camera_from_world.rotation.astype(np.float32)
     slopes = rays[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         to_floor = (floor_z_m - world_from_camera.translation[2]) / slopes

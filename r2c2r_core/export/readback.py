@@ -53,6 +53,8 @@ class Readback:
     joints: dict[str, HeldJoint]
     bodies: dict[str, HeldBody]
     problem: str = ""
+    in_world: frozenset[str] = frozenset()  # links that the loader holds as a part of the world, without a body
+    steps_per_s: tuple[tuple[int, float], ...] = ()  # worlds at once, and steps of all of them in a second
 
     @property
     def not_kept(self) -> tuple[str, ...]:
@@ -67,7 +69,14 @@ def readback_of(document: dict[str, Any]) -> Readback:
     """The answer of a probe: plain lists and numbers by the names of the fields above."""
     joints = {name: HeldJoint(**_arrays(entry)) for name, entry in document["joints"].items()}
     bodies = {name: HeldBody(**_arrays(entry)) for name, entry in document["bodies"].items()}
-    return Readback(version=document["version"], joints=joints, bodies=bodies, problem=document.get("problem", ""))
+    return Readback(
+        version=document["version"],
+        joints=joints,
+        bodies=bodies,
+        problem=document.get("problem", ""),
+        in_world=frozenset(document.get("in_world", ())),
+        steps_per_s=tuple((int(worlds), float(speed)) for worlds, speed in document.get("steps_per_s", {}).items()),
+    )
 
 
 def expected_readback(urdf: Urdf) -> Readback:
@@ -90,7 +99,7 @@ def differences(expected: Readback, found: Readback) -> list[str]:
     lines += _set_differences("joint", set(expected.joints), set(found.joints))
     for name in sorted(set(expected.joints) & set(found.joints)):
         lines += [f"{name} {phrase}" for phrase in _joint_differences(expected.joints[name], found.joints[name])]
-    lines += _set_differences("link", set(expected.bodies), set(found.bodies))
+    lines += _set_differences("link", set(expected.bodies) - found.in_world, set(found.bodies))
     for name in sorted(set(expected.bodies) & set(found.bodies)):
         lines += [f"{name} {phrase}" for phrase in _body_differences(expected.bodies[name], found.bodies[name])]
     return lines

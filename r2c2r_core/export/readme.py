@@ -1,7 +1,10 @@
 """README.txt of a bundle: how to load it where, what each file leaves out, and what may be done with it."""
 
+from textwrap import indent, wrap
+
 from r2c2r_core.export.manifest import tool_version
 from r2c2r_core.export.plan import Plan
+from r2c2r_core.export.simulators import Recipe, recipes
 from r2c2r_core.export.writers.table import formats
 
 
@@ -10,34 +13,54 @@ def readme_text(plan: Plan) -> str:
     losses = "\n".join(f"{entry.file}\n" + "\n".join(f"  - {line}" for line in entry.loses) for entry in formats())
     joints = [body.joint_name for body in plan.bodies if body.joint is not None]
     example = joints[0] if joints else "JOINT"
-    return _TEMPLATE.format(name=plan.name, version=tool_version(), joints=len(joints), losses=losses, example=example)
+    base = plan.bodies[0]
+    return _TEMPLATE.format(
+        name=plan.name,
+        version=tool_version(),
+        joints=len(joints),
+        losses=losses,
+        example=example,
+        object=base.object_name,
+        simulators="\n".join(_recipe_lines(recipe) for recipe in recipes(plan.name, base.object_name)),
+        body=base.name.removeprefix(f"{base.object_name}_"),
+    )
 
 
+def _recipe_lines(recipe: Recipe) -> str:
+    note = "\n".join(wrap(recipe.note, _WIDTH - 4))
+    return "\n".join(
+        [f"  {recipe.simulator} ({recipe.install})", *(indent(text, "    ") for text in (recipe.code, note) if text)]
+    )
+
+
+_WIDTH = 120
 _TEMPLATE = """\
 {name}: a scanned scene that opens ({joints} joints), written by r2c2r {version}
 Metres, kilograms, radians, +Z up. Every joint is closed at 0 and opens towards its upper limit.
 
 FILES
   scene.urdf     yourdfpy, PyBullet, SAPIEN, ROS, MuJoCo        scene.xml   MuJoCo
-  scene.usda     Isaac Sim, Omniverse, anything that reads USD  preview.png
+  scene.usda     Isaac Sim, Omniverse, anything that reads USD  scene.usdz  the same in one file
+  scene.sdf      Gazebo, Drake                                  scene.srdf  MoveIt, SAPIEN: pairs that never collide
+  package.xml    the folder as a ROS 2 package; ros/ has RViz's view and the URDF with package:// paths and handle frames
   scene.glb      web viewers, Blender (+Y up, as glTF demands)  review.html the scene to open and turn, in any browser
   manifest.json  where every number comes from                  report.html the certificate, for reading
+  gripper/ arm/  a sheet of pictures of a gripper, and of an arm with the places where it stands, at every joint they tried
+  assets/        each object alone (.urdf .xml .usda .glb): origin under the middle of its foot, front at -Y, closed, no floor,
+                 no gravity; textures and meshes are those of meshes/, so keep the two folders side by side
+  preview.png    the scene
   meshes/        textured OBJ to see (_vis), convex OBJ to touch (_col_); boxes stand in scene.urdf and scene.xml
 
 LOADING  (unpack first; run in the bundle's folder)
-  MuJoCo     python -m mujoco.viewer --mjcf=scene.xml
-  PyBullet   pybullet.loadURDF("scene.urdf", flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
-             Without that flag PyBullet makes up its own inertias. The scene holds still without useFixedBase.
-             Add pybullet.URDF_USE_SELF_COLLISION to let doors touch their neighbours. Switch each joint's
-             default motor off before pushing: setJointMotorControl2(..., VELOCITY_CONTROL, force=0).
-  SAPIEN     loader = scene.create_urdf_loader(); loader.fix_root_link = True; loader.load("scene.urdf")
-             Without a Vulkan GPU remove the <visual> elements first. SAPIEN 3 drops the friction, effort and
-             velocity of joints (its own friction is 0.05): call joint.set_friction(friction) and
-             joint.set_drive_property(0, damping, effort) with the numbers of scene.urdf.
-  Isaac Sim  File > Open scene.usda, or add it as a reference. Each fixture with joints is one articulation; the drives damp
-             (stiffness 0): raise stiffness to hold a position. Joint friction is in PhysxJointAxisAPI (Isaac Sim 5, PhysX 5.6).
-  ROS        give the text of scene.urdf to robot_state_publisher as robot_description. RViz wants absolute mesh paths:
-             prefix the file names with file://<this folder>/ or package://<your package>/.
+{simulators}
+  An object  MuJoCo  <model name="a" file="assets/{object}/{object}.xml"/> among the assets, then
+                     <frame pos="1 0 0"><attach model="a" body="{body}" prefix="{object}_"/></frame> in the world
+             USD     prim.GetReferences().AddReference("assets/{object}/{object}.usda")
+  Handles    each is a site (scene.xml), a prim (scene.usda), a node (scene.glb) and an <r2c2r><handle> (scene.urdf), in the
+             frame of a gripper that holds it: x along the grip, y the way fingers close, z into the front. manifest.json has
+             its size, protrusion, free room and opening direction. A front without a handle has a point to push.
+  Labels     category, part and disposition (openable, graspable, pushable) of every part: UsdSemantics.LabelsAPI in USD, a
+             <custom><text> named as the body or site in MJCF, node extras in GLB, <r2c2r><labels> in URDF
   Python     yourdfpy.URDF.load("scene.urdf").show()
   A joint    model.joint("{example}")
 

@@ -13,6 +13,7 @@ from r2c2r_core.export.seen import unseen_words
 from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import formats
 from r2c2r_core.model.report import Certificate
+from r2c2r_core.robot.arm_certificate import MAP
 from r2c2r_core.texts import shown
 
 REPORT_VERSION = 1
@@ -20,14 +21,27 @@ REPORT_VERSION = 1
 _ASSETS = Path(__file__).parent / "report_page"
 
 
-def report_of(manifest: dict[str, Any], certificate: Certificate, failures: dict[str, str]) -> dict[str, Any]:
-    """The report as a JSON document. The speed of the simulation is left out: it says something about this machine."""
+def report_of(
+    manifest: dict[str, Any],
+    certificate: Certificate,
+    failures: dict[str, str],
+    gripper: dict[str, Any] | None = None,
+    arm: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The report as a JSON document. The speed of the simulation is left out: it says something about this machine.
+
+    `gripper` and `arm` are their certificates as JSON; None where they did not try.
+    """
     judged = certificate_to_json(certificate)
     judged.pop("realtime_factor")
+    for loader in judged["loaders"]:
+        loader.pop("steps_per_s")
     return {
         "version": REPORT_VERSION,
         "tool_version": manifest["tool_version"],
         "certificate": judged,
+        "gripper": gripper,
+        "arm": arm,
         "objects": [_object_row(entry) for entry in manifest["objects"]],
         "failures": dict(sorted(failures.items())),
         "losses": {entry.file: list(entry.loses) for entry in formats()},
@@ -51,6 +65,9 @@ def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict
             _objects(manifest["objects"], pictures),
             _joints(manifest["objects"], certificate["joints"]),
             _things(certificate["things"]),
+            _colliders(certificate["colliders"]),
+            _gripper(report["gripper"]),
+            _arm(report["arm"]),
             _loaders(certificate["loaders"]),
             _stages(manifest["stages"]),
             _losses(report["losses"]),
@@ -253,6 +270,82 @@ def _things(things: list[dict[str, Any]]) -> str:
     ]
     head = ["free-standing", "moved in 5 s, left alone", "its hollow free of colliders"]
     return "<h2>Free-standing things</h2>" + _table(head, rows, numeric=(1, 2))
+
+
+def _colliders(colliders: list[dict[str, Any]]) -> str:
+    """How far what an engine touches lies from what is drawn."""
+    if not colliders:
+        return ""
+    ways = ("drawn_to_collider", "collider_to_drawn")
+    worst = sorted(colliders, key=lambda fit: -max(fit[way]["p95_m"] for way in ways))
+    rows = [
+        [_name(fit["link"]), *(_millimetres(fit[way][key]) for way in ways for key in ("median_m", "p95_m", "most_m"))]
+        for fit in worst
+    ]
+    head = ["link", "drawn to collider", "95 %", "most", "collider to drawn", "95 %", "most"]
+    said = "Distances in millimetres from points of one surface to the other: the median, what 95 % keep below, and the most."
+    return f'<h2>Colliders beside what is drawn</h2><p class="quiet">{said}</p>' + _table(
+        head, rows, numeric=tuple(range(1, 7))
+    )
+
+
+def _gripper(gripper: dict[str, Any] | None) -> str:
+    """What the gripper did, with a sheet of pictures of each."""
+    if gripper is None or not gripper["grips"]:
+        return ""
+    about = gripper["gripper"]
+    said = (
+        f"A floating parallel gripper ({1000 * about['stroke_m']:.0f} mm stroke, {about['grips_n'][0]:.0f} N, "
+        f"or {about['grips_n'][1]:.0f} N where that slips) held by nothing but the friction of its pads opened and closed "
+        f"{gripper['joints_opened']} of {gripper['joints']} joints and moved {gripper['things_moved']} of {gripper['things']} "
+        f"free things by 10 cm. push: no handle; pressed, then taken as thrown out {1000 * about['latch_throw_m']:.0f} mm by a "
+        "push latch, which is no part of the bundle, and pulled by its edge."
+    )
+    return f'<h2>A gripper</h2><p class="quiet">{said}</p>' + _grips("gripper", gripper["grips"])
+
+
+def _arm(arm: dict[str, Any] | None) -> str:
+    """Where the arm stands on the floor plan, and what it did from there."""
+    if arm is None or arm.get("grips") == []:
+        return ""
+    if "why" in arm:
+        return f"<h2>An arm</h2><p>Not tried: {_text(arm['why'])}</p>"
+    about = arm["arm"]
+    said = (
+        f"A {_text(about['name'])} ({_text(about['source'])}) on a lifting column reaches {arm['joints_in_reach']} of "
+        f"{arm['joints']} joints without meeting anything, from {len(arm['places'])} places. It opened and closed "
+        f"{arm['joints_opened']} of them by the friction of its pads."
+    )
+    picture = (
+        f'<img src="arm/{MAP}" alt="The floor plan with the places where the arm stands, numbered; they are listed in it">'
+    )
+    return f'<h2>An arm</h2><p class="quiet">{said}</p><figure>{picture}</figure>' + _grips("arm", arm["grips"])
+
+
+def _grips(folder: str, grips: list[dict[str, Any]]) -> str:
+    rows = [
+        [
+            _sheet(folder, grip["film"]),
+            _name(grip["name"]),
+            _judged("yes" if grip["passed"] else "no", grip["passed"]),
+            _text(grip["method"] or "–"),
+            "–" if grip["grip_n"] is None else f"{grip['grip_n']:.0f} N",
+            _percent(grip["opened"]),
+            _millimetres(grip["slip_m"] if grip["kind"] == "joint" else grip["off_m"]),
+            "–" if grip["force_n"] is None else f"{grip['force_n']:.0f} N",
+            _text(f"{grip['why']} (the {grip['blame']})" if grip["why"] else "–"),
+        ]
+        for grip in grips
+    ]
+    head = ["", "where", "done", "how", "grip", "opened", "slip, or off its place", "most force", "why not, and whose doing"]
+    return _table(head, rows, numeric=(4, 5, 6, 7))
+
+
+def _sheet(folder: str, name: str | None) -> str:
+    if name is None:
+        return ""
+    file = _text(f"{folder}/{name}")
+    return f'<a href="{file}.jpg"><img class="sheet" src="{file}.jpg" alt="The {folder} at {_text(name)}"></a>'
 
 
 def _loaders(loaders: list[dict[str, Any]]) -> str:

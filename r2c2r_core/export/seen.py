@@ -109,6 +109,8 @@ def _are_seen(looks: Looks, frames: Sequence[Frame], bodies: Sequence[int], spot
     seen = np.zeros(len(spots.points), dtype=bool)
     for frame in frames:
         left = np.flatnonzero(~seen)
+        if len(left) == 0:
+            break
         seen[left] = _sees(looks.at(frame), frame, bodies, spots.points[left], spots.normals[left])
     return seen
 
@@ -120,6 +122,7 @@ def _sees(look: Look, frame: Frame, bodies: Sequence[int], points: Points, norma
     uv = project(local, frame.depth_camera)
     drawn, inside = sample_nearest(look.drawn_m, uv)
     body, _ = sample_nearest(look.bodies, uv)
-    measured, _ = sample_nearest(np.where(look.known, look.measured_m, np.inf), uv)
+    measured, _ = sample_nearest(look.measured_m, uv)
+    known, _ = sample_nearest(look.known, uv)
     shown = inside & (local[:, 2] > 0) & np.isin(body, bodies) & (np.abs(drawn - local[:, 2]) < _OWN_M)
-    return np.asarray(shown & faces_eye & (measured > local[:, 2] - HIDDEN_M))
+    return np.asarray(shown & faces_eye & (~known | (measured > local[:, 2] - HIDDEN_M)))

@@ -114,6 +114,19 @@ def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
             yield finding("overlap", touch.names.partition(" ")[0], f"{touch.names} overlap by {1000 * touch.depth_m:.1f} mm")
 
 
+def without_visuals(spec: Any) -> None:
+    """Take from an MjSpec what is only seen: it takes seconds to load."""
+    for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
+        spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for part in [m for m in spec.meshes if m.name not in used]:
+        spec.delete(part)
+    for geom in spec.geoms:
+        geom.material = ""
+    for part in [*spec.materials, *spec.textures]:
+        spec.delete(part)
+
+
 def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:
     """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go.
 
@@ -124,15 +137,7 @@ def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loose
     mujoco.set_mju_user_warning(_LOG.debug)  # else a scene that diverges leaves MUJOCO_LOG.TXT where the person works
     ET.fromstring(mjcf.read_text(encoding="utf-8"))  # MuJoCo takes names that are no text, and cannot say them
     spec = mujoco.MjSpec.from_file(str(mjcf))
-    for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
-        spec.delete(geom)
-    used = {geom.meshname for geom in spec.geoms}
-    for part in [m for m in spec.meshes if m.name not in used]:
-        spec.delete(part)
-    for geom in spec.geoms:
-        geom.material = ""
-    for part in [*spec.materials, *spec.textures]:
-        spec.delete(part)
+    without_visuals(spec)
     if strict:
         for exclude in list(spec.excludes):
             spec.delete(exclude)

@@ -3,19 +3,22 @@
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.disk import explained_io
-from r2c2r_core.errors import ExportFailed
+from r2c2r_core.errors import BundleError, ExportFailed
 from r2c2r_core.export.archive import building_folder, opened_bundle, replace_folder, write_zip
 from r2c2r_core.export.certify import certificate_to_json, certify
+from r2c2r_core.export.gripping import SCENE, arm_tried, begin_gripping
+from r2c2r_core.export.handles import with_handles
+from r2c2r_core.export.lint import lint
 from r2c2r_core.export.looks import looks_of
 from r2c2r_core.export.manifest import manifest_of, with_blockers
 from r2c2r_core.export.pictures import write_pictures
@@ -24,21 +27,36 @@ from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.review import review_html
+from r2c2r_core.export.rules.table import UNSAFE
 from r2c2r_core.export.scan_fit import ScanFit, scan_fits
 from r2c2r_core.export.seal import check_seal, checksums
 from r2c2r_core.export.seen import Seen, seen_sides
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_body
-from r2c2r_core.export.writers.table import write_formats
+from r2c2r_core.export.writers.table import formats, write_formats
 from r2c2r_core.failing import apart
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.model.scene import ArticulatedScene
+from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.robot.arm_certificate import ArmCertificate, arm_to_json, certify_with_arm
+from r2c2r_core.robot.certificate import GripperCertificate, certify_with_gripper, gripper_to_json
 from r2c2r_core.schema.settings import setting
 
-__all__ = ["ExportConfig", "certificate_to_json", "check_bundle", "write_bundle"]
+__all__ = [
+    "ExportConfig",
+    "arm_to_json",
+    "certificate_to_json",
+    "check_bundle",
+    "grip_bundle",
+    "gripper_to_json",
+    "reach_bundle",
+    "write_bundle",
+]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,17 +68,24 @@ class ExportConfig:
     )
     keep_folder: bool = setting(False, "whether the unpacked bundle stays beside the zip, under its name without .zip")
     pictures: bool = setting(True, "whether report.html shows a photo beside the model for each object")
+    gripper: bool = setting(True, "whether a gripper tries every joint and free thing, and report.html shows pictures of it")
+    arm: bool = setting(
+        False, "whether a Franka Panda tries every joint within its reach, and report.html shows where it stands (extra arm)"
+    )
 
 
 def write_bundle(
     reconstruction: Reconstruction,
     destination: Path,
     config: ExportConfig,
+    pool: Pool | None = None,
     *,
     created: str | None = None,
     progress: Progress = SILENT,
 ) -> Certificate:
     """Write the certified bundle to `destination` (a .zip) and return its certificate, passed or not.
+
+    The gripper tries its joints in the processes of `pool` (None: here) beside what else judges the bundle.
 
     The zip appears whole or not at all, and equal inputs give equal bytes: `created` (ISO 8601) is the only time in it, and
     None leaves it to SOURCE_DATE_EPOCH, or out. Raises ExportFailed on a scene without objects and EnvironmentProblem on a
@@ -74,7 +99,10 @@ def write_bundle(
         reconstruction = replace(
             reconstruction, scene=_without(reconstruction.scene, lost), failures=reconstruction.failures | lost
         )
-        write_formats(plan, folder, progress=progress.part(0.05, 0.1))
+        tried = [entry for entry in formats() if entry.file == SCENE]
+        write_formats(plan, folder, tried)  # first, so that the gripper begins
+        gripped = begin_gripping(folder, pool or Pool(1), progress.part(0.7, 0.9)) if config.gripper else None
+        write_formats(plan, folder, [entry for entry in formats() if entry not in tried], progress=progress.part(0.05, 0.1))
         fits, seen, pictures = dict[str, ScanFit](), dict[str, Seen](), dict[str, str]()
         with apart("export", "the fit to the scan", {}):
             looks = looks_of(reconstruction.capture, plan)
@@ -89,9 +117,11 @@ def write_bundle(
         with apart("export", "pictures", {}):
             if config.pictures:
                 pictures = write_pictures(reconstruction, plan, folder, progress=progress.part(0.3, 0.4))
-        certificate = certify(folder, progress=progress.part(0.4, 0.9))
+        certificate = certify(folder, progress=progress.part(0.4, 0.7))
+        gripper = gripped() if gripped is not None else None
+        arm = arm_tried(folder, progress.part(0.85, 0.9)) if config.arm else None
         manifest = with_blockers(manifest, plan, certificate.joints)
-        _write_reports(folder, manifest, certificate, reconstruction.failures, pictures)
+        _write_reports(folder, manifest, certificate, reconstruction.failures, pictures, gripper, arm)
         with apart("export", "review.html", {}):
             review = review_html(plan, certificate, _filmed_from(reconstruction.capture), seen)
             (folder / "review.html").write_text(review, encoding="utf-8")
@@ -118,7 +148,8 @@ def _with_meshes(scene: ArticulatedScene, folder: Path, texture_max_px: int) -> 
                 write_body(body, folder, texture_max_px)
     for name in lost:
         shutil.rmtree(folder / "meshes" / name, ignore_errors=True)
-    return supported(replace(plan, bodies=tuple(body for body in plan.bodies if body.object_name not in lost))), lost
+    written = replace(plan, bodies=tuple(body for body in plan.bodies if body.object_name not in lost))
+    return with_handles(supported(written)), lost
 
 
 def _without(scene: ArticulatedScene, lost: Mapping[str, str]) -> ArticulatedScene:
@@ -141,10 +172,46 @@ def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Prog
     return replace(certificate, passed=certificate.passed and not changed, findings=tuple(findings))
 
 
+def grip_bundle(path: Path, films: Path | None = None, *, progress: Progress = SILENT) -> GripperCertificate:
+    """Let the gripper open every joint of a bundle, zip or folder, and move its free things; films go to the folder `films`.
+
+    Raises BundleError on a foreign, truncated or unsafe one, and on one without a readable scene.xml.
+    """
+    return _tried(path, lambda scene: certify_with_gripper(scene, films, progress=progress))
+
+
+def reach_bundle(path: Path, films: Path | None = None, *, progress: Progress = SILENT) -> ArmCertificate:
+    """Let an arm open every joint of a bundle that it can reach; films and the map of where it stands go to `films`.
+
+    Raises as grip_bundle does, and BackendUnavailable without the arm's extra.
+    """
+    return _tried(path, lambda scene: certify_with_arm(scene, films, progress=progress))
+
+
+def _tried(path: Path, certified: Callable[[Path], T]) -> T:
+    with opened_bundle(path) as folder, explained_io(path):
+        unsafe = [found for found in lint(folder) if found.rule in UNSAFE]
+        if unsafe:
+            raise BundleError(
+                f"{path}: {unsafe[0].message}", hint="no simulator is given a bundle that names files outside itself"
+            )
+        try:
+            return certified(folder / SCENE)
+        except ValueError as error:
+            why = str(error).partition("\n")[0]
+            raise BundleError(f"{path}: MuJoCo cannot load scene.xml ({why})", hint="r2c2r check says more") from error
+
+
 def _write_reports(
-    folder: Path, manifest: dict[str, Any], certificate: Certificate, failures: dict[str, str], pictures: dict[str, str]
+    folder: Path,
+    manifest: dict[str, Any],
+    certificate: Certificate,
+    failures: dict[str, str],
+    pictures: dict[str, str],
+    gripper: dict[str, Any] | None,
+    arm: dict[str, Any] | None,
 ) -> None:
-    report = report_of(manifest, certificate, failures)
+    report = report_of(manifest, certificate, failures, gripper, arm)
     _write_json(folder / "report.json", report)
     (folder / "report.html").write_text(report_html(manifest, report, pictures), encoding="utf-8")
 

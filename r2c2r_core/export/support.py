@@ -112,6 +112,7 @@ def _plate(thing: Body, points: Points) -> Body:
     )
     return Body(
         object_name=thing.object_name,
+        category=thing.category,
         name=name,
         parent=WORLD,
         parent_from_body=pose,

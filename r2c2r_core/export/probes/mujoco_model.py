@@ -13,6 +13,13 @@ def read_back(scene: Path) -> dict[str, Any]:
     model = mujoco.MjModel.from_xml_path(str(scene))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    return held_by(model, data)
+
+
+def held_by(model: Any, data: Any) -> dict[str, Any]:
+    """What a model holds whose kinematics `data` is computed for."""
+    import mujoco
+
     moving = [j for j in range(model.njnt) if model.jnt_type[j] in _KINDS]
     return {
         "version": f"MuJoCo {mujoco.__version__}",

@@ -1,6 +1,5 @@
 """Whether the manifest and scene.xml tell the same story as scene.urdf."""
 
-import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
@@ -10,6 +9,7 @@ from r2c2r_core.documents import parse_json
 from r2c2r_core.errors import BundleError
 from r2c2r_core.export.plan import WORLD
 from r2c2r_core.export.reading import MOVING, Urdf, UrdfJoint
+from r2c2r_core.export.rules.assets import USD_REFERENCE
 from r2c2r_core.export.rules.files import BundleFiles, is_inside
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.export.writers.table import FORMATS, formats
@@ -18,8 +18,7 @@ from r2c2r_core.model.report import Finding
 from r2c2r_core.schema.document import checked
 from r2c2r_core.schema.manifest import Manifest, ManifestJoint, ManifestObject
 
-REQUIRED_FILES = (*(entry.file for entry in FORMATS), "manifest.json", "preview.png", "README.txt")
-_USD_ASSET = re.compile(r"@@@(.+?)@@@|@([^@\n]+)@")
+REQUIRED_FILES = (*(entry.file for entry in FORMATS if entry.required), "manifest.json", "preview.png", "README.txt")
 SUPPORT_SUFFIX = "_support"
 """Links of this ending hold a free-standing thing up; they belong to no object."""
 
@@ -57,7 +56,7 @@ def _own_checks(files: BundleFiles) -> Iterator[Finding]:
 def _usd(content: bytes) -> Iterator[Finding]:
     if not content.startswith(b"#usda 1."):
         yield finding("usd-parse", "scene.usda", "does not begin with '#usda 1.'")
-    for triple, single in _USD_ASSET.findall(content.decode(errors="replace")):
+    for triple, single in USD_REFERENCE.findall(content.decode(errors="replace")):
         if not is_inside((triple or single).removeprefix("./")):
             yield finding("usd-path", "scene.usda", f"reads '{triple or single}'")
 

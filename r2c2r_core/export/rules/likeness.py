@@ -5,8 +5,10 @@ from typing import Any
 
 from r2c2r_core.documents import parse_json
 from r2c2r_core.errors import BundleError
+from r2c2r_core.export.handles import out_of_reach
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.table import LIKENESS_RULES, finding
+from r2c2r_core.model.handle import Room
 from r2c2r_core.model.report import Finding
 
 _LEAST_TRAVEL = 0.5  # of what its kind opens: less, and its unit or its neighbour is in the wrong place
@@ -21,8 +23,8 @@ def check_likeness(files: BundleFiles) -> Iterator[Finding]:
         manifest = parse_json(path.read_bytes(), "manifest.json", BundleError, hint="")
         present = {item["name"] for item in manifest["objects"]}
         yield from _contradictions(manifest.get("contradictions", []), present)
-        yield from (found for item in manifest["objects"] for joint in item.get("joints", []) for found in _cut_short(joint))
-    except (BundleError, KeyError, TypeError, AttributeError):
+        yield from (found for item in manifest["objects"] for joint in item.get("joints", []) for found in _of_joint(joint))
+    except (BundleError, KeyError, IndexError, TypeError, AttributeError):
         return
 
 
@@ -31,6 +33,16 @@ def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterato
     for entry in entries:
         if entry["rule"] in LIKENESS_RULES and present.issuperset(entry["objects"]):
             yield finding(entry["rule"], ", ".join(entry["objects"]), f"{entry['message']}; {entry['mend']}")
+
+
+def _of_joint(joint: dict[str, Any]) -> Iterator[Finding]:
+    yield from _cut_short(joint)
+    for handle in joint.get("handles", []):
+        room = handle["room"]
+        free = Room(before_m=room["before_m"], beside_m=tuple(room["beside_m"]), depth_m=tuple(room["depth_m"]))
+        reason = out_of_reach(handle["kind"], handle["size_m"][1], free)
+        if reason is not None:
+            yield finding("handle-reach", handle["name"], f"a gripper 9 cm wide cannot take it: {reason}")
 
 
 def _cut_short(joint: dict[str, Any]) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ import numpy as np
 from r2c2r_core.export.reading import MOVING, Urdf, UrdfLink, UrdfShape
 from r2c2r_core.export.rules.files import BundleFiles, ObjMesh
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.export.writers.meshes import MOST_COPLANAR, MOST_HULL_VERTICES, coplanar
 from r2c2r_core.model.report import Finding
 
 _FLAT_M = 2e-4
@@ -49,6 +50,14 @@ def convexity_defect(mesh: ObjMesh) -> str | None:
     if _closed(mesh) and volume < _FILLED_SHARE * hull.volume:
         return f"concave: it fills {100 * volume / hull.volume:.0f} % of its hull"
     return None
+
+
+def most_coplanar(mesh: ObjMesh) -> int:
+    """Most vertices of a convex mesh that lie in one plane of its hull."""
+    from scipy.spatial import ConvexHull
+
+    points = mesh.vertices[np.unique(mesh.faces)]
+    return int(coplanar(points, ConvexHull(points).equations).sum())
 
 
 def _closed(mesh: ObjMesh) -> bool:
@@ -114,6 +123,10 @@ def _collider(where: str, reference: str, mesh: ObjMesh) -> Iterator[Finding]:
     defect = convexity_defect(mesh)
     if defect is not None:
         yield finding(f"collision-{defect.partition(':')[0]}", where, f"{reference} is {defect}")
+    elif (corners := len(np.unique(mesh.faces))) > MOST_HULL_VERTICES:
+        yield finding("collision-vertices", where, f"{reference} has {corners} vertices, {MOST_HULL_VERTICES} are allowed")
+    elif (fan := most_coplanar(mesh)) > MOST_COPLANAR:
+        yield finding("collision-coplanar", where, f"{reference} has {fan} vertices in one plane, {MOST_COPLANAR} are allowed")
 
 
 def _textures(where: str, reference: str, mesh: ObjMesh, files: BundleFiles) -> Iterator[Finding]:

@@ -48,6 +48,8 @@ RULES: dict[str, Rule] = {
     "collision-flat": Rule("error", "a flat collision mesh: MuJoCo refuses it as coplanar"),
     "collision-concave": Rule("error", "every engine fills it to its convex hull"),
     "collision-parts": Rule("error", "several parts in one OBJ: open in PyBullet, a solid hull elsewhere"),
+    "collision-vertices": Rule("warning", "engines on GPUs bound a hull's vertices, or slow down"),
+    "collision-coplanar": Rule("warning", "a face of many vertices: contacts on it take long in MJX and Brax"),
     "box-size": Rule("error", "a box without extent"),
     "file-missing": Rule("error", "a file every bundle has"),
     "manifest-schema": Rule("error", "the manifest cannot be read by its schema"),
@@ -61,6 +63,10 @@ RULES: dict[str, Rule] = {
     "mjcf-mass": Rule("error", "masses of scene.xml and of the URDF differ"),
     "usd-parse": Rule("error", "scene.usda is no USD text"),
     "usd-path": Rule("error", "scene.usda reads files from outside the bundle"),
+    "asset-path": Rule("error", "an asset, scene.sdf or the ROS package reads files from outside the bundle"),
+    "asset-missing": Rule("error", "a file that an asset, scene.sdf or the ROS package reads is not in the bundle"),
+    "asset-unreadable": Rule("error", "an asset that is damaged"),
+    "asset-differs": Rule("error", "a joint of an asset is not the scene's"),
 }
 
 SIMULATION_RULES: dict[str, Rule] = {
@@ -69,6 +75,7 @@ SIMULATION_RULES: dict[str, Rule] = {
     "penetration-sweep": Rule("error", "a joint moves its part into something"),
     "cavity": Rule("error", "a door or a tray of solid colliders: nothing fits in"),
     "opening": Rule("warning", "a mug or a bowl whose colliders fill its hollow: nothing can be put into it"),
+    "collider-far": Rule("warning", "what a robot sees and what it touches are not in one place"),
     "together": Rule("warning", "parts of two joints meet when both are open, as in many real kitchens"),
     "travel": Rule("error", "a joint jams under a hand's force"),
     "drift": Rule("error", "something left alone falls or creeps"),
@@ -84,6 +91,7 @@ LIKENESS_RULES: dict[str, Rule] = {
     "click-disobeyed": Rule("warning", "a mask that is not what a person clicked"),
     "size-unlikely": Rule("warning", "two doors built as one, or a part of one as a whole"),
     "in-the-air": Rule("warning", "the upper part of what stands on the floor, built as a whole"),
+    "handle-reach": Rule("warning", "a handle that a gripper 9 cm wide cannot take"),
     "in-a-wall": Rule("warning", "a drawer that slides out of a bare wall"),
     "edge-unsure": Rule("warning", "a front that ends where no edge shows, or holds a seam"),
     "travel-cut": Rule(
@@ -98,7 +106,7 @@ SEAL_RULES: dict[str, Rule] = {
     "file-unsealed": Rule("warning", "a bundle without checksums: what was changed in it cannot be told"),
 }
 
-UNSAFE = ("mesh-path", "mjcf-path", "usd-path")
+UNSAFE = ("mesh-path", "mjcf-path", "usd-path", "asset-path")
 """With one of these, no loader is given the bundle: it would read files of this machine."""
 
 

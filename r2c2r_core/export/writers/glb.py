@@ -7,15 +7,19 @@ axis and limits stand in the node's `extras`.
 import json
 import struct
 from collections.abc import Iterator
-from pathlib import Path
+from dataclasses import asdict
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import cv2
 import numpy as np
 
+from r2c2r_core.export.assets import asset_file, assets_of
+from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.handle import Handle
 
 Y_UP_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 SECONDS = 3.0  # of a clip: closed, open in the middle, closed
@@ -26,13 +30,25 @@ _PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 
 
 def write_glb(plan: Plan, path: Path) -> None:
-    """Write the plan as one binary glTF; the textures that stand beside it (meshes.py) go into it as they are."""
-    gltf = _Gltf()
+    """Write the plan as one binary glTF with its textures in it, and each object's asset, which names them where they are."""
+    _write(plan, path, embedded=True)
+    for asset in assets_of(plan):
+        file = path.parent / asset_file(asset.name, ".glb")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _write(asset, file, embedded=False)
+
+
+def _write(plan: Plan, path: Path, *, embedded: bool) -> None:
+    gltf = _Gltf(path.parent if embedded else None)
     nodes = {WORLD: _node(WORLD, Rigid3(Y_UP_FROM_WORLD[:3, :3], np.zeros(3)))}
     materials: dict[str, int] = {}  # one a texture
     for body in plan.bodies:
         nodes[body.parent].setdefault("children", []).append(len(nodes))
-        nodes[body.name] = _node(body.name, body.parent_from_body) | _mesh(body, gltf, materials, path.parent)
+        nodes[body.name] = _node(body.name, body.parent_from_body) | _mesh(body, gltf, materials)
+        nodes[body.name]["extras"] = asdict(labels_of(body))
+    for handle in plan.handles:
+        nodes[handle.link].setdefault("children", []).append(len(nodes))
+        nodes[handle.name] = _handle_node(handle, plan)
     clips = _clips(plan, gltf, nodes)
     document = {
         "asset": {"version": "2.0", "generator": "r2c2r"},
@@ -60,9 +76,10 @@ def check_glb(path: Path) -> Iterator[str]:
 
 
 class _Gltf:
-    """The tables of a document that refer to one buffer, and the buffer."""
+    """The tables of a document that refer to one buffer, and the buffer; pictures of `folder` go into it, or stay files."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
         self.tables: dict[str, list[dict[str, Any]]] = {
             name: [] for name in ("meshes", "materials", "textures", "images", "accessors", "bufferViews")
         }
@@ -72,6 +89,12 @@ class _Gltf:
         """Number of the new entry."""
         self.tables[table].append(entry)
         return len(self.tables[table]) - 1
+
+    def picture(self, file: str) -> dict[str, Any]:
+        """Where a PNG is found."""
+        if self.folder is None:
+            return {"uri": file}
+        return {"mimeType": "image/png", "bufferView": self.view((self.folder / file).read_bytes())}
 
     def view(self, content: bytes) -> int:
         """Number of a new buffer view, aligned as accessors need it."""
@@ -95,14 +118,22 @@ def _node(name: str, parent_from_node: Rigid3) -> dict[str, Any]:
     return {"name": name, "translation": translation, "rotation": rotation}
 
 
-def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int], folder: Path) -> dict[str, int]:
+def _handle_node(handle: Handle, plan: Plan) -> dict[str, Any]:
+    """An empty node in a handle, +Z into the front and +X along the grip."""
+    body = plan.body(handle.link)
+    size = [round(float(value), 6) for value in handle.size_m]
+    extras = asdict(labels_of_handle(handle, body)) | {"handle": handle.kind, "joint": handle.joint, "size_m": size}
+    return {**_node(handle.name, body.world_from_body.inverse @ handle.world_from_handle), "extras": extras}
+
+
+def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int]) -> dict[str, int]:
     """The node's reference to the mesh of a body; nothing for one without a shape."""
     visual, attributes = body.link.visual, dict[str, int]()
     if visual is not None and body.texture_file is not None:
         vertices, faces = visual.vertices, visual.faces
         attributes["TEXCOORD_0"] = gltf.accessor(visual.uv * (1, -1) + (0, 1), "VEC2")  # v runs down in glTF
         if body.texture_file not in materials:
-            materials[body.texture_file] = _textured(gltf, folder / body.texture_file)
+            materials[body.texture_file] = _textured(gltf, body.texture_file)
         material = materials[body.texture_file]
     else:
         vertices, faces = box_mesh(body)
@@ -116,11 +147,12 @@ def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int], folder: Path) -> d
     return {"mesh": gltf.add("meshes", {"name": f"{body.name}_vis", "primitives": [shape]})}
 
 
-def _textured(gltf: _Gltf, file: Path) -> int:
+def _textured(gltf: _Gltf, file: str) -> int:
     """Number of a new material that shows a PNG file."""
-    image = gltf.add("images", {"name": file.stem, "mimeType": "image/png", "bufferView": gltf.view(file.read_bytes())})
+    name = PurePosixPath(file).stem
+    image = gltf.add("images", {"name": name, **gltf.picture(file)})
     look = {"baseColorTexture": {"index": gltf.add("textures", {"source": image})}, **_PLAIN}
-    return gltf.add("materials", {"name": file.stem, "pbrMetallicRoughness": look, "doubleSided": True})
+    return gltf.add("materials", {"name": name, "pbrMetallicRoughness": look, "doubleSided": True})
 
 
 def _clips(plan: Plan, gltf: _Gltf, nodes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
@@ -144,7 +176,7 @@ def _clip(body: Body, gltf: _Gltf, times: int, nodes: dict[str, dict[str, Any]])
     assert joint is not None
     assert axis is not None
     limits = [joint.lower, joint.upper]
-    nodes[body.name]["extras"] = {"joint": body.joint_name, "type": joint.type, "axis": axis.tolist(), "range": limits}
+    nodes[body.name]["extras"] |= {"joint": body.joint_name, "type": joint.type, "axis": axis.tolist(), "range": limits}
     if joint.type == "revolute":
         opened = closed @ Rigid3(np.asarray(cv2.Rodrigues(axis * joint.upper)[0]), np.zeros(3))
         path, kind, ends = "rotation", "VEC4", (_quat_xyzw(closed), _quat_xyzw(opened))

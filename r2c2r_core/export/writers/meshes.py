@@ -1,24 +1,28 @@
 """Meshes as files: OBJ + MTL + PNG for visuals (the one textured format every loader reads), plain OBJ for convex pieces."""
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Image, Points
 from r2c2r_core.errors import ExportFailed
-from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.export.plan import Body
 from r2c2r_core.model.mesh import TexturedMesh
 
-
-def write_meshes(plan: Plan, folder: Path, texture_max_px: int) -> None:
-    """Write every body's meshes under `folder`; basenames are unique in the bundle, scale is baked in."""
-    for body in plan.bodies:
-        write_body(body, folder, texture_max_px)
+MOST_HULL_VERTICES = 64
+"""Of a collider: engines on GPUs bound them (MuJoCo Warp's narrow phase halves its time at 64)."""
+MOST_COPLANAR = 20
+"""Of a collider's vertices: MJX and Brax warn of more."""
+_IN_PLANE_M = 1e-5
 
 
 def write_body(body: Body, folder: Path, texture_max_px: int) -> None:
-    """Write the meshes of one body; raises ExportFailed on a collider that no engine can use."""
+    """Write the meshes of one body under `folder`: basenames are unique in the bundle, scale is baked in.
+
+    Raises ExportFailed on a collider that no engine can use.
+    """
     if body.visual_file is not None or body.collision_files:
         (folder / body.folder).mkdir(parents=True, exist_ok=True)
     if body.link.visual is not None and body.visual_file is not None and body.texture_file is not None:
@@ -32,11 +36,18 @@ def write_body(body: Body, folder: Path, texture_max_px: int) -> None:
 
 
 def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:
-    """Vertices and outward faces of the convex hull; raises ExportFailed on flat points, which no engine can use."""
+    """Vertices and outward faces of the convex hull, at most MOST_HULL_VERTICES of them and MOST_COPLANAR of a plane.
+
+    What is left out lies flattest.
+
+    Raises ExportFailed on flat points, which no engine can use.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         hull = ConvexHull(points)
+        while (left := _left_out(hull)) is not None:
+            hull = ConvexHull(hull.points[hull.vertices[hull.vertices != left]])
     except (QhullError, ValueError) as error:
         raise ExportFailed(f"{where} is flat or empty ({len(points)} points)", hint="give it a thickness") from error
     corner_of = {int(v): k for k, v in enumerate(hull.vertices)}
@@ -46,6 +57,34 @@ def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, ::-1]
     return vertices, faces
+
+
+def coplanar(points: Points, planes: np.ndarray) -> np.ndarray:
+    """Which of the points (n,) lie in the plane that holds most of them; planes (m, 4) as qhull gives a hull's."""
+    within = np.abs(points @ planes[:, :3].T + planes[:, 3]) < _IN_PLANE_M
+    return np.asarray(within[:, np.argmax(within.sum(axis=0))])
+
+
+def _left_out(hull: Any) -> int | None:
+    """The flattest vertex where there are too many of them, or too many in one plane."""
+    crowd = np.ones(len(hull.vertices), dtype=bool)
+    if len(hull.vertices) <= MOST_HULL_VERTICES:
+        crowd = coplanar(hull.points[hull.vertices], hull.equations)
+        if crowd.sum() <= MOST_COPLANAR:
+            return None
+    return int(hull.vertices[np.argmin(np.where(crowd, _sharpness(hull), np.inf))])
+
+
+def _sharpness(hull: Any) -> np.ndarray:
+    """By vertex of a hull: how far its corner is from flat (rad), times the area that meets there."""
+    missing, area = np.full(len(hull.points), 2 * np.pi), np.zeros(len(hull.points))
+    corners = hull.points[hull.simplices]
+    for k in range(3):
+        a, b = (corners[:, (k + step) % 3] - corners[:, k] for step in (1, 2))
+        cross = np.linalg.norm(np.cross(a, b), axis=1)
+        np.subtract.at(missing, hull.simplices[:, k], np.arctan2(cross, np.einsum("ij,ij->i", a, b)))
+        np.add.at(area, hull.simplices[:, k], cross / 2)
+    return np.asarray((missing * area)[hull.vertices])
 
 
 def box_mesh(body: Body) -> tuple[Points, Faces]:

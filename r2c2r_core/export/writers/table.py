@@ -1,13 +1,15 @@
 """The formats of a bundle. A new one is a file here and a line in FORMATS: linter, reports and app take it from there."""
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from r2c2r_core.export.plan import Plan
 from r2c2r_core.export.writers.glb import check_glb, write_glb
 from r2c2r_core.export.writers.mjcf import write_mjcf
+from r2c2r_core.export.writers.ros import write_ros
+from r2c2r_core.export.writers.sdf import write_sdf
 from r2c2r_core.export.writers.urdf import write_urdf
 from r2c2r_core.export.writers.usd import write_usd
 from r2c2r_core.failing import OBJECT_FAILS
@@ -27,12 +29,21 @@ class Format:
     reads_meshes: bool  # the files below meshes/, too
     write: Callable[[Plan, Path], None]
     loses: tuple[str, ...]  # what a reader of this file alone does not get
+    others: tuple[str, ...] = ()  # further files and folders of this format, in the bundle
+    assets: str | None = None  # suffix of its file for each object below assets/
+    required: bool = True  # a bundle without it is incomplete; older ones have not every format
     check: Callable[[Path], Iterable[str]] | None = None  # what is wrong with a written file, a line each
+
+    def owns(self, path: str) -> bool:
+        """Whether a file of the bundle is this format's: its scene, its assets, what stands beside them."""
+        own = path == self.file or any(path == other or path.startswith(f"{other}/") for other in self.others)
+        return own or (path.startswith("assets/") and PurePosixPath(path).suffix == self.assets)
 
 
 FORMATS: tuple[Format, ...] = (
     Format(
         name="urdf",
+        assets=".urdf",
         file="scene.urdf",
         opened_by="ROS, PyBullet, SAPIEN, MuJoCo, Isaac's importer",
         reads_meshes=True,
@@ -43,9 +54,11 @@ FORMATS: tuple[Format, ...] = (
             "SAPIEN's loader drops the friction, effort and velocity of joints: set them as README.txt says",
             "where each number comes from: see manifest.json",
         ),
+        others=("scene.srdf",),
     ),
     Format(
         name="mjcf",
+        assets=".xml",
         file="scene.xml",
         opened_by="MuJoCo, with textures",
         reads_meshes=True,
@@ -54,6 +67,7 @@ FORMATS: tuple[Format, ...] = (
     ),
     Format(
         name="usd",
+        assets=".usda",
         file="scene.usda",
         opened_by="Isaac Sim, Omniverse",
         reads_meshes=True,
@@ -63,9 +77,11 @@ FORMATS: tuple[Format, ...] = (
             "dry friction and largest velocity of joints are in PhysX's words; other engines see damping and effort only",
             "where each number comes from: see manifest.json",
         ),
+        others=("scene.usdz",),
     ),
     Format(
         name="glb",
+        assets=".glb",
         file="scene.glb",
         opened_by="the web, editors",
         reads_meshes=False,
@@ -74,6 +90,25 @@ FORMATS: tuple[Format, ...] = (
         loses=(
             "masses, colliders and how joints resist: it is the scene to look at; joints are clips that open and close them",
         ),
+    ),
+    Format(
+        name="sdf",
+        file="scene.sdf",
+        opened_by="Gazebo, Drake",
+        reads_meshes=True,
+        write=write_sdf,
+        required=False,
+        loses=("no joint armature, no contact exclusions, no handles and labels (SDF has no words for them)",),
+    ),
+    Format(
+        name="ros",
+        file="package.xml",
+        opened_by="ROS 2: colcon build, then ros2 launch; RViz",
+        reads_meshes=True,
+        write=write_ros,
+        required=False,
+        others=("CMakeLists.txt", "ros"),
+        loses=("as scene.urdf; its handles are frames",),
     ),
 )
 """The project's own, in every bundle; `formats()` also has those of other packages."""
@@ -85,12 +120,12 @@ def formats() -> tuple[Format, ...]:
     return (*FORMATS, *(entry for entry in added("r2c2r.formats", Format) if entry.file not in taken))
 
 
-def write_formats(plan: Plan, folder: Path, *, progress: Progress = SILENT) -> None:
-    """Every format's file; one that fails is left out, with a warning in the log, and the certificate says that it is missing.
+def write_formats(plan: Plan, folder: Path, wanted: Collection[Format], *, progress: Progress = SILENT) -> None:
+    """Each wanted format's file; one that fails is left out, with a warning in the log, and is missing in the certificate.
 
     scene.urdf, by which the rest is judged, must be written, and what no scene is to blame for (a full disk) ends the export.
     """
-    for entry in progress.each(formats(), "writing"):
+    for entry in progress.each(wanted, "writing"):
         try:
             entry.write(plan, folder / entry.file)
         except Exception as error:

@@ -1,14 +1,23 @@
 """Numbers and rotations as simulators write them."""
 
+import re
+
 import numpy as np
 
 from r2c2r_core.arrays import Matrix3
+from r2c2r_core.export.labels import Labels
 
 
 def numbers(values: object) -> str:
     """Numbers separated by spaces, nine digits, without negative zeros."""
     flat = np.atleast_1d(np.asarray(values, dtype=np.float64)).ravel()
     return " ".join(f"{0.0 if abs(v) < 1e-12 else v:.9g}" for v in flat)
+
+
+def words_of(labels: Labels) -> dict[str, str]:
+    """Labels as attributes: several dispositions with commas between; a category keeps to one line without `;`."""
+    category = re.sub(r"[\s;]+", " ", labels.category).strip()
+    return {"category": category, "part": labels.part, "disposition": ",".join(labels.disposition)}
 
 
 def rpy_of(rotation: Matrix3) -> np.ndarray:

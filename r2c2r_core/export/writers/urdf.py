@@ -11,27 +11,61 @@
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+from r2c2r_core.export.assets import asset_file, assets_of
+from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
-from r2c2r_core.export.writers.text import numbers, rpy_of
+from r2c2r_core.export.writers.text import numbers, rpy_of, words_of
 from r2c2r_core.geometry.transforms import Rigid3
 
 
 def write_urdf(plan: Plan, path: Path) -> None:
-    """Write the plan as one URDF with paths relative to its folder."""
+    """Write the plan as one URDF with paths relative to its folder, an SRDF beside it, and each object's asset."""
     path.write_text(urdf_text(plan))
+    path.with_suffix(".srdf").write_text(srdf_text(plan))
+    for asset in assets_of(plan):
+        file = path.parent / asset_file(asset.name, ".urdf")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(urdf_text(asset, root=None if asset.bodies[0].free else asset.name))
 
 
-def urdf_text(plan: Plan) -> str:
-    """The URDF document."""
+def srdf_text(plan: Plan) -> str:
+    """Pairs that a planner need not look at: what a joint holds together. MoveIt and SAPIEN read it."""
+    robot = ET.Element("robot", name=plan.name)
+    for body in plan.bodies:
+        if body.parent != WORLD:
+            ET.SubElement(robot, "disable_collisions", link1=body.parent, link2=body.name, reason="Adjacent")
+    ET.indent(robot)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def urdf_text(plan: Plan, root: str | None = WORLD) -> str:
+    """The URDF document; `root` names its bare first link, None: the first body is the root, as of a thing that can fall."""
     robot = ET.Element("robot", name=plan.name)
     mujoco = ET.SubElement(robot, "mujoco")
     ET.SubElement(mujoco, "compiler", strippath="false", discardvisual="false", fusestatic="false")
-    ET.SubElement(robot, "link", name=WORLD)
+    if root is not None:
+        ET.SubElement(robot, "link", name=root)
     for body in plan.bodies:
         _add_link(robot, body)
-        _add_joint(robot, body)
+        parent = root if body.parent == WORLD else body.parent
+        if parent is not None:
+            _add_joint(robot, body, parent)
+    _add_meaning(robot, plan)
     ET.indent(robot)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def _add_meaning(robot: ET.Element, plan: Plan) -> None:
+    """<r2c2r>: what URDF has no words for; README.txt lists it. Readers of URDF pass over elements they do not know."""
+    extension = ET.SubElement(robot, "r2c2r", version="1")
+    for body in plan.bodies:
+        ET.SubElement(extension, "labels", {"link": body.name, **words_of(labels_of(body))})
+    for handle in plan.handles:
+        body = plan.body(handle.link)
+        said = {"name": handle.name, "link": handle.link, "joint": handle.joint, "kind": handle.kind}
+        labels = words_of(labels_of_handle(handle, body))
+        element = ET.SubElement(extension, "handle", {**said, "size": numbers(handle.size_m), **labels})
+        _add_origin(element, body.world_from_body.inverse @ handle.world_from_handle)
 
 
 def _add_link(robot: ET.Element, body: Body) -> None:
@@ -67,11 +101,11 @@ def _add_box(link: ET.Element, kind: str, name: str, size_m: object, link_from_b
     ET.SubElement(ET.SubElement(element, "geometry"), "box", size=numbers(size_m))
 
 
-def _add_joint(robot: ET.Element, body: Body) -> None:
+def _add_joint(robot: ET.Element, body: Body, parent: str) -> None:
     joint = body.joint
     element = ET.SubElement(robot, "joint", name=body.joint_name, type="fixed" if joint is None else joint.type)
     _add_origin(element, body.parent_from_body)
-    ET.SubElement(element, "parent", link=body.parent)
+    ET.SubElement(element, "parent", link=parent)
     ET.SubElement(element, "child", link=body.name)
     if joint is not None:
         ET.SubElement(element, "axis", xyz=numbers(body.axis_body))

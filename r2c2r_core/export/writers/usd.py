@@ -1,57 +1,120 @@
 """scene.usda: USD with UsdPhysics, for Isaac Sim, Omniverse and other readers of USD; +Z up, metres, kilograms.
 
-One articulation per object with joints, its root on the object's own prim (never on a body, never nested); bodies are siblings
-in world poses, joints beside them. UsdPhysics counts angles in degrees: limits, damping and velocities of hinges are converted.
-What UsdPhysics has no words for (dry friction, armature, largest velocity) is said in PhysX's schema PhysxJointAxisAPI, as
-plain attributes, so that no NVIDIA library is needed to write or to read it.
+The scene holds gravity and the floor, and places a layer of its own for each object, `assets/<object>/<object>.usda`, by
+reference; scene.usdz is all of it in one file. One articulation per object with joints, its root on the object's own prim
+(never on a body, never nested); bodies are siblings, joints beside them. A base is fixed to the object's prim and not to
+the world, so that it stands wherever the asset is put. UsdPhysics counts angles in degrees: limits, damping and velocities
+of hinges are converted. What UsdPhysics has no words for (dry friction, armature, largest velocity) is said in PhysX's
+schema PhysxJointAxisAPI, as plain attributes, so that no NVIDIA library is needed to write or to read it.
 """
 
+import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 
+from r2c2r_core.export.assets import asset_file, assets_of, object_names, world_from_asset
+from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.meshes import convex_hull
 from r2c2r_core.export.writers.text import quat_wxyz_of
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.materials import ARMATURE, SURFACE_FRICTION
+from r2c2r_core.model.scene import Joint
 
 ROOT = "/Scene"
 _FLOOR_M = 20.0
+_FIRST_DAY = 1 << 5 | 1  # 1 January 1980, as DOS counts
 _X = np.array([1.0, 0.0, 0.0])
 
 
 def write_usd(plan: Plan, path: Path) -> None:
-    """Write the plan as one USD text layer; textures are named relative to it."""
-    from pxr import Kind, Usd, UsdGeom, UsdPhysics
+    """Write the scene's layer, a layer of each object, and scene.usdz; files are named relative to the layer they stand in."""
+    from pxr import Sdf, UsdUtils
+
+    for asset in assets_of(plan):
+        file = path.parent / asset_file(asset.name, ".usda")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        stage = _asset_stage(asset)  # a layer lives as long as its stage does
+        stage.GetRootLayer().Export(str(file))
+    layer, stage = Sdf.Layer.CreateAnonymous(), _scene_stage(plan)
+    layer.TransferContent(stage.GetRootLayer())
+    for name in object_names(plan):  # not on the stage: one in memory looks for what a relative path names, and warns
+        layer.GetPrimAtPath(f"{ROOT}/{name}").referenceList.prependedItems.append(
+            Sdf.Reference(f"./{asset_file(name, '.usda')}")
+        )
+    layer.Export(str(path))
+    package = path.with_suffix(".usdz")
+    package.unlink(missing_ok=True)
+    UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(path)), str(package))
+    _undate(package)
+
+
+def _undate(package: Path) -> None:
+    """Put the first day that a zip can name in the place of every file's time: equal scenes are equal bytes."""
+    content = bytearray(package.read_bytes())
+    with ZipFile(package) as archive:
+        entry = archive.start_dir
+        for info in archive.infolist():
+            struct.pack_into("<HH", content, info.header_offset + 10, 0, _FIRST_DAY)
+            struct.pack_into("<HH", content, entry + 12, 0, _FIRST_DAY)
+            name, extra, comment = struct.unpack_from("<HHH", content, entry + 28)
+            entry += 46 + name + extra + comment
+    package.write_bytes(content)
+
+
+def _new_stage(root: str, kind: str) -> Any:
+    """A stage in memory, with the default prim of a kind."""
+    from pxr import Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
-    root = UsdGeom.Xform.Define(stage, ROOT)
-    stage.SetDefaultPrim(root.GetPrim())
-    Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.assembly)
+    prim = UsdGeom.Xform.Define(stage, root).GetPrim()
+    stage.SetDefaultPrim(prim)
+    Usd.ModelAPI(prim).SetKind(kind)
+    return stage
+
+
+def _asset_stage(plan: Plan) -> Any:
+    """One object and its materials, nothing of the room."""
+    root = f"/{plan.name}"
+    stage = _new_stage(root, "component")
+    _write_touch(stage, root)
+    looks = _write_looks(stage, plan, root)
+    _write_object(stage, root, plan.bodies, looks)
+    for handle in plan.handles:
+        _write_handle(stage, root, handle, plan.body(handle.link))
+    return stage
+
+
+def _scene_stage(plan: Plan) -> Any:
+    """Gravity, floor, the plates that hold things up, and a placed prim for each object."""
+    from pxr import UsdGeom
+
+    stage = _new_stage(ROOT, "assembly")
     _write_world(stage, plan)
-    looks = _write_looks(stage, plan)
-    for object_name in dict.fromkeys(body.object_name for body in plan.bodies):
-        _write_object(stage, [body for body in plan.bodies if body.object_name == object_name], looks)
-    stage.GetRootLayer().Export(str(path))
+    for body in plan.bodies:
+        if body.is_support:
+            _write_body(stage, f"{ROOT}/{body.name}", body, {}, ROOT, dynamic=False)
+    for name in object_names(plan):
+        _place(UsdGeom.Xform.Define(stage, f"{ROOT}/{name}"), world_from_asset(plan, name))
+    return stage
 
 
 def _write_world(stage: Any, plan: Plan) -> None:
-    """Gravity, the floor, and how surfaces touch."""
-    from pxr import Gf, UsdGeom, UsdPhysics, UsdShade
+    """Gravity and the floor."""
+    from pxr import Gf, UsdGeom, UsdPhysics
 
     scene = UsdPhysics.Scene.Define(stage, f"{ROOT}/physics")
     scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1))
     scene.CreateGravityMagnitudeAttr(9.81)
-    touch = UsdShade.Material.Define(stage, f"{ROOT}/touch")
-    surface = UsdPhysics.MaterialAPI.Apply(touch.GetPrim())
-    surface.CreateStaticFrictionAttr(SURFACE_FRICTION)
-    surface.CreateDynamicFrictionAttr(SURFACE_FRICTION)
-    surface.CreateRestitutionAttr(0.0)
+    touch = _write_touch(stage, ROOT)
     floor = UsdGeom.Plane.Define(stage, f"{ROOT}/floor")
     floor.CreateAxisAttr(UsdGeom.Tokens.z)
     floor.CreateWidthAttr(_FLOOR_M)
@@ -62,23 +125,35 @@ def _write_world(stage: Any, plan: Plan) -> None:
     _bind(floor.GetPrim(), touch, purpose="physics")
 
 
-def _write_looks(stage: Any, plan: Plan) -> dict[str, Any]:
+def _write_touch(stage: Any, root: str) -> Any:
+    """How surfaces touch."""
+    from pxr import UsdPhysics, UsdShade
+
+    touch = UsdShade.Material.Define(stage, f"{root}/touch")
+    surface = UsdPhysics.MaterialAPI.Apply(touch.GetPrim())
+    surface.CreateStaticFrictionAttr(SURFACE_FRICTION)
+    surface.CreateDynamicFrictionAttr(SURFACE_FRICTION)
+    surface.CreateRestitutionAttr(0.0)
+    return touch
+
+
+def _write_looks(stage: Any, plan: Plan, root: str) -> dict[str, Any]:
     """A preview material per texture; bodies of one object share it."""
     from pxr import Sdf, UsdGeom, UsdShade
 
-    UsdGeom.Scope.Define(stage, f"{ROOT}/looks")
+    UsdGeom.Scope.Define(stage, f"{root}/looks")
     looks: dict[str, Any] = {}
     for body in plan.bodies:
         if body.visual_file is None or body.texture_file is None or body.texture_file in looks:
             continue
-        material = UsdShade.Material.Define(stage, f"{ROOT}/looks/{body.name}_look")
+        material = UsdShade.Material.Define(stage, f"{root}/looks/{body.name}_look")
         base = str(material.GetPath())
         uv = UsdShade.Shader.Define(stage, f"{base}/uv")
         uv.CreateIdAttr("UsdPrimvarReader_float2")
         uv.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
         picture = UsdShade.Shader.Define(stage, f"{base}/picture")
         picture.CreateIdAttr("UsdUVTexture")
-        picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{body.texture_file}")
+        picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(body.texture_file)
         picture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
         picture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
             uv.CreateOutput("result", Sdf.ValueTypeNames.Float2)
@@ -94,29 +169,31 @@ def _write_looks(stage: Any, plan: Plan) -> dict[str, Any]:
     return looks
 
 
-def _write_object(stage: Any, bodies: list[Body], looks: dict[str, Any]) -> None:
+def _write_object(stage: Any, path: str, bodies: Sequence[Body], looks: dict[str, Any]) -> None:
     """An object's bodies and joints; without joints it is a free body or a part of the room that never moves."""
-    from pxr import Kind, Usd, UsdGeom, UsdPhysics
+    from pxr import UsdGeom, UsdPhysics
 
-    path = f"{ROOT}/{bodies[0].object_name}"
-    prim = UsdGeom.Xform.Define(stage, path).GetPrim()
-    Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
+    prim = stage.GetPrimAtPath(path)
+    said = [labels_of(body) for body in bodies]
+    every = dict.fromkeys(word for labels in said for word in labels.disposition)
+    _label(prim, category=[said[0].category], disposition=[*every])
     articulated = any(body.joint is not None for body in bodies)
     if articulated:
         UsdPhysics.ArticulationRootAPI.Apply(prim)
         UsdGeom.Scope.Define(stage, f"{path}/joints")
     for body in bodies:
-        moves = articulated and not body.is_support
-        _write_body(stage, f"{path}/{body.name}", body, looks, dynamic=moves or body.free)
-        if moves and not body.free:
+        _write_body(stage, f"{path}/{body.name}", body, looks, path, dynamic=articulated or body.free)
+        if articulated and not body.free:
             _write_joint(stage, path, body)
 
 
-def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], *, dynamic: bool) -> None:
+def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], root: str, *, dynamic: bool) -> None:
     from pxr import Gf, UsdGeom, UsdPhysics
 
     xform = UsdGeom.Xform.Define(stage, path)
     _place(xform, body.world_from_body)
+    labels = labels_of(body)
+    _label(xform.GetPrim(), part=[labels.part], disposition=labels.disposition)
     if dynamic:
         UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
     inertial = body.link.inertial
@@ -127,7 +204,7 @@ def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], *, dyn
     mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*map(float, moments)))
     mass.CreatePrincipalAxesAttr(_quatf(axes))
     _write_visuals(stage, path, body, looks)
-    _write_colliders(stage, path, body)
+    _write_colliders(stage, path, body, root)
 
 
 def _write_visuals(stage: Any, path: str, body: Body, looks: dict[str, Any]) -> None:
@@ -138,6 +215,8 @@ def _write_visuals(stage: Any, path: str, body: Body, looks: dict[str, Any]) -> 
         for number, box in enumerate(body.link.boxes):
             cube = _cube(stage, f"{path}/visual_{number}", box.link_from_box, box.size_m)
             cube.CreateDisplayColorAttr([Gf.Vec3f(*map(float, body.link.colour))])
+            if box.role == "handle":
+                _label(cube.GetPrim(), part=["handle"])
         return
     mesh = _mesh(stage, f"{path}/visual", visual.vertices, visual.faces)
     mesh.CreateDoubleSidedAttr(True)
@@ -147,7 +226,7 @@ def _write_visuals(stage: Any, path: str, body: Body, looks: dict[str, Any]) -> 
         _bind(mesh.GetPrim(), looks[body.texture_file])
 
 
-def _write_colliders(stage: Any, path: str, body: Body) -> None:
+def _write_colliders(stage: Any, path: str, body: Body, root: str) -> None:
     """Convex pieces and panels, as guides: engines touch them, renderers leave them out."""
     from pxr import UsdGeom, UsdPhysics, UsdShade
 
@@ -159,23 +238,36 @@ def _write_colliders(stage: Any, path: str, body: Body) -> None:
         UsdPhysics.MeshCollisionAPI.Apply(shape.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
     for number, box in enumerate(body.link.boxes, start=len(shapes)):
         shapes.append(_cube(stage, f"{path}/collision_{number}", box.link_from_box, box.size_m))
-    touch = UsdShade.Material.Get(stage, f"{ROOT}/touch")
+    touch = UsdShade.Material.Get(stage, f"{root}/touch")
     for shape in shapes:
         shape.CreatePurposeAttr(UsdGeom.Tokens.guide)
         UsdPhysics.CollisionAPI.Apply(shape.GetPrim())
         _bind(shape.GetPrim(), touch, purpose="physics")
 
 
+def _write_handle(stage: Any, root: str, handle: Handle, body: Body) -> None:
+    """A frame in the handle, z into the front, x along the grip; what has no schema stands in attributes of r2c2r's own."""
+    from pxr import Gf, Sdf, UsdGeom
+
+    xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}/{handle.name}")
+    labels = labels_of_handle(handle, body)
+    _label(xform.GetPrim(), part=[labels.part], disposition=labels.disposition)
+    _place(xform, body.world_from_body.inverse @ handle.world_from_handle)
+    prim = xform.GetPrim()
+    prim.CreateAttribute("r2c2r:handle:kind", Sdf.ValueTypeNames.Token).Set(handle.kind)
+    prim.CreateAttribute("r2c2r:handle:joint", Sdf.ValueTypeNames.Token).Set(handle.joint)
+    prim.CreateAttribute("r2c2r:handle:size", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(*map(float, handle.size_m)))
+
+
 def _write_joint(stage: Any, object_path: str, body: Body) -> None:
-    """Between a body and its parent; a base is fixed to the world, which UsdPhysics says by naming no first body."""
+    """Between a body and its parent; a base is fixed to the object's prim, which is no body and so a place in the world."""
     from pxr import Gf, UsdPhysics
 
     joint = body.joint
     define = {"revolute": UsdPhysics.RevoluteJoint, "prismatic": UsdPhysics.PrismaticJoint}
     kind = UsdPhysics.FixedJoint if joint is None else define[joint.type]
     prim = kind.Define(stage, f"{object_path}/joints/{body.joint_name}")
-    if body.parent != WORLD:
-        prim.CreateBody0Rel().SetTargets([f"{object_path}/{body.parent}"])
+    prim.CreateBody0Rel().SetTargets([object_path if body.parent == WORLD else f"{object_path}/{body.parent}"])
     prim.CreateBody1Rel().SetTargets([f"{object_path}/{body.name}"])
     body_from_joint = np.eye(3) if body.axis_body is None else rotation_between(_X, body.axis_body)
     prim.CreateLocalPos0Attr(Gf.Vec3f(*map(float, body.parent_from_body.translation)))
@@ -204,6 +296,17 @@ def _write_joint(stage: Any, object_path: str, body: Body) -> None:
         armature=ARMATURE[joint.type],
         maxJointVelocity=joint.velocity * per_unit,
     )
+    _say_newton(prim.GetPrim(), joint)
+    _say_state(prim.GetPrim(), instance)
+
+
+def _label(prim: Any, **tokens: Sequence[str]) -> None:
+    """UsdSemantics labels by taxonomy; what has none gets none."""
+    from pxr import UsdSemantics
+
+    for taxonomy, words in tokens.items():
+        if words:
+            UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr().Set([*words])
 
 
 def _say_physx(prim: Any, instance: str, **values: float) -> None:
@@ -212,6 +315,28 @@ def _say_physx(prim: Any, instance: str, **values: float) -> None:
     prim.AddAppliedSchema(f"PhysxJointAxisAPI:{instance}")
     for name, value in values.items():
         prim.CreateAttribute(f"physxJointAxis:{instance}:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
+
+
+def _say_newton(prim: Any, joint: Joint) -> None:
+    """Newton reads neither PhysX's words nor, with MuJoCo's solver, its own: dry friction and armature in both. Damping is the
+    drive's, which both read.
+    """
+    from pxr import Sdf
+
+    prim.AddAppliedSchema("NewtonJointAPI")
+    for name, value in (("friction", joint.friction), ("armature", ARMATURE[joint.type])):
+        prim.CreateAttribute(f"newton:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
+        mjc = "mjc:frictionloss" if name == "friction" else "mjc:armature"
+        prim.CreateAttribute(mjc, Sdf.ValueTypeNames.Double, custom=False, variability=Sdf.VariabilityUniform).Set(float(value))
+
+
+def _say_state(prim: Any, instance: str) -> None:
+    """Closed and at rest; Isaac Sim reads and writes a joint's state here."""
+    from pxr import Sdf
+
+    prim.AddAppliedSchema(f"PhysicsJointStateAPI:{instance}")
+    for name in ("position", "velocity"):
+        prim.CreateAttribute(f"state:{instance}:physics:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(0.0)
 
 
 def _cube(stage: Any, path: str, link_from_box: Rigid3, size_m: np.ndarray) -> Any:
@@ -234,6 +359,11 @@ def _mesh(stage: Any, path: str, vertices: np.ndarray, faces: np.ndarray) -> Any
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(faces), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces, dtype=np.int32).ravel()))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    a, b, c = (points[np.asarray(faces)[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.round(normals / np.maximum(lengths, 1e-12), 4).astype(np.float32)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)  # flat facets: corners are corners
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
     return mesh
 

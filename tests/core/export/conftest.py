@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from r2c2r_core.export.handles import with_handles
 from r2c2r_core.export.manifest import manifest_of
-from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.plan import Plan, plan_bundle
 from r2c2r_core.export.support import supported
-from r2c2r_core.export.writers.meshes import write_meshes
-from r2c2r_core.export.writers.table import write_formats
+from r2c2r_core.export.writers.meshes import write_body
+from r2c2r_core.export.writers.table import formats, write_formats
 from r2c2r_core.model.scene import ArticulatedScene
 from tests.core.export.kitchen import kitchen, reconstruction
 
@@ -28,10 +29,15 @@ def good_folder(written_folder: Path, tmp_path: Path) -> Path:
 
 def write_folder(scene: ArticulatedScene, folder: Path) -> Path:
     folder.mkdir(parents=True)
-    plan = supported(plan_bundle(scene))
-    write_meshes(plan, folder, 2048)
-    write_formats(plan, folder)
+    plan = with_handles(supported(plan_bundle(scene)))
+    write_meshes(plan, folder)
+    write_formats(plan, folder, formats())
     (folder / "manifest.json").write_text(json.dumps(manifest_of(reconstruction(scene), plan, None)))
     (folder / "README.txt").write_text("read me")
     (folder / "preview.png").write_bytes(b"not looked at")
     return folder
+
+
+def write_meshes(plan: Plan, folder: Path, texture_max_px: int = 2048) -> None:
+    for body in plan.bodies:
+        write_body(body, folder, texture_max_px)

@@ -163,7 +163,7 @@ def drawer(name: str, *, x: float = 0.0) -> SceneObject:
             ),
         ),
         pieces=(),
-        visual=panel_mesh(front, at_front, seed=2),
+        visual=_both(panel_mesh(front, at_front, seed=2), panel_mesh(floor_size, at_floor, seed=2)),
         colour=(0.8, 0.75, 0.7),
         inertial=_slab_inertial(front, at_front),
     )
@@ -251,6 +251,16 @@ def panel_mesh(size: np.ndarray, centre: np.ndarray, *, seed: int) -> TexturedMe
     faces = np.concatenate([[[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]] for q in range(6)])
     uv = np.tile([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], (6, 1))
     return TexturedMesh(vertices=vertices, faces=faces, uv=uv, texture=_wood(seed))
+
+
+def _both(first: TexturedMesh, second: TexturedMesh) -> TexturedMesh:
+    """Two meshes with the first's texture."""
+    return TexturedMesh(
+        vertices=np.concatenate([first.vertices, second.vertices]),
+        faces=np.concatenate([first.faces, second.faces + len(first.vertices)]),
+        uv=np.concatenate([first.uv, second.uv]),
+        texture=first.texture,
+    )
 
 
 def capture(*, images: object | None = None) -> Capture:

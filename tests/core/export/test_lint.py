@@ -5,7 +5,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 
 from r2c2r_core.errors import BundleError
 from r2c2r_core.export.lint import lint
@@ -103,6 +105,23 @@ def referring_to(path: str) -> Plant:
         urdf(lambda root: door(root).find("visual/geometry/mesh").set("filename", path)),
         manifest(lambda d: d["objects"][0]["meshes"].update(visual=[path])),
     )
+
+
+def ball(count: int) -> np.ndarray:
+    points = np.random.default_rng(0).normal(size=(count, 3))
+    return 0.03 * points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def tin(sides: int) -> np.ndarray:
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rings = [np.column_stack([np.cos(angles), np.sin(angles), np.full(sides, z)]) for z in (-1.0, 1.0)]
+    return 0.03 * np.concatenate(rings)
+
+
+def obj_of_hull(points: np.ndarray) -> str:
+    hull = trimesh.convex.convex_hull(points)
+    lines = [f"v {x} {y} {z}" for x, y, z in hull.vertices] + [f"f {a} {b} {c}" for a, b, c in hull.faces + 1]
+    return "\n".join(lines) + "\n"
 
 
 def obj_of_boxes(*offsets: float) -> str:
@@ -214,9 +233,9 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         lambda f: edit_text(f / DOOR_MESH, "mtllib cabinet_1_door_vis.mtl", "mtllib ../../../x.mtl"),
         set(),
     ),
-    ("mesh-spaces", "a space", renamed_mesh("meshes/cabinet_1/my door.obj"), set()),
+    ("mesh-spaces", "a space", renamed_mesh("meshes/cabinet_1/my door.obj"), {"asset-missing"}),
     ("mesh-missing", "no file", lambda f: (f / DOOR_MESH).unlink(), set()),
-    ("mesh-format", "glb", renamed_mesh("meshes/cabinet_1/door.glb"), set()),
+    ("mesh-format", "glb", renamed_mesh("meshes/cabinet_1/door.glb"), {"asset-missing"}),
     ("mesh-scale", "millimetres", urdf(lambda r: first_mesh(r).set("scale", "0.001 0.001 0.001")), {"mesh-size"}),
     ("mesh-scale", "mirrored", urdf(lambda r: first_mesh(r).set("scale", "-1 1 1")), {"com-outside"}),
     (
@@ -239,6 +258,8 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
     ("collision-flat", "a sheet", write(BOTTLE_HULL, FLAT), set()),
     ("collision-concave", "a dent", write(BOTTLE_HULL, DENTED), set()),
     ("collision-concave", "two boxes in one", write(BOTTLE_HULL, obj_of_boxes(0.0, 0.2)), {"com-outside"}),
+    ("collision-vertices", "a ball", write(BOTTLE_HULL, obj_of_hull(ball(80))), {"com-outside"}),
+    ("collision-coplanar", "a tin", write(BOTTLE_HULL, obj_of_hull(tin(24))), {"com-outside"}),
     ("collision-parts", "two groups", write(BOTTLE_HULL, PARTS), set()),
     ("box-size", "zero", urdf(lambda r: door(r).find("collision/geometry/box").set("size", "0.1 0 0.1")), set()),
     ("box-size", "negative", urdf(lambda r: door(r).find("collision/geometry/box").set("size", "0.1 -1 0.1")), set()),
@@ -298,7 +319,16 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
     ),
     ("format", "a cut web scene", write("scene.glb", "glTF"), set()),
     ("usd-parse", "a binary layer", write("scene.usda", "PXR-USDC"), set()),
-    ("usd-path", "a texture elsewhere", text("scene.usda", "@./meshes/", "@../meshes/"), set()),
+    ("usd-path", "an asset elsewhere", text("scene.usda", "@./assets/", "@../assets/"), set()),
+    (
+        "asset-path",
+        "a texture elsewhere",
+        text("assets/cabinet_1/cabinet_1.usda", "@../../meshes/", "@../../../meshes/"),
+        set(),
+    ),
+    ("asset-missing", "another mesh", text("assets/bottle_1/bottle_1.xml", "_col_0.obj", "_col_7.obj"), set()),
+    ("asset-unreadable", "half a file", write("assets/cabinet_1/cabinet_1.glb", "glTF"), set()),
+    ("asset-differs", "more travel", text("assets/drawer_1/drawer_1.urdf", 'upper="0.42"', 'upper="0.43"'), set()),
     ("usd-path", "a layer by its address", text("scene.usda", "upAxis", "subLayers = [@@@/etc/x.usda@@@]\n    upAxis"), set()),
 ]
 

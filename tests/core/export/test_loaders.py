@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from r2c2r_core.export.loaders import EVERY_LOADER, SAPIEN_VARIABLE, try_loaders
+from r2c2r_core.export.loaders import APART, EVERY_LOADER, try_loaders
 from r2c2r_core.export.reading import read_urdf
 from r2c2r_core.model.report import LoaderResult
 
@@ -17,9 +17,63 @@ def verdicts(folder: Path, sapien_python: str | None = None) -> dict[str, Loader
     return {r.loader: r for r in results}
 
 
+GIVEN = {name: os.environ.get(own.variable, "") for name, own in APART.items()}
+
+
+def own_environment(name: str) -> pytest.MarkDecorator:
+    given = Path(GIVEN[name]).is_file()
+    return pytest.mark.skipif(not given, reason=f"no environment of {name}: set {APART[name].variable} to its python")
+
+
+@own_environment("Drake")
+def test_the_good_bundle_loads_in_drake_and_an_edited_world_fails(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(APART["Drake"].variable, GIVEN["Drake"])
+    found = verdicts(good_folder)["Drake"]
+    assert found.state == "passed", found
+    assert found.detail.endswith("it keeps no joint friction or effort")
+    scene = good_folder / "scene.sdf"
+    scene.write_text(scene.read_text().replace("<upper>0.42</upper>", "<upper>0.9</upper>"))
+    assert "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42" in verdicts(good_folder)["Drake"].detail
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=own_environment(name)) for name in ("MJX", "MuJoCo Warp")])
+def test_the_good_bundle_moves_in_engines_of_mujocos_models_as_in_mujoco(
+    good_folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv(APART[name].variable, GIVEN[name])
+    found = verdicts(good_folder)[name]
+    assert found.state == "passed", found
+    assert "4 joints, 9 links" in found.detail
+    assert [worlds for worlds, _ in found.steps_per_s] == ([1, 256] if name == "MuJoCo Warp" else [])
+
+
+@own_environment("Newton")
+def test_newton_holds_every_value_but_velocity_and_no_body_for_what_stands_fast(
+    good_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(APART["Newton"].variable, GIVEN["Newton"])
+    found = verdicts(good_folder)["Newton"]
+    assert found.state == "passed", found
+    assert "4 joints, 8 links" in found.detail
+    assert found.detail.endswith("it keeps no joint velocity")
+
+
+@own_environment("NVIDIA asset validator")
+def test_nvidias_validator_passes_the_good_bundle_and_fails_one_without_a_unit(
+    good_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "NVIDIA asset validator"
+    monkeypatch.setenv(APART[name].variable, GIVEN[name])
+    assert verdicts(good_folder)[name].state == "passed"
+    scene = good_folder / "scene.usda"
+    scene.write_text(scene.read_text().replace("metersPerUnit = 1", "").replace('upAxis = "Z"', ""))
+    assert verdicts(good_folder)[name].state == "failed"
+
+
 @pytest.fixture(autouse=True)
-def no_sapien(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(SAPIEN_VARIABLE, raising=False)
+def no_environments(monkeypatch: pytest.MonkeyPatch) -> None:
+    for own in APART.values():
+        monkeypatch.delenv(own.variable, raising=False)
 
 
 def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: Path) -> None:
@@ -53,8 +107,9 @@ def test_a_loader_that_is_not_there_is_not_tried(good_folder: Path, monkeypatch:
     found = verdicts(good_folder)
     assert found["PyBullet"].state == "not tried"
     assert "pip install" in found["PyBullet"].detail
-    assert found["SAPIEN"].state == "not tried"
-    assert SAPIEN_VARIABLE in found["SAPIEN"].detail
+    for name, own in APART.items():
+        assert found[name].state == "not tried"
+        assert own.variable in found[name].detail
 
 
 @pytest.mark.parametrize("python", ["/nowhere/python", "/bin/false"])
@@ -64,12 +119,9 @@ def test_a_wrong_sapien_python_is_not_tried(good_folder: Path, python: str) -> N
     assert python in result.detail
 
 
-SAPIEN = os.environ.get(SAPIEN_VARIABLE, "")
-
-
-@pytest.mark.skipif(not Path(SAPIEN).is_file(), reason=f"no SAPIEN environment: set {SAPIEN_VARIABLE} to its python")
+@own_environment("SAPIEN")
 def test_the_good_bundle_loads_in_sapien(good_folder: Path) -> None:
-    result = verdicts(good_folder, SAPIEN)["SAPIEN"]
+    result = verdicts(good_folder, GIVEN["SAPIEN"])["SAPIEN"]
     assert result.state == "passed", result.detail
 
 
@@ -93,17 +145,22 @@ def test_an_mjcf_that_says_something_else_fails(good_folder: Path) -> None:
 
 
 USD_DEFECTS = (
-    ("physics:upperLimit = 0.42", "physics:upperLimit = 0.9", "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42"),
-    ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint", "is prismatic, not revolute"),
-    ('upAxis = "Z"', 'upAxis = "Y"', "up axis"),
-    ("physics:localPos1 = (0, 0, 0)", "physics:localPos1 = (0, 0, 0.1)", "its frame differs by 0.1"),
-    ("rel physics:body1 = </Scene/drawer_1/drawer_1_drawer>", "rel physics:body1 = </Scene/nowhere>", "USD's validators"),
+    ("drawer_1", "physics:upperLimit = 0.42", "physics:upperLimit = 0.9", "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42"),
+    ("cabinet_1", "PhysicsRevoluteJoint", "PhysicsPrismaticJoint", "is prismatic, not revolute"),
+    (None, 'upAxis = "Z"', 'upAxis = "Y"', "up axis"),
+    ("drawer_1", "physics:localPos1 = (0, 0, 0)", "physics:localPos1 = (0, 0, 0.1)", "its frame differs by 0.1"),
+    (
+        "drawer_1",
+        "rel physics:body1 = </drawer_1/drawer_1_drawer>",
+        "rel physics:body1 = </drawer_1/nowhere>",
+        "USD's validators",
+    ),
 )
 
 
-@pytest.mark.parametrize(("old", "new", "says"), USD_DEFECTS, ids=[d[2] for d in USD_DEFECTS])
-def test_a_usd_that_says_something_else_fails(good_folder: Path, old: str, new: str, says: str) -> None:
-    scene = good_folder / "scene.usda"
+@pytest.mark.parametrize(("asset", "old", "new", "says"), USD_DEFECTS, ids=[d[3] for d in USD_DEFECTS])
+def test_a_usd_that_says_something_else_fails(good_folder: Path, asset: str | None, old: str, new: str, says: str) -> None:
+    scene = good_folder / ("scene.usda" if asset is None else f"assets/{asset}/{asset}.usda")
     text = scene.read_text()
     assert old in text
     scene.write_text(text.replace(old, new))
@@ -116,6 +173,6 @@ def test_a_usd_that_says_something_else_fails(good_folder: Path, old: str, new: 
 def test_every_loader_opens_a_bundle_whose_path_has_spaces_and_other_letters(good_folder: Path, tmp_path: Path) -> None:
     moved = tmp_path / "Küche 1 – キッチン"
     good_folder.rename(moved)
-    found = verdicts(moved, SAPIEN or None)
+    found = verdicts(moved, GIVEN["SAPIEN"] or None)
     assert {r.state for r in found.values()} <= {"passed", "not tried"}, found
     assert found["PyBullet"].state == found["USD"].state == found["MuJoCo (MJCF)"].state == "passed"

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -176,7 +177,7 @@ def test_a_usd_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: R
     from pxr import Usd
 
     prim, attribute, value, says = USD_EDITS[what]
-    stage = Usd.Stage.Open(str(bundle / "scene.usda"))
+    stage = Usd.Stage.Open(Usd.Stage.Open(str(bundle / "scene.usda")).Flatten())  # nothing is edited under a reference
     found = stage.GetPrimAtPath(prim).GetAttribute(attribute)
     assert found, attribute
     if value is None:
@@ -214,3 +215,10 @@ def test_not_a_number_is_never_equal(expected: Readback) -> None:
     hollow = replace(expected.bodies[LINK], inertia_world=np.full((3, 3), np.nan), mass_kg=float("nan"))
     lines = differences(expected, replace(expected, bodies=expected.bodies | {LINK: hollow}))
     assert [line.split()[1] for line in lines] == ["weighs", "has"]
+
+
+def test_a_link_that_a_loader_makes_part_of_the_world_is_not_missing(expected: Readback) -> None:
+    bodies = {name: body for name, body in expected.bodies.items() if name != "counter_1_slab"}
+    found = replace(expected, bodies=bodies)
+    assert differences(expected, found) == ["link counter_1_slab is missing"]
+    assert differences(expected, replace(found, in_world=frozenset({"counter_1_slab"}))) == []

@@ -7,6 +7,7 @@ from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.export.writers.table import FORMATS
 from r2c2r_core.model.report import Blocker, Certificate, JointResult, LoaderResult, ThingResult
 from tests.core.export.kitchen import kitchen, reconstruction
 
@@ -83,7 +84,7 @@ def test_the_json_report_repeats_certificate_objects_and_losses_without_the_mach
     assert "realtime_factor" not in report["certificate"]
     assert [entry["name"] for entry in report["objects"]] == [item.name for item in kitchen().objects]
     assert report["failures"] == {"mug_1": "not seen"}
-    assert set(report["losses"]) == {"scene.urdf", "scene.xml", "scene.usda", "scene.glb"}
+    assert set(report["losses"]) == {entry.file for entry in FORMATS}
     assert np.isfinite(report["objects"][0]["placement_rms_m"])
 
 
@@ -113,3 +114,22 @@ def test_findings_of_one_rule_share_a_row_and_remarks_stand_under_their_object()
     noted = report_html(manifest, report_of(manifest, certificate(), {}), {})
     assert '<tr class="noted"><td rowspan="2">' in noted
     assert '<td colspan="9"><ul class="quiet"><li>&lt;script&gt;' in noted
+
+
+def test_an_arm_is_shown_with_its_map_or_with_why_it_was_not_tried() -> None:
+    grip = {"kind": "joint", "name": "cabinet_1_hinge", "method": "pinch", "passed": True, "film": "cabinet_1_hinge", "why": ""}
+    grip |= dict.fromkeys(("grip_n", "opened", "slip_m", "off_m", "force_n", "blame"))
+    arm = {
+        "arm": {"name": "Franka Panda", "source": "a wheel, Apache-2.0"},
+        "joints_in_reach": 1,
+        "joints": 2,
+        "joints_opened": 1,
+        "places": [{}],
+        "grips": [grip],
+    }
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
+    text = report_html(manifest, report_of(manifest, certificate(), {}, arm=arm), {})
+    assert "reaches 1 of 2 joints" in text
+    assert {"arm/standing.svg", "arm/cabinet_1_hinge.jpg"} <= {attrs.get("src") for _, attrs in tags(text).seen}
+    text = report_html(manifest, report_of(manifest, certificate(), {}, arm={"why": f"no extra {EVIL}"}), {})
+    assert "Not tried: no extra &lt;script&gt;" in text

@@ -57,6 +57,27 @@ def test_the_bundle_holds_what_product_md_lists(kitchen_bundle: tuple[Path, Cert
     assert {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} == names
 
 
+def test_a_gripper_opens_the_good_kitchen_and_is_filmed(kitchen_bundle: tuple[Path, Certificate]) -> None:
+    with zipfile.ZipFile(kitchen_bundle[0]) as archive:
+        names, page = set(archive.namelist()), archive.read("report.html").decode()
+        gripper = json.loads(archive.read("report.json"))["gripper"]
+    assert gripper["joints_opened"] == gripper["joints"] == 4
+    assert {grip["name"]: grip["why"] for grip in gripper["grips"] if grip["why"]} == {
+        "bottle_1_body": "wider than 76 mm all round"
+    }
+    for grip in gripper["grips"][:4]:
+        assert f"gripper/{grip['film']}.jpg" in names
+        assert f'href="gripper/{grip["film"]}.jpg"' in page
+    assert "opened and closed 4 of 4 joints" in page
+
+
+def test_a_bundle_can_go_without_a_gripper(tmp_path: Path) -> None:
+    write_bundle(reconstruction(), tmp_path / "b.zip", ExportConfig(gripper=False))
+    with zipfile.ZipFile(tmp_path / "b.zip") as archive:
+        assert json.loads(archive.read("report.json"))["gripper"] is None
+        assert not [name for name in archive.namelist() if name.startswith("gripper/")]
+
+
 def test_nothing_else_is_left_beside_the_bundle(kitchen_bundle: tuple[Path, Certificate]) -> None:
     assert {p.name for p in kitchen_bundle[0].parent.iterdir()} == {"kitchen.zip", "kitchen"}
 
@@ -77,6 +98,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
         "capture",
         "world_from_capture",
         "objects",
+        "states",
         "contradictions",
         "stages",
         "files",
@@ -88,7 +110,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     door = document["objects"][0]
     keys = "name category dimensions_m world_from_object joint dimension_source mask candidates chosen placement warp meshes"
     assert set(keys.split()) | {"mass_kg", "warnings"} <= set(door)
-    joint_keys = "name type axis origin lower upper uncut source confidence motion blocked_by"
+    joint_keys = "name type axis origin lower upper uncut source confidence motion randomize handles blocked_by"
     assert set(door["joint"]) == set(joint_keys.split())
     assert door["joint"]["blocked_by"] == []
     assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]
@@ -200,6 +222,7 @@ def test_the_certificate_as_json_is_versioned_and_complete(kitchen_bundle: tuple
         "loaders",
         "joints",
         "things",
+        "colliders",
         "rest_penetration_m",
         "together_penetration_m",
         "drift_m",

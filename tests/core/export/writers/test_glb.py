@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 from r2c2r_core.export.plan import collider_corners_world, plan_bundle
 from r2c2r_core.export.preview import poses_at
 from r2c2r_core.export.writers.glb import Y_UP_FROM_WORLD, write_glb
-from r2c2r_core.export.writers.meshes import write_meshes
+from tests.core.export.conftest import write_meshes
 from tests.core.export.kitchen import kitchen
 
 
 def test_the_glb_is_y_up_and_holds_every_link_where_it_stands(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
-    write_meshes(plan, tmp_path, 2048)
+    write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "scene.glb")
     scene = trimesh.load(tmp_path / "scene.glb")
     assert {f"{body.name}_vis" for body in plan.bodies} == set(scene.geometry)
@@ -30,7 +30,7 @@ def test_the_glb_is_y_up_and_holds_every_link_where_it_stands(tmp_path: Path) ->
 
 def test_the_glb_carries_its_textures_and_is_the_same_twice(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
-    write_meshes(plan, tmp_path, 2048)
+    write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "a.glb")
     write_glb(plan, tmp_path / "b.glb")
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
@@ -57,7 +57,7 @@ def values_of(document: dict, binary: bytes, accessor: int) -> np.ndarray:
 
 def test_every_joint_is_a_clip_that_opens_its_part_as_the_plan_says_and_one_clip_opens_all(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
-    write_meshes(plan, tmp_path, 2048)
+    write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "scene.glb")
     document, binary = document_of(tmp_path / "scene.glb")
     assert document["buffers"][0]["byteLength"] <= len(binary) < document["buffers"][0]["byteLength"] + 4

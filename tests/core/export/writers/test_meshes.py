@@ -6,13 +6,14 @@ import trimesh
 
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.plan import plan_bundle
-from r2c2r_core.export.writers.meshes import box_mesh, convex_hull, write_meshes
+from r2c2r_core.export.writers.meshes import MOST_HULL_VERTICES, box_mesh, convex_hull
+from tests.core.export.conftest import write_meshes
 from tests.core.export.kitchen import kitchen
 
 
 def test_a_textured_obj_comes_back_with_its_corners_uv_and_picture(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
-    write_meshes(plan, tmp_path, 2048)
+    write_meshes(plan, tmp_path)
     body = next(b for b in plan.bodies if b.name == "cabinet_1_door")
     loaded = trimesh.load(tmp_path / body.visual_file, force="mesh", process=False)
     np.testing.assert_allclose(loaded.vertices, body.link.visual.vertices, atol=1e-6)
@@ -34,6 +35,25 @@ def test_a_hull_is_closed_and_faces_outwards() -> None:
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.is_watertight
     assert mesh.volume > 0
+
+
+def test_a_hull_of_many_vertices_keeps_64_and_nearly_all_of_its_room() -> None:
+    ball = np.random.default_rng(0).normal(size=(150, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    whole = trimesh.convex.convex_hull(ball).volume
+    vertices, faces = convex_hull(ball, "ball")
+    assert len(vertices) == MOST_HULL_VERTICES
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    assert mesh.is_watertight
+    assert 0.9 * whole < mesh.volume < whole
+
+
+def test_a_hull_has_at_most_20_vertices_in_one_plane() -> None:
+    angles = np.linspace(0, 2 * np.pi, 30, endpoint=False)
+    rings = [np.column_stack([np.cos(angles), np.sin(angles), np.full(30, z)]) for z in (0.0, 1.0)]
+    vertices, faces = convex_hull(np.concatenate(rings), "tin")
+    assert [int((vertices[:, 2] == z).sum()) for z in (0.0, 1.0)] == [20, 20]
+    assert trimesh.Trimesh(vertices, faces, process=False).volume > 0.95 * np.pi
 
 
 def test_a_flat_piece_is_refused_by_name() -> None:

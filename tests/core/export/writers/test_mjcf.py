@@ -32,6 +32,20 @@ def test_mjcf_and_urdf_agree_in_mujoco_on_masses_inertias_joints_and_poses(good_
             assert there == pytest.approx(here)
 
 
+def test_dry_friction_holds_what_it_is_stronger_than(model: mujoco.MjModel) -> None:
+    """Half of it pulls on every joint for five seconds, which nothing else stops: none creeps by a milliradian or a mm."""
+    model.opt.gravity[:] = 0.0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    data = mujoco.MjData(model)
+    dofs = [model.joint(j).dofadr[0] for j in range(model.njnt) if model.joint(j).type[0] != mujoco.mjtJoint.mjJNT_FREE]
+    start = data.qpos.copy()
+    data.qfrc_applied[dofs] = 0.5 * model.dof_frictionloss[dofs]
+    for _ in range(2500):
+        mujoco.mj_step(model, data)
+    moved = [abs(data.qpos[model.jnt_qposadr[j]] - start[model.jnt_qposadr[j]]) for j in model.dof_jntid[dofs]]
+    assert 0 < max(moved) < 1e-3
+
+
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
 def test_mujoco_moves_every_body_where_the_plan_says(model: mujoco.MjModel, fraction: float) -> None:
     plan = plan_bundle(kitchen())

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from r2c2r_core.export.handles import with_handles
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.writers.urdf import urdf_text
 from tests.core.export.kitchen import kitchen
@@ -13,8 +14,9 @@ GOLDEN = Path(__file__).parents[3] / "golden" / "kitchen.urdf"
 
 
 def test_the_urdf_says_what_the_golden_one_says() -> None:
-    """To accept a wanted change: write `urdf_text(plan_bundle(kitchen()))` over the golden file and review the difference."""
-    assert_same(ET.fromstring(urdf_text(plan_bundle(kitchen()))), ET.fromstring(GOLDEN.read_text()), "robot")
+    """To accept a wanted change: write `text` over the golden file and review the difference."""
+    text = urdf_text(with_handles(plan_bundle(kitchen())))
+    assert_same(ET.fromstring(text), ET.fromstring(GOLDEN.read_text()), "robot")
 
 
 def assert_same(found: ET.Element, expected: ET.Element, where: str) -> None:
@@ -38,7 +40,7 @@ def label(element: ET.Element) -> str:
 
 
 def test_every_link_but_the_bare_world_has_an_inertial_and_every_path_is_relative() -> None:
-    root = ET.fromstring(urdf_text(plan_bundle(kitchen())))
+    root = ET.fromstring(urdf_text(with_handles(plan_bundle(kitchen()))))
     for link in root.findall("link"):
         assert (link.find("inertial") is not None) == (link.get("name") != "world")
     for mesh in root.iter("mesh"):

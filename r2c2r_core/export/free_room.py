@@ -1,0 +1,75 @@
+"""How far something of a given section can move before it meets a collider: exact, for boxes and convex pieces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from r2c2r_core.arrays import Points
+from r2c2r_core.export.plan import Plan
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.scene import Box
+
+_SKIN_M = 2e-4  # what only touches is not met
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solid:
+    """A convex collider in the world."""
+
+    planes: np.ndarray  # (n, 4): outward normal and offset; inside is below zero
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prism:
+    """A rectangle that moves along its frame's z, from 0 to `length_m`."""
+
+    world_from_prism: Rigid3
+    half_m: tuple[float, float]  # along x and y
+    length_m: float
+
+
+def solids_of(plan: Plan) -> list[Solid]:
+    """Every collider, closed, and the floor."""
+    solids = [_of_box(body.world_from_body @ box.link_from_box, box) for body in plan.bodies for box in body.link.boxes]
+    solids += [_of_points(body.world_from_body.apply(p.vertices_link)) for body in plan.bodies for p in body.link.pieces]
+    far = np.full(3, 1e3)
+    floor = np.array([[0.0, 0.0, 1.0, -plan.floor_z_m]])
+    return [*solids, Solid(planes=floor, low=-far, high=np.array([1e3, 1e3, plan.floor_z_m]))]
+
+
+def free_length(prism: Prism, solids: Sequence[Solid]) -> float:
+    """Way in m before the moving rectangle meets one of the solids; its `length_m` where it meets none."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)], dtype=np.float64)
+    swept = prism.world_from_prism.apply(corners * [*prism.half_m, prism.length_m])
+    low, high = swept.min(axis=0), swept.max(axis=0)
+    near = [solid for solid in solids if (solid.low < high).all() and (solid.high > low).all()]
+    return min([prism.length_m, *(_met_at(prism, solid) for solid in near)])
+
+
+def _met_at(prism: Prism, solid: Solid) -> float:
+    """Lowest z of what prism and solid share: a linear programme of three unknowns."""
+    from scipy.optimize import linprog
+
+    normals = solid.planes[:, :3] @ prism.world_from_prism.rotation
+    offsets = solid.planes[:, 3] + solid.planes[:, :3] @ prism.world_from_prism.translation
+    (x, y), length = prism.half_m, prism.length_m
+    found = linprog([0, 0, 1], A_ub=normals, b_ub=-offsets - _SKIN_M, bounds=[(-x, x), (-y, y), (0, length)])
+    return float(found.fun) if found.status == 0 else length
+
+
+def _of_box(world_from_box: Rigid3, box: Box) -> Solid:
+    half = np.asarray(box.size_m) / 2
+    normals = np.concatenate([world_from_box.rotation.T, -world_from_box.rotation.T])
+    offsets = -normals @ world_from_box.translation - np.concatenate([half, half])
+    reach = np.abs(world_from_box.rotation) @ half
+    centre = world_from_box.translation
+    return Solid(planes=np.column_stack([normals, offsets]), low=centre - reach, high=centre + reach)
+
+
+def _of_points(points: Points) -> Solid:
+    from scipy.spatial import ConvexHull
+
+    return Solid(planes=ConvexHull(points).equations, low=points.min(axis=0), high=points.max(axis=0))

@@ -1,0 +1,98 @@
+"""Load scene.sdf in Drake and write what it holds: `python drake_probe.py scene.sdf answer.json`.
+
+Runs in Drake's own environment, so it imports nothing of r2c2r. Every joint is set to its ends and the scene simulated for a
+moment: what is not finite then is a problem. Drake has a damping of joints, and no dry friction.
+"""
+
+import json
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_SECONDS = 0.05
+
+
+def read_back(scene: Path) -> dict[str, Any]:
+    """Joints and bodies as Drake holds them, closed."""
+    from pydrake.multibody.parsing import Parser  # type: ignore[import-not-found]  # lives in an environment of its own
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph  # type: ignore[import-not-found]
+    from pydrake.systems.analysis import Simulator  # type: ignore[import-not-found]
+    from pydrake.systems.framework import DiagramBuilder  # type: ignore[import-not-found]
+
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.002)
+    parser = Parser(plant)  # one that is not kept takes the models with it
+    parser.AddModels(str(scene))
+    plant.Finalize()
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    own = plant.GetMyContextFromRoot(context)
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    moving = [joint for joint in joints if joint.type_name() in _KINDS]
+    links = [plant.get_body(index) for model in _models(plant) for index in plant.GetBodyIndices(model)]
+    answer = {
+        "version": f"Drake {version('drake')}",
+        "joints": {joint.name(): _joint(joint, own) for joint in moving},
+        "bodies": {body.name(): _body(plant, body, own) for body in links if body.name() != "floor_link"},
+    }
+    simulator = Simulator(diagram, context)
+    for joint in moving:
+        _open(joint, own)
+    simulator.AdvanceTo(_SECONDS)
+    finite = bool(np.isfinite(plant.GetPositionsAndVelocities(own)).all())
+    return answer | {"problem": "" if finite else "it diverges within 0.05 s with every joint open"}
+
+
+_KINDS = {"revolute": "revolute", "prismatic": "prismatic"}
+
+
+def _models(plant: Any) -> list[Any]:
+    from pydrake.multibody.tree import ModelInstanceIndex  # type: ignore[import-not-found]
+
+    return [ModelInstanceIndex(number) for number in range(2, plant.num_model_instances())]  # 0 and 1: world and default
+
+
+def _open(joint: Any, context: Any) -> None:
+    upper = float(joint.position_upper_limits()[0])
+    if joint.type_name() == "revolute":
+        joint.set_angle(context, upper)
+    else:
+        joint.set_translation(context, upper)
+
+
+def _joint(joint: Any, context: Any) -> dict[str, Any]:
+    kind = joint.type_name()
+    frame = joint.frame_on_child().CalcPoseInWorld(context)
+    axis = joint.revolute_axis() if kind == "revolute" else joint.translation_axis()
+    return {
+        "type": _KINDS[kind],
+        "axis_world": (frame.rotation().matrix() @ axis).tolist(),
+        "origin_world": frame.translation().tolist(),
+        "lower": float(joint.position_lower_limits()[0]),
+        "upper": float(joint.position_upper_limits()[0]),
+        "damping": float(joint.GetDampingVector(context)[0]),
+        "velocity": float(joint.velocity_upper_limits()[0]),
+    }
+
+
+def _body(plant: Any, body: Any, context: Any) -> dict[str, Any]:
+    pose = body.EvalPoseInWorld(context)
+    inertia = body.CalcSpatialInertiaInBodyFrame(context)
+    com = inertia.get_com()
+    turn = pose.rotation().matrix()
+    central = inertia.Shift(com).CalcRotationalInertia().CopyToFullMatrix3()
+    return {
+        "mass_kg": float(inertia.get_mass()),
+        "com_world": (pose.translation() + turn @ com).tolist(),
+        "inertia_world": (turn @ central @ turn.T).tolist(),
+        "rotation_world": turn.tolist(),
+        "origin_world": pose.translation().tolist(),
+        "colliders": len(plant.GetCollisionGeometriesForBody(body)),
+    }
+
+
+if __name__ == "__main__":
+    Path(sys.argv[2]).write_text(json.dumps(read_back(Path(sys.argv[1]))))

@@ -1,0 +1,121 @@
+"""Load scene.usda in Newton, on the CPU, and write what it holds: `python newton_probe.py scene.usda answer.json`.
+
+Runs in Newton's own environment, so it imports nothing of r2c2r. Every joint is put to its end in turn and the scene stepped by
+Newton's MuJoCo solver: what is not finite then is a problem. Newton reads friction and armature in its own words, damping and
+effort from the drive; it has no body for what stands fast.
+"""
+
+import json
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_STEPS, _STEP_S = 10, 0.002
+_KINDS = {0: "prismatic", 1: "revolute"}  # newton.JointType
+_COLLIDES = 2  # newton.ShapeFlags.COLLIDE_SHAPES
+_HELD = 0.05  # of the travel that a joint may move in 0.02 s, let go at its end
+
+
+def read_back(scene: Path) -> dict[str, Any]:
+    """Joints and bodies as Newton holds them, closed."""
+    import newton  # type: ignore[import-not-found]  # lives in an environment of its own
+    import warp  # type: ignore[import-not-found]
+    from newton.usd import SchemaResolverNewton, SchemaResolverPhysx  # type: ignore[import-not-found]
+
+    with warp.ScopedDevice("cpu"):
+        builder = newton.ModelBuilder()
+        newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+        builder.add_usd(str(scene), schema_resolvers=[SchemaResolverNewton(), SchemaResolverPhysx()])
+        model = builder.finalize()
+        closed = model.state()
+        newton.eval_fk(model, model.joint_q, model.joint_qd, closed)
+        names = [str(label).rsplit("/", 1)[-1] for label in model.body_label]
+        moving = [joint for joint, kind in enumerate(model.joint_type.numpy()) if int(kind) in _KINDS]
+        return {
+            "version": f"Newton {version('newton')}",
+            "joints": {str(model.joint_label[j]).rsplit("/", 1)[-1]: _joint(model, closed, j) for j in moving},
+            "bodies": {name: _body(model, closed, body) for body, name in enumerate(names)},
+            "in_world": _fixed(scene),
+            "problem": _swept(newton, model, moving),
+        }
+
+
+def _fixed(scene: Path) -> list[str]:
+    """What has a mass and no body of its own: Newton makes it part of the world."""
+    from pxr import Usd, UsdPhysics
+
+    stage = Usd.Stage.Open(str(scene))  # prims end with their stage
+    return [p.GetName() for p in stage.Traverse() if p.HasAPI(UsdPhysics.MassAPI) and not p.HasAPI(UsdPhysics.RigidBodyAPI)]
+
+
+def _joint(model: Any, closed: Any, joint: int) -> dict[str, Any]:
+    dof = int(model.joint_qd_start.numpy()[joint])
+    child = closed.body_q.numpy()[model.joint_child.numpy()[joint]]
+    in_child = model.joint_X_c.numpy()[joint]
+    turn = _matrix(child[3:]) @ _matrix(in_child[3:])
+    return {
+        "type": _KINDS[int(model.joint_type.numpy()[joint])],
+        "axis_world": (turn @ model.joint_axis.numpy()[dof]).tolist(),
+        "origin_world": (child[:3] + _matrix(child[3:]) @ in_child[:3]).tolist(),
+        "lower": float(model.joint_limit_lower.numpy()[dof]),
+        "upper": float(model.joint_limit_upper.numpy()[dof]),
+        "damping": float(model.joint_target_kd.numpy()[dof]),
+        "friction": float(model.joint_friction.numpy()[dof]),
+        "effort": float(model.joint_effort_limit.numpy()[dof]),
+    }
+
+
+def _body(model: Any, closed: Any, body: int) -> dict[str, Any]:
+    pose = closed.body_q.numpy()[body]
+    turn = _matrix(pose[3:])
+    own = (model.shape_body.numpy() == body) & ((model.shape_flags.numpy() & _COLLIDES) > 0)
+    return {
+        "mass_kg": float(model.body_mass.numpy()[body]),
+        "com_world": (pose[:3] + turn @ model.body_com.numpy()[body]).tolist(),
+        "inertia_world": (turn @ model.body_inertia.numpy()[body] @ turn.T).tolist(),
+        "rotation_world": turn.tolist(),
+        "origin_world": pose[:3].tolist(),
+        "colliders": int(own.sum()),
+    }
+
+
+def _swept(newton: Any, model: Any, moving: list[int]) -> str:
+    """What goes wrong with a joint at its end, in words; empty where nothing does."""
+    solver, control = newton.solvers.SolverMuJoCo(model), model.control()
+    for joint in moving:
+        name = str(model.joint_label[joint]).rsplit("/", 1)[-1]
+        at, dof = int(model.joint_q_start.numpy()[joint]), int(model.joint_qd_start.numpy()[joint])
+        upper = float(model.joint_limit_upper.numpy()[dof])
+        now, after = model.state(), model.state()
+        q = model.joint_q.numpy()
+        q[at] = upper
+        now.joint_q.assign(q)
+        newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+        for _ in range(_STEPS):
+            now.clear_forces()
+            solver.step(now, after, control, None, _STEP_S)
+            now, after = after, now
+        found = now.joint_q.numpy()
+        if not np.isfinite(found).all():
+            return f"it diverges with {name} open"
+        if abs(found[at] - upper) > _HELD * upper:
+            return f"{name}, let go at {upper:.3g}, is at {found[at]:.3g} after {_STEPS} steps"
+    return ""
+
+
+def _matrix(quat_xyzw: np.ndarray) -> np.ndarray:
+    x, y, z, w = np.asarray(quat_xyzw, dtype=np.float64) / np.linalg.norm(quat_xyzw)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+if __name__ == "__main__":
+    Path(sys.argv[2]).write_text(json.dumps(read_back(Path(sys.argv[1]))))

@@ -1,0 +1,69 @@
+"""A link whose collider is known to stand off what is drawn of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from r2c2r_core.export.certify import FAR_COLLIDER_M, certify
+from r2c2r_core.export.collider_fit import collider_fits
+from r2c2r_core.export.reading import Urdf, UrdfLink, UrdfShape, read_urdf
+from r2c2r_core.export.rules.files import BundleFiles
+from r2c2r_core.geometry.transforms import Rigid3
+from tests.core.export.conftest import write_folder
+from tests.core.export.kitchen import kitchen
+
+HERE = BundleFiles(folder=Path("nowhere"))
+
+
+def box(kind: str, size: tuple[float, float, float], at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> UrdfShape:
+    pose = Rigid3(np.eye(3), np.array(at))
+    return UrdfShape(kind=kind, name="", link_from_shape=pose, mesh=None, scale=np.ones(3), box_m=np.array(size))
+
+
+def urdf_of(*shapes: UrdfShape) -> Urdf:
+    part = UrdfLink(name="part", shapes=shapes, inertial=None)
+    return Urdf(name="one", links=(part,), joints=(), mujoco_compiler=None, malformed=())
+
+
+def test_a_collider_that_is_the_drawing_lies_on_it() -> None:
+    (fit,) = collider_fits(urdf_of(box("visual", (0.4, 0.02, 0.5)), box("collision", (0.4, 0.02, 0.5))), HERE)
+    assert fit.drawn_to_collider.most_m < 1e-5  # Open3D measures in single precision
+    assert fit.collider_to_drawn.most_m < 1e-5
+
+
+def test_each_way_says_its_own() -> None:
+    """A board drawn 0.4 m wide of which only half collides: what is drawn lies up to 0.2 m off, the collider 5 mm."""
+    (fit,) = collider_fits(urdf_of(box("visual", (0.4, 0.02, 0.5)), box("collision", (0.2, 0.01, 0.5), (-0.1, 0.0, 0.0))), HERE)
+    assert fit.drawn_to_collider.most_m == pytest.approx(0.2, abs=0.01)
+    assert fit.collider_to_drawn.median_m == pytest.approx(0.005, abs=1e-5)
+
+
+def test_what_is_sunk_in_another_collider_is_not_touched() -> None:
+    drawn = box("visual", (0.4, 0.4, 0.4))
+    inside = box("collision", (0.1, 0.1, 0.1))
+    (fit,) = collider_fits(urdf_of(drawn, box("collision", (0.4, 0.4, 0.4)), inside), HERE)
+    assert fit.collider_to_drawn.most_m < 1e-5
+
+
+def test_a_link_without_a_collider_is_left_out() -> None:
+    assert collider_fits(urdf_of(box("visual", (0.4, 0.4, 0.4))), HERE) == ()
+
+
+def test_the_certificate_names_a_collider_far_from_what_is_drawn(tmp_path: Path) -> None:
+    folder = write_folder(kitchen(), tmp_path / "kitchen")
+    assert {fit.link for fit in collider_fits(read_urdf(folder / "scene.urdf"), BundleFiles(folder=folder))} >= {
+        "cabinet_1_door"
+    }
+    path = folder / "meshes" / "bottle_1" / "bottle_1_body_vis.obj"
+    lines = path.read_text().splitlines()
+    moved = [_shifted(line, 3 * FAR_COLLIDER_M) if line.startswith("v ") else line for line in lines]
+    path.write_text("\n".join(moved) + "\n")
+    found = [f for f in certify(folder).findings if f.rule == "collider-far"]
+    assert {f.where for f in found} == {"bottle_1_body"}
+    assert {f.severity for f in found} == {"warning"}
+
+
+def _shifted(line: str, metres: float) -> str:
+    _, x, *rest = line.split()
+    return " ".join(["v", str(float(x) + metres), *rest])

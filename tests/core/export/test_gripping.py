@@ -1,0 +1,40 @@
+"""The gripper beside what else judges a bundle: the same certificate whatever the number of processes."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.export.gripping import begin_gripping
+from r2c2r_core.model.report import Certificate
+from r2c2r_core.pool import Pool
+
+Bundle = tuple[Path, Certificate]
+
+
+def test_two_processes_say_what_one_says(kitchen_bundle: Bundle, tmp_path: Path) -> None:
+    told = []
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        shutil.copytree(kitchen_bundle[0].with_suffix(""), folder)
+        shutil.rmtree(folder / "gripper", ignore_errors=True)
+        with Pool(workers) as pool:
+            told.append(begin_gripping(folder, pool)())
+    assert told[0] is not None
+    assert told[0]["grips"]
+    assert told[0] == told[1]
+    pictures = [sorted(path.name for path in (tmp_path / str(workers) / "gripper").iterdir()) for workers in (1, 2)]
+    assert pictures[0] == pictures[1] == sorted(f"{grip['film']}.jpg" for grip in told[0]["grips"] if grip["film"])
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_scene_that_mujoco_cannot_load_is_left_untried(tmp_path: Path, workers: int) -> None:
+    (tmp_path / "scene.xml").write_text("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>")
+    with Pool(workers) as pool:
+        assert begin_gripping(tmp_path, pool)() is None
+
+
+def test_it_begins_before_it_is_waited_for(kitchen_bundle: Bundle) -> None:
+    with Pool(2) as pool:
+        begin_gripping(kitchen_bundle[0].with_suffix(""), pool)
+        assert len(pool._busy) == 2

@@ -1,0 +1,83 @@
+"""The lines that take a bundle into a simulator: each file they name is in the bundle, and they run where it is installed."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from r2c2r_core.export.loaders import APART, EVERY_LOADER
+from r2c2r_core.export.probes.sapien_probe import without_visuals
+from r2c2r_core.export.simulators import Recipe, recipes
+from tests.core.export.conftest import write_folder
+from tests.core.export.kitchen import kitchen
+
+RECIPES = {recipe.simulator: recipe for recipe in recipes("hand made", "cabinet_1")}
+HERE = {"MuJoCo": "mujoco", "PyBullet": "pybullet"}
+ELSEWHERE = {"MJX": "MJX", "MuJoCo Warp": "MuJoCo Warp", "Newton": "Newton", "Drake": "Drake"}
+WITHOUT_A_DEVICE = {"SAPIEN, ManiSkill"}
+NOT_FROM_PYPI = {"Isaac Sim", "Isaac Lab", "ROS 2", "Gazebo"}  # their files are looked at alone: they need a GPU or a system
+READERS = {"yourdfpy", "MuJoCo (URDF)", "USD"}  # loaders of the certificate that are no simulators of their own
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_folder(kitchen(), tmp_path_factory.mktemp("simulators") / "kitchen")
+
+
+def test_every_engine_of_the_certificate_has_lines_and_all_lines_that_can_be_are_run() -> None:
+    assert set(EVERY_LOADER) - READERS == {recipe.loader for recipe in RECIPES.values()} - {None}
+    assert set(RECIPES) == {*HERE, *ELSEWHERE, *WITHOUT_A_DEVICE, *NOT_FROM_PYPI}
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
+def test_every_file_that_is_named_is_in_the_bundle(recipe: Recipe, folder: Path) -> None:
+    named = re.findall(r"\b(?:scene\.(?:xml|urdf|usda|sdf|srdf)|assets/[\w/.]+\w)", f"{recipe.code} {recipe.note}")
+    assert named or "PACKAGE" not in recipe.code
+    assert [name for name in named if not (folder / name).is_file()] == []
+    assert recipe.loader is None or recipe.loader in EVERY_LOADER
+
+
+@pytest.mark.parametrize("recipe", [r for r in RECIPES.values() if r.language == "python"], ids=lambda r: r.simulator)
+def test_python_lines_are_python(recipe: Recipe) -> None:
+    compile(recipe.code, recipe.simulator, "exec")
+
+
+@pytest.mark.parametrize("simulator", HERE)
+def test_the_lines_run(simulator: str, folder: Path) -> None:
+    pytest.importorskip(HERE[simulator], reason=f"{RECIPES[simulator].install}")
+    ran = subprocess.run(
+        [sys.executable, "-c", RECIPES[simulator].code], cwd=folder, capture_output=True, text=True, check=False, timeout=600
+    )
+    assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize("simulator", ELSEWHERE)
+def test_the_lines_run_in_an_environment_of_its_own(simulator: str, folder: Path) -> None:
+    python = os.environ.get(APART[ELSEWHERE[simulator]].variable)
+    if not python:
+        pytest.skip(f"{APART[ELSEWHERE[simulator]].variable} names no environment")
+    code = RECIPES[simulator].code
+    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=1800)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_sapiens_lines_run_without_a_device_as_their_note_says(folder: Path, tmp_path: Path) -> None:
+    python = os.environ.get(APART["SAPIEN"].variable)
+    if not python:
+        pytest.skip(f"{APART['SAPIEN'].variable} names no environment")
+    recipe = RECIPES["SAPIEN, ManiSkill"]
+    without = re.search(r"sapien\.Scene\([^)]*\)\]\)", recipe.note)
+    assert without is not None
+    code = recipe.code.replace("sapien.Scene()", without[0]).replace(
+        "scene.urdf", str(without_visuals(folder / "scene.urdf", tmp_path))
+    )
+    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=600)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_ros_is_told_the_packages_name(folder: Path) -> None:
+    assert "<name>hand_made</name>" in (folder / "package.xml").read_text()
+    assert "ros2 launch hand_made view.launch.py" in RECIPES["ROS 2"].code

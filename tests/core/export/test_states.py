@@ -1,0 +1,82 @@
+"""States to reset to, and how far each number may be varied."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from r2c2r_core.export import randomize
+from r2c2r_core.model.placement import Spread
+from r2c2r_core.schema.manifest import Manifest
+from tests.core.export.kitchen import bottle, cabinet, drawer, reconstruction
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("state", ["closed", "ajar", "open"])
+def test_a_keyframe_puts_every_joint_where_the_manifest_says_and_things_where_they_stand(good_folder: Path, state: str) -> None:
+    said = json.loads((good_folder / "manifest.json").read_text())["states"][state]
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    data, still = mujoco.MjData(model), mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(state).id)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_forward(model, still)
+    assert len(said) == 4
+    for joint, position in said.items():
+        assert float(data.joint(joint).qpos[0]) == pytest.approx(position, abs=1e-8)
+        assert position == pytest.approx({"closed": 0, "ajar": 0.15, "open": 1}[state] * model.joint(joint).range[1])
+    np.testing.assert_allclose(data.body("bottle_1_body").xpos, still.body("bottle_1_body").xpos, atol=1e-8)
+
+
+def test_an_asset_has_the_states_of_its_own_joint(good_folder: Path) -> None:
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "assets/drawer_1/drawer_1.xml"))
+    assert model.key("open").qpos[0] == pytest.approx(0.42)
+
+
+def test_usd_joints_have_a_state_and_newtons_words(good_folder: Path) -> None:
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(good_folder / "scene.usda"))
+    slide = stage.GetPrimAtPath("/Scene/drawer_1/joints/drawer_1_slide")
+    assert {"PhysicsJointStateAPI:linear", "NewtonJointAPI"} <= set(slide.GetPrimTypeInfo().GetAppliedAPISchemas())
+    said = {a.GetName(): a.Get() for a in slide.GetAttributes()}
+    assert said["state:linear:physics:position"] == 0.0
+    assert (said["newton:friction"], said["mjc:frictionloss"]) == (1.0, 1.0)
+    assert said["newton:armature"] == pytest.approx(0.02)
+
+
+def test_the_written_number_lies_within_each_of_its_ranges(good_folder: Path) -> None:
+    manifest = Manifest.model_validate_json((good_folder / "manifest.json").read_text())
+    for item in manifest.objects:
+        ranges = item.randomize
+        assert ranges is not None
+        assert ranges.mass_kg.low <= item.mass_kg <= ranges.mass_kg.high
+        for size, found in zip(item.dimensions_m, ranges.dimensions_m, strict=True):
+            assert found.low <= size <= found.high
+        for joint in item.joints:
+            assert joint.randomize is not None
+            assert joint.randomize.upper.low <= joint.upper <= joint.randomize.upper.high
+
+
+def test_a_measured_spread_is_a_normal_distribution_and_a_guess_a_wider_uniform_one() -> None:
+    item = drawer("drawer_1")
+    placement = reconstruction().placements[0]
+    placement = replace(
+        placement, spread=Spread(turn_deg=1.0, turn_axis_world=_UP, shift_m=0.002, shift_axis_world=_UP, scale=0.004)
+    )
+    width, depth, _ = randomize.of_object(item, 5.0, placement)["dimensions_m"]
+    assert (width.distribution, width.source) == ("normal", "measured")
+    assert width.sigma == pytest.approx(0.004 * item.dimensions_m[0])
+    assert (depth.distribution, depth.source) == ("uniform", "default")
+    assert depth.high - depth.low == pytest.approx(0.1 * item.dimensions_m[1])
+
+
+def test_what_whole_ones_weigh_is_sourced_and_an_obstacle_is_never_passed() -> None:
+    mass = randomize.of_object(bottle("bottle_1"), 0.9, None)["mass_kg"]
+    assert (mass.low, mass.high, mass.source) == (0.2, 2.2, "sourced")
+    (joint,) = cabinet("a").joints
+    assert randomize.of_joint(joint)["upper"].high > joint.upper
+    assert randomize.of_joint(replace(joint, uncut=2.0))["upper"].high == joint.upper

@@ -1,0 +1,52 @@
+"""Sweeping beside MuJoCo, with MuJoCo's own steps in the place of an engine's."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import r2c2r_core.export.probes as probes
+
+
+@pytest.fixture
+def sweeping(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The probes import it as the file beside them."""
+    monkeypatch.syspath_prepend(str(Path(probes.__file__).parent))
+    import sweeping
+
+    yield sweeping
+    sys.modules.pop("sweeping")
+
+
+def stepped_in(model: Any) -> Any:
+    def stepped(qpos: np.ndarray, steps: int) -> np.ndarray:
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        mujoco.mj_step(model, data, steps)
+        return np.array(data.qpos)
+
+    return stepped
+
+
+def test_an_engine_that_steps_as_mujoco_has_no_problem(good_folder: Path, sweeping: Any) -> None:
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    assert sweeping.sweep_beside_mujoco(model, stepped_in(model)) == ""
+
+
+def test_a_door_that_an_engine_lets_meet_its_carcass_is_named(good_folder: Path, sweeping: Any) -> None:
+    """Contact exclusions that are not kept throw a door out of its frame."""
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    other = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    other.dof_damping[:] = 0
+    other.dof_frictionloss[:] = 0
+    other.opt.gravity[:] = (0, 40, 0)  # a pull that opens what nothing holds
+    assert "from where MuJoCo has it after 10 steps" in sweeping.sweep_beside_mujoco(model, stepped_in(other))
+
+
+def test_an_engine_that_diverges_is_named_with_the_joint(good_folder: Path, sweeping: Any) -> None:
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    problem = sweeping.sweep_beside_mujoco(model, lambda qpos, steps: np.full_like(qpos, np.nan))
+    assert problem == "it diverges with cabinet_1_hinge at 0%"
