@@ -99,20 +99,46 @@ def _commands() -> tuple[Any, ...]:
         check,
         check_data,
         dataset,
+        db,
         demo,
         doctor,
         evaluate,
         info,
         key,
+        remote,
         restore,
         run,
         sample,
         schema,
         serve,
+        token,
         user,
+        vary,
+        work,
     )
 
-    return serve, key, demo, user, backup, restore, check_data, sample, info, run, check, evaluate, dataset, schema, doctor
+    return (
+        serve,
+        work,
+        key,
+        demo,
+        user,
+        token,
+        backup,
+        restore,
+        check_data,
+        db,
+        sample,
+        info,
+        run,
+        check,
+        vary,
+        evaluate,
+        dataset,
+        remote,
+        schema,
+        doctor,
+    )
 
 
 def _way_out(number: int | None) -> str:

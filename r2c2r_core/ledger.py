@@ -98,6 +98,8 @@ class Ledger:
     pool: Pool = field(default_factory=lambda: Pool(1))
     seconds: dict[str, float] = field(default_factory=dict)  # by stage: what its results took when they were computed
     failures: dict[str, str] = field(default_factory=dict)  # by object: one line
+    only: Collection[str] | None = None  # objects of the last stage to compute, others are left; None: all of every stage
+    left: list[str] = field(default_factory=list)  # objects of the last stage that are not there and were left
 
     def one(
         self,
@@ -121,9 +123,10 @@ class Ledger:
         Of an input that is a mapping each object is given its own. `alone`: in this process, whatever the pool.
         """
         progress = self._begin(stage)
+        names = [name for name in names if not self.only or name in self.only]
         jobs = {name: self._job(stage, name, compute, _own(name, inputs)) for name in names}
         results = {name: kept for name, job in jobs.items() if (kept := self._found(job)) is not None}
-        wanted = {name: job for name, job in jobs.items() if name not in results}
+        wanted = self._without_left(stage, {name: job for name, job in jobs.items() if name not in results})
         parallel = not alone and min(len(wanted), self.pool.workers) > 1
         results |= self._side_by_side(wanted, progress) if parallel else self._one_by_one(wanted, progress)
         progress.at(1.0, "done")
@@ -141,6 +144,15 @@ class Ledger:
             with apart(stage, name, self.failures):
                 results[name] = choose(*_values((item, *_own(name, inputs)), SILENT))
         return results
+
+    def _without_left(self, stage: Stage, missing: "dict[str, _Job]") -> "dict[str, _Job]":
+        """What this run is to compute of what is not there."""
+        if self.only is None:
+            return missing
+        wanted = {name: job for name, job in missing.items() if stage == self.until and name in self.only}
+        if stage == self.until:
+            self.left += [name for name in missing if name not in wanted]
+        return wanted
 
     def _one_by_one(self, jobs: "dict[str, _Job]", progress: Progress) -> dict[str, Kept[Any]]:
         results = {}

@@ -1,7 +1,7 @@
 """READ FIRST: one recording and a few clicks in, an articulated scene out."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.align.stage import Placer, place_candidate
 from r2c2r_core.config import ReconstructConfig
-from r2c2r_core.errors import StageError
+from r2c2r_core.errors import InputError, StageError
 from r2c2r_core.export.stage import write_bundle
 from r2c2r_core.generate.candidates import Plan, make_candidates, select_candidate
 from r2c2r_core.generate.stage import GENERATORS
@@ -36,6 +36,8 @@ from r2c2r_core.synthesize.stage import build_scene
 from r2c2r_core.tuning import changed, tuning
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace, content_key, file_key
+
+OBJECT_STAGES: tuple[Stage, ...] = ("segment", "generate", "align")  # that go object by object
 
 _log = logging.getLogger(__name__)
 
@@ -70,18 +72,32 @@ class Outcome:
     computed: tuple[str, ...]  # "stage/object" of what was computed rather than found
     failures: dict[str, str]  # object -> one line
     seconds: dict[str, float]  # by stage: what its results took when they were computed
+    left: tuple[str, ...] = ()  # objects that the last stage lacks, of a run of some objects
 
 
 def reconstruct(
-    request: Request, work: Workspace, *, until: Stage = "export", workers: int = 1, progress: Progress = SILENT
+    request: Request,
+    work: Workspace,
+    *,
+    until: Stage = "export",
+    only: Collection[str] | None = None,
+    workers: int = 1,
+    progress: Progress = SILENT,
 ) -> Outcome:
     """Turn one RGB-D recording into an articulated scene; the bundle is `work.bundle`.
 
     Objects are computed side by side in `workers` processes (0: as many as cores and memory allow); 1 starts none.
+
+    With `only` the run computes these objects of the stage `until`, one of OBJECT_STAGES whose earlier stages are done, and
+    other processes may compute others beside it. With none at all it makes what they share, and says what is left to compute.
+    The run of all that comes after them finds what they stored. Raises InputError for a stage or an object that is none.
     """
     reconstruction, certificate = None, None
-    with work.locked(), tuning(changed(request.config.numbers)), Pool(workers or usual_workers()) as pool, suppress(Reached):
-        run = Ledger(work, progress, until, pool)
+    if only is not None:
+        _require_objects(request, until, only)
+    held = work.locked([f"{until}/{name}" for name in only or ()])
+    with held, tuning(changed(request.config.numbers)), Pool(workers or usual_workers()) as pool, suppress(Reached):
+        run = Ledger(work, progress, until, pool, only=only)
         reconstruction, certificate = _run(request, run)
         work.keep_seconds(run.seconds)
     return Outcome(
@@ -90,7 +106,15 @@ def reconstruct(
         computed=tuple(work.computed),
         failures=dict(run.failures),
         seconds=dict(run.seconds),
+        left=tuple(run.left),
     )
+
+
+def _require_objects(request: Request, stage: Stage, names: Collection[str]) -> None:
+    if stage not in OBJECT_STAGES:
+        raise InputError(f"{stage}: it does not go object by object", hint=f"one of {', '.join(OBJECT_STAGES)}")
+    if unknown := sorted(set(names) - {prompt.name for prompt in request.prompts.objects}):
+        raise InputError(f"{unknown[0]}: no such object in the prompts", hint="name objects as the prompts do")
 
 
 def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
@@ -112,7 +136,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
     placements = place_objects(request, run, capture, tracks, candidates, choices)
 
     names = list(placements)
-    if not names:
+    if not names and run.only is None:
         raise StageError("no object could be placed", hint="; ".join(run.failures.values()) or "add prompts")
     shown = [tracks[name] for name in names]
     placed = [placements[name] for name in names]
@@ -136,7 +160,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
     if not work.bundle.exists():
         work.forget("export", "scene")
     known = Kept(result, content_key(fitted.key, run.failures))
-    certificate = run.one("export", write_bundle, known, aside(work.bundle), config.export)
+    certificate = run.one("export", write_bundle, known, aside(work.bundle), config.export, aside(run.pool))
     run.failures |= certificate.value.left_out
     return result, certificate.value
 
@@ -209,7 +233,7 @@ def generate_objects(
         return run.each("generate", make_candidates, plans, capture, tracks, plans, given, placers, earlier, alone=alone)
 
     made = made_by(plans)
-    failed = {name: run.failures[name].removeprefix(f"generate: {name}: ") for name in plans if name not in made}
+    failed = {name: run.failures[name].removeprefix(f"generate: {name}: ") for name in plans if name in run.failures}
     instead = {name: plan for name, why in failed.items() if (plan := plans[name].stand_in(why)) is not None}
     for name in instead:
         del run.failures[name]

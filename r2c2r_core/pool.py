@@ -66,20 +66,31 @@ class Pool:
             worker.end()
 
     def run(self, tasks: Mapping[str, Task], progress: Progress = SILENT) -> Iterator[tuple[str, Any | Failed]]:
-        """Every task's name and what it gave or Failed, as they end; raises Cancelled. One that ends its process has failed."""
-        waiting, shares, done = list(tasks.items()), {}, 0
+        """Every task's name and what it gave or Failed, as they end; raises Cancelled. One that ends its process has failed.
+
+        The first ones, as many as there are processes, begin at the call; the others while the caller asks for results.
+        """
+        waiting = list(tasks.items())
+        self._begin(waiting)
+        return self._results(waiting, len(tasks), progress)
+
+    def _begin(self, waiting: list[tuple[str, Task]]) -> None:
+        while waiting and len(self._busy) < self.workers:
+            worker = self._idle.pop() if self._idle else _Worker()
+            worker.begin(*waiting.pop(0))
+            self._busy[worker.channel] = worker
+
+    def _results(self, waiting: list[tuple[str, Task]], count: int, progress: Progress) -> Iterator[tuple[str, Any | Failed]]:
+        shares: dict[str, float] = {}
+        done = 0
         while waiting or self._busy:
-            while waiting and len(self._busy) < self.workers:
-                name, task = waiting.pop(0)
-                worker = self._idle.pop() if self._idle else _Worker()
-                worker.begin(name, task)
-                self._busy[worker.channel] = worker
+            self._begin(waiting)
             for channel in wait(list(self._busy), _POLL_S):
                 worker = self._busy[channel]  # type: ignore[index]  # these are the connections given
                 kind, *content = worker.answer()
                 if kind == "at":
                     shares[worker.name] = content[0]
-                    progress.at((done + sum(shares.values())) / len(tasks), content[1])
+                    progress.at((done + sum(shares.values())) / count, content[1])
                     continue
                 del self._busy[worker.channel]
                 shares.pop(worker.name, None)

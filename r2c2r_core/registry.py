@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, cast
@@ -53,6 +54,7 @@ class Registry(Generic[T]):
 
     seam: str
     own: tuple[Backend, ...]
+    protocol: type = object  # T at run time: what a backend has to offer; its abstract methods are asked for
     setting: str = "segment.weights"  # where a configuration names the weights
     group: Group | None = None  # of entry points, by which other packages add to it
 
@@ -118,13 +120,27 @@ class Registry(Generic[T]):
     def load(self, name: str, **options: Any) -> T:
         """A new instance of the backend; raises BackendUnavailable with the extra to install or the weights to fetch.
 
-        A backend with weights takes their folder as `weights`.
+        A backend with weights takes their folder as `weights`. One that is not what the seam asks for is refused here.
         """
         folder = self.require(name, options.pop("weights", ""))
         if folder is not None:
             options["weights"] = folder
-        module_name, class_name = self.get(name).target.split(":")
-        return cast(T, getattr(importlib.import_module(module_name), class_name)(**options))
+        return self._class_of(name)(**options)
+
+    def _class_of(self, name: str) -> Callable[..., T]:
+        """What the backend's line names, if it has every method of the protocol."""
+        target = self.get(name).target
+        module_name, _, class_name = target.partition(":")
+        found = getattr(importlib.import_module(module_name), class_name, None)
+        asked = sorted(getattr(self.protocol, "__abstractmethods__", ()))
+        lacking = [method for method in asked if not _is_written(getattr(found, method, None))]
+        if found is None or lacking:
+            fault = "there is none" if found is None else f"it has no {' and no '.join(lacking)}"
+            raise BackendUnavailable(
+                f"{self.seam} '{name}' is not available: {target}: {fault}",
+                hint=f"a class with the methods of {self.protocol.__module__}.{self.protocol.__name__} is expected",
+            )
+        return cast(Callable[..., T], found)
 
 
 def find_weights(named: str, holds: tuple[str, ...] = MODEL_FILES) -> Path | None:
@@ -145,6 +161,10 @@ def hub_cache() -> Path:
     """Where Hugging Face's tools keep what they downloaded (HF_HUB_CACHE, HF_HOME, else the user's cache folder)."""
     home = os.environ.get("HF_HOME") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "huggingface"
     return Path(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub").expanduser()
+
+
+def _is_written(method: object) -> bool:
+    return callable(method) and not getattr(method, "__isabstractmethod__", False)
 
 
 def _is_model(folder: Path, holds: tuple[str, ...]) -> bool:

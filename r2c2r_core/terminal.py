@@ -1,12 +1,16 @@
 """What the command line prints: progress on stderr, tables."""
 
 import contextlib
+import math
 import sys
 import time
 from collections.abc import Iterator, Sequence
 
-from r2c2r_core.model.report import Certificate
+from r2c2r_core.model.report import Certificate, LoaderResult
 from r2c2r_core.progress import Progress
+from r2c2r_core.robot.arm_certificate import ArmCertificate
+from r2c2r_core.robot.certificate import Grip, GripperCertificate
+from r2c2r_core.robot.panda import NAME
 from r2c2r_core.texts import shown
 
 
@@ -34,13 +38,59 @@ def certificate_text(certificate: Certificate) -> str:
     lines = [
         table(("joint", "deepest mm", "travel %"), joints) if joints else "no joints",
         "",
-        *(f"{loader.loader}: {loader.state} {loader.detail}".rstrip() for loader in certificate.loaders),
+        *(f"{loader.loader}: {loader.state} {loader.detail}{_speed(loader)}".rstrip() for loader in certificate.loaders),
         *(f"{finding.severity}: {finding.rule}: {finding.where}: {finding.message}" for finding in certificate.findings),
         f"deepest contact at rest {1000 * certificate.rest_penetration_m:.2f} mm, drift {1000 * certificate.drift_m:.2f} mm, "
         f"{certificate.realtime_factor:.0f} x real time",
         f"certificate {'passed' if certificate.passed else 'FAILED'}",
     ]
     return shown("\n".join(lines))
+
+
+def _speed(loader: LoaderResult) -> str:
+    """How many steps a second it took here, in one world and in many at once."""
+    return "".join(f"; {speed:.0f} steps/s in {worlds} world{'s' * (worlds > 1)}" for worlds, speed in loader.steps_per_s)
+
+
+def gripper_text(certificate: GripperCertificate) -> str:
+    """The gripper's certificate for a person at a terminal."""
+    (opened, joints), (moved, things) = certificate.share("joint"), certificate.share("thing")
+    said = f"the gripper opens and closes {opened} of {joints} joints and moves {moved} of {things} free things"
+    return shown("\n".join([*_grips("gripper at", certificate.grips), said]))
+
+
+def arm_text(certificate: ArmCertificate) -> str:
+    """The arm's certificate for a person at a terminal."""
+    places = [
+        f"stand {number} at x {stand.x_m:.1f}, y {stand.y_m:.1f} m, lifted {stand.lift_m:.1f} m, for {', '.join(joints)}"
+        for number, (stand, joints) in enumerate(certificate.places.items(), 1)
+    ]
+    said = f"a {NAME} opens and closes {certificate.opened} of {len(certificate.grips)} joints from {len(places)} places"
+    return shown("\n".join([*_grips("arm at", certificate.grips), *places, said]))
+
+
+def _grips(title: str, grips: Sequence[Grip]) -> list[str]:
+    rows = [
+        (
+            grip.name,
+            grip.method or "-",
+            "yes" if grip.passed else "NO",
+            _figure(grip.grip_n),
+            _figure(100 * grip.opened),
+            _figure(1000 * grip.slip_m),
+            _figure(grip.force_n),
+        )
+        for grip in grips
+    ]
+    return [
+        table((title, "how", "done", "grip N", "open %", "slip mm", "force N"), rows) if rows else "nothing to hold",
+        "",
+        *(f"{grip.name}: {grip.why} (the {grip.blame})" for grip in grips if grip.why),
+    ]
+
+
+def _figure(value: float) -> str:
+    return f"{value:.0f}" if math.isfinite(value) else "-"
 
 
 class _Live:

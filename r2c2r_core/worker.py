@@ -1,8 +1,9 @@
-"""One stage in a process of its own: `python -m r2c2r_core.worker WORKDIR --until STAGE [--request FILE]`.
+"""One stage in a process of its own: `python -m r2c2r_core.worker WORKDIR --until STAGE [--request FILE] [--only NAME ...]`.
 
 Reads the request (WORKDIR/request.json unless another is named) and prints JSON lines: {"stage", "fraction", "text"} while
 working, then either {"done", "computed", "failures", "passed"} or {"error": {"kind", "message", "hint"}}. A stage's memory
-returns with its process, and killing it loses at most the noun being computed.
+returns with its process, and killing it loses at most the noun being computed. With --only it computes these objects of the
+stage alone, and with no name after it none: then it makes what they share, and "left" says which are to be computed.
 """
 
 import argparse
@@ -37,6 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--until", choices=STAGES, default="export")
     parser.add_argument("--request", type=Path, help="what to compute; WORKDIR/request.json unless given")
     parser.add_argument("--workers", type=int, default=0, help="processes side by side; 0: as cores and memory allow")
+    parser.add_argument("--only", nargs="*", metavar="NAME", help="objects of the stage, computed beside others elsewhere")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
@@ -46,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         work = Workspace(options.workdir)
         request = read_request(options.request or options.workdir / "request.json")
-        outcome = reconstruct(request, work, until=options.until, workers=options.workers, progress=progress)
+        outcome = reconstruct(request, work, until=options.until, only=options.only, workers=options.workers, progress=progress)
     except R2C2RError as error:
         _say(error={"kind": type(error).__name__, "message": error.message, "hint": error.hint})
         return 130 if isinstance(error, Cancelled) else error.exit_code
@@ -60,7 +62,8 @@ def main(arguments: list[str] | None = None) -> int:
         _say(error={"kind": type(error).__name__, "message": f"unexpected: {error}", "hint": "see the job's log"})
         return 1
     passed = None if outcome.certificate is None else outcome.certificate.passed
-    _say(done=options.until, computed=list(outcome.computed), failures=outcome.failures, passed=passed)
+    left = {} if options.only is None else {"left": list(outcome.left)}
+    _say(done=options.until, computed=list(outcome.computed), failures=outcome.failures, passed=passed, **left)
     return 0
 
 

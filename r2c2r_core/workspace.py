@@ -20,7 +20,7 @@ import shutil
 import threading
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -139,14 +139,21 @@ class Workspace:
         self.noun_path(stage, name).unlink(missing_ok=True)
 
     @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
-        """Hold the workspace against a second run; raises EnvironmentProblem when one is at work."""
-        with explained_io(self.root):
+    def locked(self, parts: Collection[str] = ()) -> Iterator[None]:
+        """Hold the workspace against a second run, or these parts of it ("stage/name"), beside whom others may hold others.
+
+        Raises EnvironmentProblem when another process is at work on it, or on one of the parts.
+        """
+        with explained_io(self.root), contextlib.ExitStack() as opened:
             self.root.mkdir(parents=True, exist_ok=True)
-            lock = (self.root / ".lock").open("w")
-        with lock as handle:
+            whole = opened.enter_context((self.root / ".lock").open("w"))
+            shares = opened.enter_context((self.root / ".parts").open("w")) if parts else whole
+            held = opened.pop_all()
+        with held:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(whole, (fcntl.LOCK_SH if parts else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+                for part in parts:
+                    fcntl.lockf(shares, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte_of(part))
             except OSError as error:
                 raise EnvironmentProblem(
                     f"{self.root}: another run is at work here", hint="wait for it, or choose another --workdir"
@@ -159,6 +166,11 @@ class Workspace:
         from r2c2r_core.ingest.stage import open_images
 
         return replace(noun, images=open_images(self.store(header.get("frames", "")), noun.frames))
+
+
+def _byte_of(part: str) -> int:
+    """The byte of the file of locks that stands for the part; none has to be there."""
+    return int.from_bytes(hashlib.sha256(part.encode()).digest()[:7])
 
 
 def noun_path(root: Path, stage: str, name: str) -> Path:

@@ -11,7 +11,7 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "serve", serve)
     add_address(added)
     add_data(added)
-    added.add_argument("--jobs", type=whole(1, 64), default=1, help="heavy jobs at a time (default: %(default)s)")
+    added.add_argument("--jobs", type=whole(0, 64), default=1, help="heavy jobs at a time (default: 1; 0: see r2c2r work)")
     added.add_argument(
         "--workers", type=whole(0, 64), default=0, help="objects of a job side by side; 0: as cores and memory allow"
     )

@@ -1,7 +1,10 @@
 """Resuming: what is computed again, and what is not."""
 
 import errno
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -11,7 +14,7 @@ import pytest
 from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import BackendUnavailable, Cancelled, EnvironmentProblem, ObjectNotSeen
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
-from r2c2r_core.ledger import Kept, Ledger, Reached
+from r2c2r_core.ledger import Kept, Ledger, Reached, Stage
 from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.workspace import Workspace, content_key, file_key, write_atomically
@@ -109,6 +112,66 @@ def test_two_runs_in_one_workspace_are_refused(tmp_path: Path) -> None:
     first, second = Workspace(tmp_path), Workspace(tmp_path)
     with first.locked(), pytest.raises(EnvironmentProblem, match="another run"), second.locked():
         pass
+
+
+def masked(name: str, progress: Progress) -> PackedMask:
+    if name == "d":
+        raise ObjectNotSeen("d: no frame shows it")
+    return noun(1)
+
+
+def grown(mask: PackedMask, progress: Progress) -> PackedMask:
+    return noun(mask.area_px + 1)
+
+
+def of_some(root: Path, only: list[str] | None, until: Stage = "generate") -> Ledger:
+    """A run of some objects, or of all, through two stages; d fails in the first."""
+    ledger = Ledger(Workspace(root), SILENT, until=until, only=only)
+    with suppress(Reached):
+        masks = ledger.each("segment", masked, "abcd", {name: name for name in "abcd"})
+        ledger.each("generate", grown, masks, masks)
+    return ledger
+
+
+def test_a_run_of_some_objects_computes_these_of_its_stage_and_nothing_of_earlier_ones(tmp_path: Path) -> None:
+    assert of_some(tmp_path, ["b"]).work.computed == []
+    of_some(tmp_path, None, "segment")
+    assert of_some(tmp_path, ["b"]).work.computed == ["generate/b"]
+    assert of_some(tmp_path, ["a", "d"]).work.computed == ["generate/a"]
+    joined = of_some(tmp_path, None)
+    assert (joined.work.computed, joined.failures) == (["generate/c"], {"d": "segment: d: no frame shows it"})
+
+
+def test_a_run_of_no_objects_says_which_are_left(tmp_path: Path) -> None:
+    assert of_some(tmp_path, [], "segment").left == ["a", "b", "c", "d"]
+    of_some(tmp_path, None, "segment")
+    assert of_some(tmp_path, []).left == ["a", "b", "c"]
+    of_some(tmp_path, ["b"])
+    none = of_some(tmp_path, [])
+    assert (none.left, none.work.computed, none.failures) == (["a", "c"], [], {})
+
+
+HOLDS = """
+import pathlib, sys
+from r2c2r_core.workspace import Workspace
+with Workspace(pathlib.Path(sys.argv[1])).locked(sys.argv[2:]):
+    pass
+"""
+
+
+def at_once(root: Path, *parts: str) -> subprocess.CompletedProcess[str]:
+    """Another process that takes the parts, or the whole, and gives them back."""
+    return subprocess.run([sys.executable, "-c", HOLDS, str(root), *parts], capture_output=True, text=True, check=False)
+
+
+def test_parts_of_a_workspace_are_held_beside_one_another_each_once_and_none_beside_the_whole(tmp_path: Path) -> None:
+    with Workspace(tmp_path).locked(["align/a", "align/b"]):
+        assert at_once(tmp_path, "align/c", "generate/a").returncode == 0
+        assert "another run is at work" in at_once(tmp_path, "align/c", "align/b").stderr
+        assert "another run is at work" in at_once(tmp_path).stderr
+    with Workspace(tmp_path).locked():
+        assert "another run is at work" in at_once(tmp_path, "align/a").stderr
+    assert at_once(tmp_path).returncode == at_once(tmp_path, "align/a").returncode == 0
 
 
 def test_a_full_disk_leaves_the_old_file_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,12 @@ def test_corrections_are_read(tmp_path: Path) -> None:
     assert overrides.of("other").hinge is None
 
 
+def test_states_that_were_marked_are_read_by_joint_and_frame(tmp_path: Path) -> None:
+    marks = {"left_door": [{"frame": 12, "state": 0.0}, {"frame": 40, "state": 1.25}]}
+    overrides = read_overrides(write(tmp_path, {"objects": {"pair": {"states": marks}}}))
+    assert overrides.of("pair").states == {"left_door": {12: 0.0, 40: 1.25}}
+
+
 def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
     (tmp_path / "mine.glb").write_bytes(b"x")
     overrides = read_overrides(write(tmp_path, {"objects": {"door": {"candidate": "mine.glb"}}}))
@@ -37,7 +43,7 @@ def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
         ([], r"the document is \[\]"),
         ({"version": 7}, "version is 7; expected 1"),
         ({"objects": {"door": {"hinge": "middle"}}}, "door.hinge is 'middle'"),
-        ({"objects": {"door": {"colour": 1}}}, "unknown key 'colour'"),
+        ({"objects": {"door": {"paint": 1}}}, "unknown key 'paint'"),
         ({"objects": {"door": {"dimensions_m": [1, 2]}}}, "three numbers"),
         ({"objects": {"door": {"dimensions_m": [1, 2, -1]}}}, "positive"),
         ({"objects": {"door": {"joint_limits": [2, 1]}}}, r"lower, upper"),

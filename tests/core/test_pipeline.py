@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,15 +11,15 @@ import pytest
 
 from r2c2r_core.align.stage import AlignConfig, Placer
 from r2c2r_core.config import ReconstructConfig
-from r2c2r_core.errors import BackendUnavailable
+from r2c2r_core.errors import BackendUnavailable, InputError
 from r2c2r_core.generate.candidates import select_candidate, weighed
 from r2c2r_core.generate.consensus import choose_candidate
 from r2c2r_core.generate.stage import GenerateConfig, generate_candidates
 from r2c2r_core.geometry.meshes import box_mesh
-from r2c2r_core.ledger import Kept, Ledger
+from r2c2r_core.ledger import Kept, Ledger, Reached
 from r2c2r_core.model.inputs import ObjectOverride, Overrides, Prompts
 from r2c2r_core.model.mesh import TexturedMesh
-from r2c2r_core.pipeline import DISPUTED, Request, Tools, generate_objects, place_objects, restricted_licences
+from r2c2r_core.pipeline import DISPUTED, Request, Tools, generate_objects, place_objects, reconstruct, restricted_licences
 from r2c2r_core.pool import Pool
 from r2c2r_core.progress import SILENT
 from r2c2r_core.workspace import Workspace
@@ -158,7 +159,7 @@ def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
     after = weighed(capture, track, before, Placer(matcher="sift", config=request_for("http://nowhere").config.align), "medoid")
     assert after.chosen_id == "c1"
     assert after.chosen.metrics["mask_iou"] > 0.7
-    assert "mask IoU" in after.reason
+    assert "outline agrees" in after.reason
 
 
 def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles, tmp_path, monkeypatch):
@@ -207,6 +208,39 @@ def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, tmp_p
     assert len(stored) == 4
     for path in stored:
         assert contents(tmp_path / "1" / path) == contents(tmp_path / "2" / path)
+
+
+def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(two_bottles, tmp_path):
+    capture, tracks = two_bottles
+    recording = Kept(capture, "c")
+    request = replace(request_for("http://nowhere"), tools=Tools())
+
+    def run_of(folder, until, only=None):
+        run = Ledger(Workspace(tmp_path / folder), SILENT, until, only=only)
+        with suppress(Reached):
+            found = generate_objects(request, run, recording, tracks)
+            choices = {name: kept.value for name, kept in found.items()}
+            place_objects(request, run, recording, tracks, found, choices)
+        return run
+
+    run_of("one", "align")
+    for stage in ("generate", "align"):
+        assert run_of("many", stage, []).left == list(tracks)
+        for name in tracks:
+            assert run_of("many", stage, [name]).work.computed == [f"{stage}/{name}"]
+        assert run_of("many", stage).work.computed == []
+    stored = {path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*.noun")}
+    assert len(stored) == 4
+    for path in stored:
+        assert contents(tmp_path / "one" / path) == contents(tmp_path / "many" / path)
+
+
+@pytest.mark.parametrize(
+    ("until", "only", "said"), [("warp", [], "object by object"), ("align", ["door_9"], "door_9: no such object")]
+)
+def test_a_run_of_some_objects_that_is_none_is_one_line(until, only, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        reconstruct(request_for("http://nowhere"), Workspace(tmp_path), until=until, only=only)
 
 
 def test_what_is_made_for_all_objects_is_not_taken_for_one(tmp_path: Path) -> None:

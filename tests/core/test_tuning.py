@@ -86,7 +86,7 @@ def test_a_configuration_sets_them_by_stage_and_module() -> None:
 @pytest.mark.parametrize(
     ("params", "says"),
     [
-        ({"wals": {}}, "unknown key 'wals' in kitchen.params; expected category, fillers, fronts"),
+        ({"wals": {}}, "unknown key 'wals' in kitchen.params; expected category, depth, fillers, fronts"),
         ({"../walls": {}}, "unknown key '../walls' in kitchen.params"),
         ({"walls": {"parallel": 0.1}}, "kitchen.params.walls: unknown key 'parallel' in the document; expected parallel_rad"),
         ({"walls": {"parallel_rad": "wide"}}, "kitchen.params.walls: parallel_rad is 'wide'; expected between the normals"),

@@ -1,0 +1,113 @@
+"""`r2c2r remote`: a server somewhere else, by an API token."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from r2c2r_core.commands.options import Parsers, add_command, existing, seed, whole
+from r2c2r_core.errors import InputError
+from r2c2r_core.terminal import show_progress, table
+
+if TYPE_CHECKING:
+    from r2c2r_core.client import Server
+
+_SEAMS = ("segmenter", "generator", "matcher")
+
+
+def add(parsers: Parsers) -> None:
+    """The command and what it can do."""
+    actions = add_command(parsers, "remote", remote).add_subparsers(required=True, dest="what", metavar="|".join(_ACTIONS))
+    added = {what: actions.add_parser(what, help=act.__doc__, description=act.__doc__) for what, act in _ACTIONS.items()}
+    for action in added.values():
+        action.add_argument(
+            "--server",
+            default=os.environ.get("R2C2R_SERVER"),
+            metavar="ADDRESS",
+            help="default: R2C2R_SERVER of the environment",
+        )
+    added["upload"].add_argument("capture", type=Path)
+    added["upload"].add_argument("--name", help="of the project (default: the file's)")
+    for what in ("click", "run", "wait", "download", "export"):
+        added[what].add_argument("project", help="its id, as upload and list print it")
+    added["click"].add_argument("prompts", type=Path, metavar="PROMPTS.json")
+    for seam in _SEAMS:
+        added["run"].add_argument(f"--{seam}")
+    added["run"].add_argument("--seed", type=seed, default=0)
+    added["download"].add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip")
+    added["export"].add_argument("-o", "--output", type=Path, required=True, metavar="PROJECT.zip")
+    added["export"].add_argument("--recording", action="store_true", help="with its recording")
+    added["download"].add_argument("--version", type=whole(1, 2**31 - 1), help="default: the newest")
+
+
+def remote(options: argparse.Namespace) -> int:
+    """Another machine's server, with the token in R2C2R_TOKEN: list, upload, click, run, wait, download, export."""
+    from r2c2r_core.client import Server
+
+    token = os.environ.get("R2C2R_TOKEN", "")
+    if not options.server:
+        raise InputError("no server is named", hint="--server https://kitchens.example, or R2C2R_SERVER")
+    if not token:  # an argument would be seen by everybody on the machine
+        raise InputError("R2C2R_TOKEN is not set", hint="r2c2r token add NAME prints a token, on the server's machine")
+    _ACTIONS[options.what](Server(options.server, token), options)
+    return 0
+
+
+def _list(server: "Server", options: argparse.Namespace) -> None:
+    """The projects you may see."""
+    rows = [(each["id"], each["name"], each["status"], each["review_state"]) for each in server.projects()]
+    print(table(("project", "name", "status", "review"), rows))
+
+
+def _upload(server: "Server", options: argparse.Namespace) -> None:
+    """Send a recording or a project's file and print its project's id; sent again after a break, it goes on."""
+    with show_progress() as progress:
+        print(server.upload(existing(options.capture), options.name, progress))
+
+
+def _click(server: "Server", options: argparse.Namespace) -> None:
+    """Add the objects of a prompts.json."""
+    from r2c2r_core.documents import read_json
+
+    prompts = read_json(options.prompts, hint="see docs/schemas/prompts.json")
+    if not isinstance(prompts, dict):
+        raise InputError(f"{options.prompts}: no prompts.json", hint="see docs/schemas/prompts.json")
+    for item in server.click(options.project, prompts):
+        print(f"{item['name']}: {item['category']}")
+
+
+def _run(server: "Server", options: argparse.Namespace) -> None:
+    """Begin a run and print its job's number."""
+    tools = {seam: getattr(options, seam) for seam in _SEAMS if getattr(options, seam) is not None}
+    print(server.run(options.project, seed=options.seed, **tools))
+
+
+def _wait(server: "Server", options: argparse.Namespace) -> None:
+    """Wait until the project's newest job is done; exit 1 with the reason when it is not."""
+    with show_progress() as progress:
+        server.wait(options.project, progress)
+
+
+def _download(server: "Server", options: argparse.Namespace) -> None:
+    """Write the newest bundle, or a version of it."""
+    with show_progress() as progress:
+        version = server.download(options.project, options.output, options.version, progress)
+    print(f"{options.output}: version {version}")
+
+
+def _export(server: "Server", options: argparse.Namespace) -> None:
+    """Write a project as one file, which upload takes to another server."""
+    with show_progress() as progress:
+        server.export(options.project, options.output, recording=options.recording, progress=progress)
+    print(options.output)
+
+
+_ACTIONS = {
+    "list": _list,
+    "upload": _upload,
+    "click": _click,
+    "run": _run,
+    "wait": _wait,
+    "download": _download,
+    "export": _export,
+}
