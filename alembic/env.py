@@ -1,14 +1,13 @@
 """How migrations are run: by the app on its own connection, or by the `alembic` command on R2C2R_DATABASE."""
 
 import os
-from pathlib import Path
 
 from sqlalchemy import Connection, create_engine
 from sqlmodel import SQLModel
 
 from alembic import context
 from app.db import tables  # noqa: F401  (defines the metadata)
-from app.settings import default_data_dir
+from app.settings import DATABASE, default_data_dir
 
 
 def run(connection: Connection) -> None:
@@ -22,6 +21,6 @@ given = context.config.attributes.get("connection")
 if given is not None:
     run(given)
 else:
-    database = Path(os.environ.get("R2C2R_DATABASE", default_data_dir() / "r2c2r.db"))
-    with create_engine(f"sqlite:///{database}").begin() as opened:
+    named = os.environ.get("R2C2R_DATABASE", "")
+    with create_engine(named or f"sqlite:///{default_data_dir() / DATABASE}").begin() as opened:
         run(opened)

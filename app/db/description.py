@@ -9,13 +9,13 @@ from pydantic import ValidationError
 from sqlmodel import Session, col, select
 
 from app.db import queries
-from app.db.tables import Bundle, Comment, Event, Override, Project, SceneObject, Verdict
+from app.db.tables import Bundle, Comment, Event, Override, Project, SceneObject, TrueLength, Verdict
 from app.files import ProjectFiles
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
 
-_OF_ACCOUNTS = {"owner_id"}  # told by name: numbers of accounts mean others in another database
-_DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name"}  # of an object
+_OF_ACCOUNTS = {"owner_id", "assignee_id"}  # told by name: numbers of accounts mean others in another database
+_DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name", "assignee"}  # of an object
 _DERIVED = {"certificate"}  # it is in the bundle itself
 
 
@@ -31,6 +31,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
         verdicts[verdict.object_id].append(verdict.model_dump(exclude={"id", "object_id"}))
     overrides = {row.object_id: row.data for row in session.exec(select(Override).where(Override.project_id == project.id))}
     comments = session.exec(select(Comment).where(Comment.project_id == project.id).order_by(col(Comment.id)))
+    lengths = session.exec(select(TrueLength).where(TrueLength.project_id == project.id).order_by(col(TrueLength.id)))
     bundles = session.exec(select(Bundle).where(Bundle.project_id == project.id).order_by(col(Bundle.version)))
     owner = queries.owner(session, project)
     return Description(
@@ -38,6 +39,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
         changed=changed(session, project),
         project=relative(project.model_dump(exclude=_OF_ACCOUNTS), files.root),
         owner=owner,
+        assignee=queries.account_name(session, project.assignee_id),
         members=sorted(queries.who_sees(session, project) - {owner}),
         objects=[
             DescribedObject(
@@ -49,6 +51,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
             for item in objects
         ],
         comments=[row.model_dump(exclude={"id", "project_id"}) for row in comments],
+        true_lengths=[row.model_dump(exclude={"id", "project_id"}) for row in lengths],
         bundles=[row.model_dump(exclude={"id", "project_id", *_DERIVED}) for row in bundles],
     )
 

@@ -1,17 +1,18 @@
-"""SQLite in WAL mode: many readers, one writer, nothing lost when the process dies."""
+"""The rows, in a SQLite file or a Postgres: many readers, one writer, nothing lost when the process dies."""
 
 import logging
 import sqlite3
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Engine, event
-from sqlalchemy.exc import DatabaseError
+from sqlalchemy.exc import DBAPIError
 from sqlmodel import Session, create_engine
 
-from app.db import once
+from app.db import announcing, once, postgres
 from app.db.migrations import migrate, require_tables
 from app.db.sqlite import explained
 from app.db.tables import Bundle, Comment, Event, Project
@@ -20,14 +21,17 @@ from app.db.usable import require_usable
 _log = logging.getLogger(__name__)
 
 
-def open_engine(database: Path, *, anew: bool = False) -> Engine:
-    """The engine of a database file, migrated to the newest tables.
+def open_engine(database: Path | str, *, anew: bool = False) -> Engine:
+    """The engine of a database, a file or the address of a Postgres, migrated to the newest tables.
 
     Raises DatabaseUnusable for a file that is none, is damaged, is of a newer r2c2r or may not be written, and where there
     is no file beside projects (an empty one would hide them), unless it is to be made `anew`.
     """
-    require_usable(database, anew=anew)
-    engine = _engine(database, _prepare)
+    if isinstance(database, str):
+        engine = postgres.postgres_engine(database)
+    else:
+        require_usable(database, anew=anew)
+        engine = _engine(database, _prepare)
     with _said_plainly(engine):
         migrate(engine)
         require_tables(engine)
@@ -35,7 +39,7 @@ def open_engine(database: Path, *, anew: bool = False) -> Engine:
 
 
 @contextmanager
-def opened(database: Path, *, anew: bool = False) -> Iterator[Engine]:
+def opened(database: Path | str, *, anew: bool = False) -> Iterator[Engine]:
     """`open_engine` for as long as the block lasts."""
     engine = open_engine(database, anew=anew)
     try:
@@ -54,6 +58,18 @@ def opened_to_read(database: Path) -> Iterator[Engine]:
         engine.dispose()
 
 
+def is_shared(engine: Engine) -> bool:
+    """Whether more than one server may use it at a time; a file is one server's."""
+    return engine.dialect.name != "sqlite"
+
+
+def now(session: Session) -> float:
+    """Seconds since 1970 by the clock that everybody who uses the database shares."""
+    if session.get_bind().dialect.name == "sqlite":
+        return time.time()
+    return float(session.execute(postgres.NOW).scalar_one())
+
+
 @contextmanager
 def reading(engine: Engine) -> Iterator[Session]:
     """A session for reading; raises Unavailable when the database does not answer, DatabaseUnusable when it is damaged."""
@@ -62,24 +78,32 @@ def reading(engine: Engine) -> Iterator[Session]:
 
 
 @contextmanager
-def writing(engine: Engine) -> Iterator[Session]:
+def writing(engine: Engine, *, lasting: bool = True) -> Iterator[Session]:
     """One transaction that takes the write lock at its start, so that what it read is still true when it writes.
 
     Raises NoSpace when the disk is full, Unavailable when the database does not answer, DatabaseUnusable when it is damaged:
-    nothing of it is stored then. Once it is stored, the engine's option `projects_changed` is told whose rows changed.
+    nothing of it is stored then. Once it is stored, the engine's option `projects_changed` is told whose rows changed, and
+    `announced` is called where webhooks are to hear of it. What is not `lasting` is shown for a moment: nobody waits until it
+    is on the disk of a Postgres, which may lose the last of it when it crashes.
     """
-    options = engine.execution_options(write=True)
+    options = engine.execution_options(write=True, lasting=lasting)
     with _said_plainly(engine), _Writing(options, expire_on_commit=False) as session:
         with session.begin():
             once.claim(session)
             yield session
-        tell = options.get_execution_options().get("projects_changed")
-        if tell and session.info:
-            tell(session.info)
+        listening = options.get_execution_options()
+        announced = session.info.pop(announcing.ANNOUNCED, False)
+        if announced and "announced" in listening:
+            listening["announced"]()
+        if session.info and "projects_changed" in listening:
+            listening["projects_changed"](session.info)
 
 
 class _Writing(Session):
     """A session whose `info` has the ids of projects that people, or a finished job, changed."""
+
+
+event.listen(_Writing, "before_flush", announcing.announce)
 
 
 @event.listens_for(_Writing, "after_flush")
@@ -95,10 +119,11 @@ def _note_changed(session: _Writing, _context: Any) -> None:
 def _said_plainly(engine: Engine) -> Iterator[None]:
     try:
         yield
-    except DatabaseError as error:
-        if not isinstance(error.orig, sqlite3.Error):
-            raise
-        said = explained(error.orig, Path(engine.url.database or ""))
+    except DBAPIError as error:
+        if isinstance(error.orig, sqlite3.Error):
+            said = explained(error.orig, Path(engine.url.database or ""))
+        else:
+            said = postgres.explained(error, engine.url)
         if said is None:
             raise
         _log.warning("the database: %s", error.orig)

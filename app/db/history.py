@@ -1,8 +1,8 @@
 """Every change is an event with what it replaced and by what, so anything can be undone, also after a restart.
 
-An object's state has two scopes that are undone apart: `prompts` (name, category, colour, clicks, whether it is there) and
-`review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event keeps only
-those that differ, so the history grows with what is done and not with what is there. Undo puts back what the event
+An object's state has two scopes that are undone apart: `prompts` (name, category, colour, clicks, whose turn it is, whether it
+is there) and `review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event
+keeps only those that differ, so the history grows with what is done and not with what is there. Undo puts back what the event
 replaced and is itself an event; nothing is ever removed.
 
 What can be undone is a stack, and what can be redone another. Events say on which they stand: `done`, `undone`, or `gone`
@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple
 
 import sqlalchemy
-from sqlalchemy import bindparam, func, update
+from sqlalchemy import bindparam, case, func, update
 from sqlalchemy.orm import aliased
 from sqlmodel import Session, col, delete, select
 
@@ -27,7 +27,7 @@ from app.errors import Conflict
 Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
-_FIELDS = ("name", "category", "colour", "deleted", "front", "crop")
+_FIELDS = ("name", "category", "colour", "deleted", "front", "crop", "assignee")
 _POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then its id, number, name, candidate
 
 
@@ -89,9 +89,14 @@ def steps_and_saved(session: Session, item: SceneObject, scope: Scope) -> tuple[
     return Steps(bool(found[0]), bool(found[1])), found[2] or 0.0
 
 
+def _any_of_scope(standing: str) -> Any:
+    """Whether any event of the scope stands so, as a number: Postgres has no largest truth value."""
+    return func.max(case(((col(Event.scope) == bindparam("of")) & (col(Event.standing) == standing), 1), else_=0))
+
+
 _STEPS_AND_SAVED = sqlalchemy.select(
-    func.max((col(Event.scope) == bindparam("of")) & (col(Event.standing) == "done")),
-    func.max((col(Event.scope) == bindparam("of")) & (col(Event.standing) == "undone")),
+    _any_of_scope("done"),
+    _any_of_scope("undone"),
     func.max(col(Event.at)),
 ).where(col(Event.project_id) == bindparam("project"), col(Event.object_id) == bindparam("object"))
 

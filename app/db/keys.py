@@ -15,6 +15,7 @@ from app.db.queries import Click, clicks_by_object, live_objects
 from app.db.tables import Project, SceneObject
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.workspace import content_key
 
 Drawn = dict[str, Any]  # what an entry of prompts.json holds beside clicks: front, frames, crop
@@ -104,6 +105,7 @@ def note_segmenter(session: Session, project: Project) -> None:
 
 def _chosen(project: Project) -> dict[str, str]:
     """What is not the default, backends by seam and how depth is read: something new leaves the keys of older results."""
-    usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default}
+    usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default, "arm": ARMS.default}
     chosen = {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}
-    return {**chosen, "depth": "registered"} if project.register_depth else chosen
+    chosen |= {"depth": "registered"} if project.register_depth else {}
+    return chosen | ({"scale": f"{project.scale:.6f}"} if project.scale != 1.0 else {})

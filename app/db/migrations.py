@@ -1,4 +1,4 @@
-"""Revisions of the tables: which there are, and bringing a file to the newest with a copy of the older one kept."""
+"""Revisions of the tables, and bringing a database to the newest; of a file a copy of the older one is kept."""
 
 import time
 from collections.abc import Iterator
@@ -12,6 +12,7 @@ from sqlalchemy import Connection, Engine, inspect
 from sqlmodel import SQLModel
 
 from alembic import command
+from app.db.postgres import shown
 from app.db.sqlite import RESTORE, copy_database
 from app.errors import DatabaseUnusable
 from app.settings import shipped
@@ -20,7 +21,26 @@ KEPT_COPIES = 3  # of databases before a migration
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:
-    """Bring the file to a revision; an empty file becomes a complete one, an older one is copied to backups/ first."""
+    """Bring the database to a revision; an empty one becomes a complete one, an older file is copied to backups/ first."""
+    if engine.dialect.name == "sqlite":
+        _migrate_file(engine, revision)
+    else:
+        _migrate_server(engine, revision)
+
+
+def _migrate_server(engine: Engine, revision: str) -> None:
+    """In one transaction, with the writers' lock: of servers that start together, the others find it done."""
+    config, known = _config(), revisions()
+    with engine.execution_options(write=True).begin() as connection:
+        now = MigrationContext.configure(connection).get_current_revision()
+        if now is not None and now not in known:
+            found = f"revision {now}, where this r2c2r knows {known[0]} to {known[-1]}"
+            raise DatabaseUnusable(f"{shown(engine.url)}: {found}", hint="use the r2c2r that made it")
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+
+
+def _migrate_file(engine: Engine, revision: str) -> None:
     config = _config()
     with engine.begin() as connection:
         now = MigrationContext.configure(connection).get_current_revision()
@@ -42,7 +62,7 @@ def revisions() -> list[str]:
 
 
 def require_tables(engine: Engine) -> None:
-    """Raise DatabaseUnusable for a file whose tables are not those of tables.py, whatever its revision says."""
+    """Raise DatabaseUnusable for a database whose tables are not those of tables.py, whatever its revision says."""
     found = inspect(engine)
     names = set(found.get_table_names())
     for table in SQLModel.metadata.sorted_tables:

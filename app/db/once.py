@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
-from sqlalchemy import bindparam, insert, update
+from sqlalchemy import bindparam, text, update
 from sqlmodel import Session, col, delete
 
 from app.db.tables import SentChange
@@ -39,7 +39,10 @@ class Sending:
     kept: Answer | None = field(default=None, compare=False)  # stored with the change
 
 
-_CLAIM = insert(SentChange).prefix_with("OR IGNORE")
+_CLAIM = text(
+    "INSERT INTO sent_changes (digest, request, project_id, at, answer) "
+    "VALUES (:digest, :request, :project_id, :at, :answer) ON CONFLICT DO NOTHING"
+)
 _ANSWERED = (
     update(SentChange)
     .where(col(SentChange.digest) == bindparam("claimed"))

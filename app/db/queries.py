@@ -17,7 +17,9 @@ STAGES: dict[str, tuple[str, ...]] = {
     "import": ("ingest",),
     "sample": ("sample", "ingest"),
     "run": ("segment", "generate", "align", "synthesize", "warp", "export"),
+    "vary": ("vary",),
 }
+READS_RECORDING = ("import", "sample")  # kinds of jobs; until one is done the project cannot be opened
 ACTIVE = ("queued", "running", "cancelling")
 
 
@@ -57,8 +59,18 @@ def live_objects(session: Session, project_id: str, *, deleted: bool = False) ->
 
 def owner(session: Session, project: Project) -> str | None:
     """The name of who made the project; None for whoever started the server, and where the account is gone."""
-    account = session.get(Account, project.owner_id) if project.owner_id is not None else None
+    return account_name(session, project.owner_id)
+
+
+def account_name(session: Session, account_id: int | None) -> str | None:
+    """The account's name; None for none, and for one that is gone."""
+    account = session.get(Account, account_id) if account_id is not None else None
     return account.name if account else None
+
+
+def has_account(session: Session, name: str) -> bool:
+    """Whether there is an account of that name."""
+    return session.exec(select(Account.id).where(Account.name == name)).first() is not None
 
 
 def who_sees(session: Session, project: Project) -> set[str]:
@@ -170,8 +182,8 @@ def newest_bundle(session: Session, project_id: str) -> Bundle | None:
 
 def no_retry(kind: str, source_path: str | None) -> str:
     """Why the job, if it failed, would only fail again; empty where it may be retried."""
-    of_recording = kind in ("import", "sample")
-    return "the recording was refused, and is not kept" if of_recording and source_path is None else ""
+    refused = kind in READS_RECORDING and source_path is None
+    return "the recording was refused, and is not kept" if refused else ""
 
 
 def job_shapes(session: Session, rows: Sequence[Job]) -> list[schemas.Job]:
@@ -224,10 +236,10 @@ def stage_states(row: Job) -> list[schemas.StageState]:
 
 def bundles(session: Session, which: Any) -> list[tuple[Bundle, bool | None]]:
     """Bundles, newest first, and whether each passed: their certificates, which may be long, are left where they are."""
-    passed = func.json_extract(Bundle.certificate, "$.passed")
+    passed = col(Bundle.certificate)["passed"].as_boolean()
     rows = select(Bundle, passed).where(which).options(defer(Bundle.certificate))  # type: ignore[arg-type]  # a column
     found = session.exec(rows.order_by(col(Bundle.version).desc()))
-    return [(bundle, None if said is None else bool(said)) for bundle, said in found]
+    return [(bundle, said) for bundle, said in found]
 
 
 def bundle_shape(row: Bundle, passed: bool | None, name: str, inputs: str) -> schemas.Bundle:
@@ -246,5 +258,10 @@ def bundle_shape(row: Bundle, passed: bool | None, name: str, inputs: str) -> sc
 
 def bundle_file_name(name: str, version: int, sha256: str) -> str:
     """What the browser saves a bundle as."""
+    return f"{plain_name(name)}-v{version}-{sha256[:8]}.zip"
+
+
+def plain_name(name: str) -> str:
+    """A project's name as a file may be called."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name).strip("-").lower()
-    return f"{plain or 'scene'}-v{version}-{sha256[:8]}.zip"
+    return plain or "scene"

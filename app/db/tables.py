@@ -5,12 +5,15 @@ Times are seconds since 1970, UTC. Nothing but jobs' progress is ever updated wi
 
 from typing import Any
 
-from sqlalchemy import JSON, Column, Index, UniqueConstraint, false
+from sqlalchemy import JSON, BigInteger, Column, Index, Integer, UniqueConstraint, false
 from sqlmodel import Field, SQLModel
 
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
+
+BYTES = BigInteger().with_variant(Integer, "sqlite")  # more than 2 GiB; SQLite's integers hold as much as they are given
 
 
 class Project(SQLModel, table=True):
@@ -33,12 +36,25 @@ class Project(SQLModel, table=True):
     segmenter: str = Field(default=SEGMENTERS.default, sa_column_kwargs={"server_default": SEGMENTERS.default})
     generator: str = Field(default=GENERATORS.default, sa_column_kwargs={"server_default": GENERATORS.default})
     matcher: str = Field(default=MATCHERS.default, sa_column_kwargs={"server_default": MATCHERS.default})
+    arm: str = Field(default=ARMS.default, sa_column_kwargs={"server_default": ARMS.default})
     register_depth: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # moved onto colour when read
+    scale: float = Field(default=1.0, sa_column_kwargs={"server_default": "1"})  # on every length of the recording when read
     owner_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # who made it
+    assignee_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # whose turn it is
+    opinion_of: str | None = None  # a project of this recording, of which it is an independent one; it may be gone
+    honeypot: bool = Field(
+        default=False, sa_column_kwargs={"server_default": false()}
+    )  # its truth is known; admins alone are told
     members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # only they and admins see it
     review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py
+    tags: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]"))
+    checklist: list[dict[str, str]] = Field(  # names and categories of objects that are to be clicked
+        default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]")
+    )
+    archived: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # done with: not shown unless asked for
+    trashed: float | None = None  # when it was put into the trash: nobody sees it, all of it is kept
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of everything a person gave
-    size_bytes: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # of its folder
+    size_bytes: int = Field(default=0, sa_type=BYTES, sa_column_kwargs={"server_default": "0"})  # of its folder
     sized: float = Field(default=0.0, sa_column_kwargs={"server_default": "0"})  # when that was measured
 
 
@@ -46,13 +62,30 @@ class Account(SQLModel, table=True):
     """A person who may sign in."""
 
     __tablename__ = "accounts"
-    __table_args__ = (UniqueConstraint("name", name="uq_accounts_name"),)
+    __table_args__ = (
+        UniqueConstraint("name", name="uq_accounts_name"),
+        Index("ix_accounts_subject", "subject", unique=True),
+    )
 
     id: int | None = Field(default=None, primary_key=True)
     name: str  # lower case
+    subject: str | None = None  # of an OpenID provider: the issuer, and whom it means for ever
     role: str  # annotator | reviewer | admin
-    password: str  # argon2id, with its parameters and salt
+    password: str  # argon2id, with its parameters and salt; empty: none opens it
     created: float
+
+
+class Template(SQLModel, table=True):
+    """Names and categories of objects, to be clicked in whatever project takes them over."""
+
+    __tablename__ = "templates"
+    __table_args__ = (UniqueConstraint("name", name="uq_templates_name"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    name: str
+    objects: list[dict[str, str]] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
+    who: str
+    changed: float
 
 
 class ProjectMember(SQLModel, table=True):
@@ -64,6 +97,17 @@ class ProjectMember(SQLModel, table=True):
     account_id: int = Field(primary_key=True, foreign_key="accounts.id", ondelete="CASCADE")
 
 
+class Seen(SQLModel, table=True):
+    """Up to where somebody has read what others did to a project."""
+
+    __tablename__ = "seen"
+
+    project_id: str = Field(primary_key=True, foreign_key="projects.id", ondelete="CASCADE")
+    account_id: int = Field(primary_key=True, foreign_key="accounts.id", ondelete="CASCADE")
+    event: int  # the last one; no foreign key: it is a place in their order
+    at: float
+
+
 class SignIn(SQLModel, table=True):
     """One browser that is let in; without an account it is that of whoever started the server."""
 
@@ -73,6 +117,55 @@ class SignIn(SQLModel, table=True):
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
     created: float
     used: float  # to the hour
+
+
+class ApiToken(SQLModel, table=True):
+    """With which a program comes in; without an account it acts for whoever started the server."""
+
+    __tablename__ = "api_tokens"
+    __table_args__ = (UniqueConstraint("digest", name="uq_api_tokens_digest"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    digest: str  # SHA-256: the database alone lets nobody in
+    account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
+    name: str  # what it is for
+    scope: str  # metrics | read | annotator | reviewer | admin
+    created: float
+    used: float | None = None  # to the minute
+
+
+class Webhook(SQLModel, table=True):
+    """An address that is told of a project, or, an admin's, of all; without an account it is whoever started the server's."""
+
+    __tablename__ = "webhooks"
+
+    id: int | None = Field(default=None, primary_key=True)
+    account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
+    project_id: str | None = Field(default=None, foreign_key="projects.id", ondelete="CASCADE")
+    url: str
+    secret: str  # signs what is posted: it is needed as it is
+    created: float
+
+
+class Delivery(SQLModel, table=True):
+    """One message on its way to a webhook, stored with the change that it tells of."""
+
+    __tablename__ = "webhook_deliveries"
+    __table_args__ = (
+        Index("ix_webhook_deliveries_due", "due"),
+        Index("ix_webhook_deliveries_webhook", "webhook_id"),
+        {"sqlite_autoincrement": True},
+    )
+
+    id: int | None = Field(default=None, primary_key=True)
+    webhook_id: int = Field(foreign_key="webhooks.id", ondelete="CASCADE")
+    event: str  # run.finished | state.changed
+    body: str  # JSON, as it is signed
+    created: float
+    attempts: int = 0
+    due: float | None = None  # when it is tried next; None: delivered, or given up
+    delivered: float | None = None
+    answer: str = ""  # to the last attempt
 
 
 class LaunchKey(SQLModel, table=True):
@@ -120,7 +213,7 @@ class Upload(SQLModel, table=True):
     id: str = Field(primary_key=True)  # becomes the project's
     file_name: str
     name: str | None = None
-    size: int
+    size: int = Field(sa_type=BYTES)
     modified: float | None = None  # the file's own time of change: with name and size it tells that it is the same file
     who: str
     created: float
@@ -145,6 +238,7 @@ class SceneObject(SQLModel, table=True):
     front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
     crop: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
+    assignee: str | None = Field(default=None, index=True)  # whose turn it is, by name
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
     run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # in the last run; empty: as now
 
@@ -208,11 +302,30 @@ class Comment(SQLModel, table=True):
     x: float | None = None
     y: float | None = None
     point_world: list[float] | None = Field(default=None, sa_column=Column(JSON))
+    view: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # how 3D was looked at
     text: str
     who: str
     at: float
     resolved_by: str = ""
     resolved_at: float | None = None
+
+
+class TrueLength(SQLModel, table=True):
+    """A length that somebody measured in the room, and what it is of: an object's side, or between two points."""
+
+    __tablename__ = "true_lengths"
+    __table_args__ = (Index("ix_true_lengths_project", "project_id"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
+    object_id: int | None = Field(default=None, foreign_key="objects.id", ondelete="CASCADE")
+    side: str = ""  # width | depth | height of the object
+    points_world: list[list[float]] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))
+    scale: float  # the project's when the points were set: they lie where the world was as large
+    metres: float
+    text: str  # what it is of, in words
+    who: str
+    at: float
 
 
 class Event(SQLModel, table=True):
@@ -249,7 +362,7 @@ class Job(SQLModel, table=True):
 
     id: int | None = Field(default=None, primary_key=True)
     project_id: str = Field(foreign_key="projects.id", ondelete="CASCADE")
-    kind: str  # import | sample | run
+    kind: str  # import | sample | run | vary
     state: str  # queued | running | cancelling | cancelled | failed | done
     payload: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
     stage: str = ""
@@ -262,13 +375,58 @@ class Job(SQLModel, table=True):
     attempts: int = 0  # since it last got further
     reached: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # stages it ever finished
     who: str = ""
-    owner_pid: int | None = None  # the server that runs it
+    owner: str | None = None  # host, process and a random word of the server that runs it
     worker_pid: int | None = None
     worker_started: float | None = None  # the worker's creation time: its pid alone may be another's by now
-    heartbeat: float | None = None
+    heartbeat: float | None = None  # when its owner last said that it lives, by the database's clock
     created: float
     started: float | None = None
     finished: float | None = None
+
+
+class Part(SQLModel, table=True):
+    """An object of a stage of a running job, which any seat may compute; there while the stage is shared: jobs/sharing.py."""
+
+    __tablename__ = "parts"
+    __table_args__ = (UniqueConstraint("job_id", "stage", "name", name="uq_parts_object"), {"sqlite_autoincrement": True})
+
+    id: int | None = Field(default=None, primary_key=True)
+    job_id: int = Field(foreign_key="jobs.id", ondelete="CASCADE")
+    stage: str
+    name: str  # of the object, as the job's prompts have it
+    holder: str  # who makes the project's files, as the store has it
+    state: str  # waiting | running | stopping | done | failed
+    at_least: int  # as many a process takes, where its seat's share is so many: its start takes time too
+    owner: str | None = None  # of the process that computes it, as of a job
+    heartbeat: float | None = None  # when its owner last said that it is at it, by the database's clock
+    attempts: int = 0
+    log: str = ""  # what its process wrote; of several that one process computed, the first has it
+
+
+class Seat(SQLModel, table=True):
+    """A process that takes jobs from a database that several share, while it lives."""
+
+    __tablename__ = "seats"
+    __table_args__ = (UniqueConstraint("owner", name="uq_seats_owner"),)
+
+    id: int | None = Field(default=None, primary_key=True)
+    owner: str  # as of its jobs
+    version: str
+    jobs: int  # at a time
+    began: float
+    seen: float  # when it last said that it lives, by the database's clock
+    draining: bool = False  # it takes no further job
+
+
+class Message(SQLModel, table=True):
+    """What one process tells the others that share the database; deleted after minutes: db/channel.py."""
+
+    __tablename__ = "messages"
+
+    id: int | None = Field(default=None, sa_column=Column(BYTES, primary_key=True))
+    at: float  # by the database's clock
+    sender: str
+    body: str
 
 
 class JobEvent(SQLModel, table=True):
@@ -309,7 +467,7 @@ class Bundle(SQLModel, table=True):
     version: int
     path: str  # file name in the project's bundles folder
     sha256: str
-    size: int
+    size: int = Field(sa_type=BYTES)
     created: float
     certificate: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # the project's, when the run began

@@ -3,8 +3,13 @@
 import sqlite3
 from pathlib import Path
 
+from sqlalchemy import Engine
+from sqlmodel import Session, select
+
 from app.db.migrations import revisions
+from app.db.postgres import shown
 from app.db.sqlite import RESTORE, connected, require_sound
+from app.db.tables import Project
 from app.errors import DatabaseUnusable
 
 
@@ -20,6 +25,18 @@ def require_usable(database: Path, *, anew: bool = False, to_write: bool = True)
     if revision is None and not anew:
         _refuse_beside_projects(database)
     return revision
+
+
+def require_projects_known(engine: Engine, data_dir: Path) -> None:
+    """Raise DatabaseUnusable for a Postgres that knows no project, beside projects: it would not know them."""
+    with Session(engine) as session:
+        known = session.exec(select(Project.id)).first() is not None
+    folders = _project_folders(data_dir)
+    if folders and not known:
+        raise DatabaseUnusable(
+            f"{shown(engine.url)}: no project, beside {len(folders)} project folders in {data_dir}",
+            hint="r2c2r db move brings rows over, or r2c2r serve --adopt makes new ones of what the folders say",
+        )
 
 
 def _checked(database: Path, to_write: bool) -> str | None:
@@ -50,9 +67,13 @@ def _known_revision(connection: sqlite3.Connection, database: Path, tables: set[
 
 def _refuse_beside_projects(database: Path) -> None:
     """Raise DatabaseUnusable rather than begin an empty database that knows nothing of the projects beside it."""
-    folders = [path for path in database.parent.glob("projects/*") if path.is_dir()]
+    folders = _project_folders(database.parent)
     if folders:
         raise DatabaseUnusable(
             f"{database}: no database beside {len(folders)} project folders; an empty one would not know them",
             hint="r2c2r restore a backup, or r2c2r serve --adopt makes a new one of what the folders say",
         )
+
+
+def _project_folders(data_dir: Path) -> list[Path]:
+    return [path for path in data_dir.glob("projects/*") if path.is_dir()]

@@ -1,0 +1,241 @@
+"""What happens at one of the servers that share a Postgres, told to the others: a row for each message, and a notice of it.
+
+Rows are inserted under a lock of their own, so that their numbers rise in the order in which they can be seen: whoever knows
+the last that it read reads each later one, also after its connection broke. Rows are deleted after KEPT_S. Nothing waits for
+a message, so what a process had not sent when it vanished is lost: the others notice, and call `on_gap`.
+"""
+
+import json
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sqlalchemy import Engine
+from sqlalchemy.exc import DBAPIError
+
+from app.hub import Hub
+
+_log = logging.getLogger(__name__)
+
+KEPT_S = 300.0
+WAITING_BYTES = 32 * 1024 * 1024  # of messages to be sent, while the database does not answer
+AGAIN_S = 1.0  # between two tries to reach it, and between two looks at the clock
+MISSED_BEATS = 3  # after so many without one, a process is gone, or the connection is
+
+_ORDERED = f"SELECT pg_advisory_xact_lock({0x72326334})"
+_INSERT = "INSERT INTO messages (at, sender, body) VALUES (extract(epoch FROM clock_timestamp()), %s, %s)"
+_NOTIFY = "SELECT pg_notify('r2c2r', '')"
+_SWEEP = "DELETE FROM messages WHERE at < extract(epoch FROM clock_timestamp()) - %s"
+_LATER = "SELECT id, at, sender, body FROM messages WHERE id > %s ORDER BY id"
+_NEWEST = "SELECT id, at FROM messages ORDER BY id DESC LIMIT 1"
+_IS_KNOWN = "SELECT 1 FROM messages WHERE id = %s AND at = %s"
+
+Handler = Callable[[str, dict[str, Any]], None]
+
+
+class Channel:
+    """One process's end. `hears` are told of each message of their kind: who sent it, and what it says.
+
+    `beats` say something every `beat_s` and to each process that comes. `on_gone` are told of one that is gone, and whether it
+    vanished: what it did last it may have told nobody. `on_gap` are called when messages are lost.
+    """
+
+    def __init__(self, engine: Engine, name: str, beat_s: float) -> None:
+        self.name, self._engine, self._beat_s = name, engine, beat_s
+        self.hears: dict[str, Handler] = {}
+        self.beats: list[Callable[[], None]] = [lambda: self.say("beat", {})]
+        self.on_gone: list[Callable[[str, bool], None]] = []
+        self.on_gap: list[Callable[[], None]] = []
+        self._out: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._waiting = 0  # bytes in it
+        self._lock = threading.Lock()
+        self._listening, self._stopping = threading.Event(), threading.Event()
+        self._newest: tuple[int, float] | None = None  # number and time of the message that was read last
+        self._heard: dict[str, float] = {}  # when each process was, this one too
+        self._threads = [
+            threading.Thread(target=do, name=name, daemon=True)
+            for do, name in ((self._read_on, "channel-in"), (self._send_on, "channel-out"))
+        ]
+
+    def start(self) -> None:
+        """Be one of them."""
+        self._beat()
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """Send what waits, and leave."""
+        self.say("bye", {})
+        self._stopping.set()
+        self._listening.set()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join()
+
+    def say(self, kind: str, said: dict[str, Any]) -> None:
+        """Tell all others; it does not wait for that."""
+        text = json.dumps({**said, "kind": kind}, separators=(",", ":"))
+        with self._lock:
+            if self._waiting + len(text) > WAITING_BYTES:
+                _log.warning("the database takes no messages: what waited for it is dropped")
+                self._drain()
+                text = json.dumps({"kind": "gap"})
+            self._waiting += len(text)
+            self._out.put(text)
+
+    def _send_on(self) -> None:
+        self._listening.wait()  # the others answer to the first beat
+        texts: list[str] = []
+        while not (self._stopping.is_set() and self._out.empty()):
+            try:
+                with self._connected() as connection:
+                    connection.execute("SET synchronous_commit TO off")
+                    while True:
+                        texts = texts or self._taken()
+                        self._store(connection, texts)
+                        texts = []
+                        if self._stopping.is_set() and self._out.empty():
+                            return
+            except (DBAPIError, self._failure) as error:
+                _log.warning("messages to other servers wait: %s", error)
+                if self._stopping.wait(AGAIN_S):
+                    return
+
+    def _store(self, connection: Any, texts: list[str]) -> None:
+        with connection.transaction():
+            connection.execute(_ORDERED)
+            with connection.cursor() as cursor:
+                cursor.executemany(_INSERT, [(self.name, text) for text in texts])
+            connection.execute(_SWEEP, (KEPT_S,))
+            connection.execute(_NOTIFY)
+
+    def _taken(self) -> list[str]:
+        """All that waits, once something does."""
+        with_beat = time.monotonic() + self._beat_s
+        while True:
+            try:
+                first = self._out.get(timeout=max(with_beat - time.monotonic(), 0.0))
+            except queue.Empty:
+                self._beat()
+                continue
+            with self._lock:
+                return [first, *self._drain()]
+
+    def _drain(self) -> list[str]:
+        self._waiting = 0
+        texts = []
+        while not self._out.empty():
+            texts.append(self._out.get_nowait())
+        return texts
+
+    def _read_on(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                with self._connected() as connection:
+                    connection.execute("LISTEN r2c2r")
+                    self._find_place(connection)
+                    self._listening.set()
+                    while not self._stopping.is_set() and self._is_heard():
+                        self._take_later(connection)
+                        for _ in connection.notifies(timeout=min(self._beat_s, AGAIN_S), stop_after=1):
+                            pass
+            except (DBAPIError, self._failure) as error:
+                _log.warning("other servers are not heard: %s", error)
+                self._stopping.wait(AGAIN_S)
+
+    def _find_place(self, connection: Any) -> None:
+        """After which message to read on; what was deleted meanwhile is a gap, also where its number is another's by now."""
+        if self._newest is not None and connection.execute(_IS_KNOWN, self._newest).fetchone() is None:
+            self._miss()
+            self._newest = None
+        if self._newest is None:
+            self._newest = connection.execute(_NEWEST).fetchone() or (0, 0.0)
+        self._heard[self.name] = time.monotonic()
+
+    def _take_later(self, connection: Any) -> None:
+        assert self._newest is not None
+        for number, at, sender, body in connection.execute(_LATER, (self._newest[0],)).fetchall():
+            self._newest = (number, at)
+            is_new = sender not in self._heard
+            self._heard[sender] = time.monotonic()
+            if sender == self.name:
+                continue
+            try:
+                self._take(sender, json.loads(body))
+                if is_new:
+                    self._beat()
+            except Exception:  # one message must not take the others with it
+                _log.exception("a message of %s", sender)
+
+    def _take(self, sender: str, said: dict[str, Any]) -> None:
+        kind = said.pop("kind")
+        if kind == "bye":
+            self._lose(sender, vanished=False)
+        elif kind == "gap":
+            self._miss()
+        elif kind in self.hears:
+            self.hears[kind](sender, said)
+
+    def _is_heard(self) -> bool:
+        """Whether the connection lives, by this process's own messages; others that are silent for as long are gone."""
+        silent = {sender for sender, at in self._heard.items() if time.monotonic() - at > MISSED_BEATS * self._beat_s}
+        if self.name in silent:
+            return False
+        for sender in silent:
+            _log.warning("%s vanished", sender)
+            self._lose(sender, vanished=True)
+        return True
+
+    def _beat(self) -> None:
+        for beat in self.beats:
+            beat()
+
+    def _lose(self, sender: str, *, vanished: bool) -> None:
+        del self._heard[sender]
+        for told in self.on_gone:
+            told(sender, vanished)
+
+    def _miss(self) -> None:
+        for told in self.on_gap:
+            told()
+
+    @contextmanager
+    def _connected(self) -> Iterator[Any]:
+        """A connection of its own, beside the pool."""
+        pooled = self._engine.raw_connection()
+        connection: Any = pooled.dbapi_connection
+        pooled.detach()
+        try:
+            connection.rollback()
+            connection.autocommit = True
+            yield connection
+        finally:
+            connection.close()
+
+    @property
+    def _failure(self) -> type[Exception]:
+        failure: type[Exception] = self._engine.dialect.dbapi.Error  # type: ignore[union-attr]
+        return failure
+
+
+def join_hubs(channel: Channel, hub: Hub) -> None:
+    """Carry what is published at this process's hub to the others', and theirs to it."""
+    hub.carry = channel.say
+    channel.hears |= {
+        "message": lambda _, said: hub.hear(**said),
+        "presence": lambda sender, said: hub.hear_presence(sender, said["project"], said["people"]),
+        "presences": lambda sender, said: hub.hear_presences(sender, said["projects"]),
+    }
+
+    def forget(sender: str, vanished: bool) -> None:
+        hub.hear_presences(sender, {})
+        if vanished:
+            hub.start_anew()
+
+    channel.beats.append(lambda: channel.say("presences", {"projects": hub.presences}))
+    channel.on_gone.append(forget)
+    channel.on_gap.append(hub.start_anew)
