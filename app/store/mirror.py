@@ -1,0 +1,374 @@
+"""The data folder as a cache of projects in an object store.
+
+Of each project the store holds its files as objects named by their content, and one manifest that says which file has which
+content now. The manifest is written on the condition that nobody else wrote it meanwhile: what it names is whole, whenever a
+machine dies. It also says whose job makes the nouns now: a machine that was silent for so long that another took its job up
+keeps nothing more of what it made. Beside the projects here lies what each manifest said when it was last looked at, so that
+what changed here and what changed there can be told apart; what changed in both is as who kept it last has it.
+"""
+
+import hashlib
+import json
+import logging
+import os
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import timedelta
+from pathlib import Path
+from typing import NamedTuple
+
+from app.errors import NotFound, Unavailable
+from app.files import delete_folder
+from app.store.objects import Changed, NotModified, Objects, Read
+from r2c2r_core.workspace import write_atomically
+
+_log = logging.getLogger(__name__)
+
+AT_ONCE = 16  # objects on their way at a time: a recording is thousands of small ones
+TRIES = 20  # at a manifest that others write too
+UNUSED_S = 600.0  # a page may read for so long what it asked for
+UNNAMED = timedelta(hours=1)  # for so long an object that no manifest names may be one that is about to be named
+_MADE_ANEW = ("previews", "logs")  # the one at any time; the other is shown while it is written: keep_log
+_RECORDING = "source/"
+_CLICKS_BESIDE_IT = "source/prompts.json"  # of a sample: what makes it a project reads them
+_MADE_BY_JOBS = ("work/", "bundles/", "variants/", "requests/", "finished-prompts.json")
+_HALF_MADE = "half-made"
+
+
+class Entry(NamedTuple):
+    """One file: its content, and its time of change, by which recordings that are folders are known."""
+
+    sha256: str
+    size: int  # bytes
+    mtime_ns: int
+
+
+class Lost(NotFound):
+    """The project's job is another machine's by now."""
+
+
+Names = dict[str, Entry]
+_NONE = Entry("", -1, -1)
+
+
+@dataclass(slots=True)
+class Held:
+    """What of a project's manifest lies here, as far as is known; `tag` is the manifest's when all that is wanted does."""
+
+    names: Names = field(default_factory=dict)
+    tag: str | None = None
+    recording: bool = False  # whether its recording was asked for
+
+
+class Manifest(NamedTuple):
+    """What a project is made of, and who makes it."""
+
+    names: Names
+    holder: str
+
+
+class Mirror:
+    """A Store (app.store.protocol) of objects. `quota_bytes` is what may lie here; None: whatever was used."""
+
+    def __init__(self, objects: Objects, data_dir: Path, quota_bytes: int | None = None) -> None:
+        self._objects, self._quota = objects, quota_bytes
+        self._projects, self._notes = data_dir / "projects", data_dir / "stored"
+        self._locks: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)
+        self._holders: dict[str, str] = {}  # what this machine is called in manifests, of projects that it held last
+        self._used: dict[str, float] = {}
+        self._seen: set[str] = set()  # since they were last kept
+        self._swept: dict[str, float] = {}
+
+    def fetch(self, project_id: str, *, recording: bool = False) -> None:
+        """Take what is otherwise there than it was when it was last looked at."""
+        with self._locks[project_id]:
+            self._used[project_id] = time.monotonic()
+            self._seen.add(project_id)
+            held = self._held(project_id)
+            complete = held.recording or not recording
+            for _ in range(TRIES):
+                try:
+                    found = self._objects.read(_manifest(project_id), unless=held.tag if complete else None)
+                except NotModified:
+                    return
+                if found is None:
+                    return
+                names = _said(found).names
+                wanted = _wanted(names, recording=recording or held.recording)
+                if self._take(project_id, held, names, wanted):
+                    kept = {path: entry for path, entry in held.names.items() if path in names} | wanted
+                    self._note(project_id, Held(kept, found.tag, recording or held.recording))
+                    return
+            raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+
+    def keep(self, project_id: str) -> None:
+        """Give what is otherwise here than it was when it was last looked at.
+
+        Raises NotFound where the project was deleted, and Lost where its job is another's: what was made of it here is dropped.
+        """
+        root = self._projects / project_id
+        with self._locks[project_id]:
+            held, here = self._held(project_id), _lying(root)
+            changed = _read(root, {path: state for path, state in here.items() if held.names.get(path, _NONE)[1:] != state})
+            gone = held.names.keys() - here.keys()
+            if not changed and not gone:
+                return
+            given: set[str] = set()
+            for _ in range(TRIES):
+                found = self._objects.read(_manifest(project_id))
+                if found is None and held.names:
+                    raise NotFound(f"{project_id}: the project was deleted", hint="see the list of projects")
+                before, holder = _said(found)
+                if self._holders.get(project_id, holder) != holder:
+                    self._drop(project_id, held, changed, gone)
+                changed = self._give(project_id, changed, {entry.sha256 for entry in before.values()} | given)
+                given |= {entry.sha256 for entry in changed.values()}
+                names = {path: entry for path, entry in before.items() if path not in gone} | changed
+                try:
+                    tag = self._objects.write(
+                        _manifest(project_id), _written(Manifest(names, holder)), after=found.tag if found else None
+                    )
+                except Changed:
+                    continue
+                alone = found is None or found.tag == held.tag  # what others gave is still to be fetched
+                mine = {path: entry for path, entry in held.names.items() if path not in gone} | changed
+                self._note(project_id, Held(mine, tag if alone else None, held.recording))
+                self._sweep(project_id, names)
+                return
+            raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+
+    def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
+        """Say in the manifest who makes what is in it; raises NotFound where the project was deleted."""
+        with self._locks[project_id]:
+            if not taken:
+                self._take_hold(project_id, holder)
+            self._holders[project_id] = holder
+
+    def keep_log(self, project_id: str, log: Path) -> None:
+        """Give the log as it is."""
+        if log.is_file():
+            self._objects.put(_log_of(project_id, log), log)
+
+    def fetch_log(self, project_id: str, log: Path) -> None:
+        """Take the log as it was given last."""
+        found = self._objects.read(_log_of(project_id, log))
+        if found is not None:
+            write_atomically(log, found.content)
+
+    def link(self, project_id: str, path: Path, name: str) -> str | None:
+        """A presigned address of a file that was kept."""
+        root = self._projects / project_id
+        entry = self._held(project_id).names.get(path.relative_to(root).as_posix())
+        if entry is None:
+            return None
+        return self._objects.link(_object(project_id, entry), f"projects/{project_id}/downloads/{entry.sha256}/{name}")
+
+    def size(self, project_id: str) -> int:
+        """Bytes of all files that the manifest names."""
+        found = self._objects.read(_manifest(project_id))
+        return sum(entry.size for entry in _said(found).names.values())
+
+    def delete(self, project_id: str) -> None:
+        """Delete all objects of the project, its manifest first: whoever would keep something is refused then."""
+        with self._locks[project_id]:
+            self._objects.delete([_manifest(project_id)])
+            self._objects.delete(self._objects.old(f"projects/{project_id}/", timedelta()))
+            self._note_path(project_id).unlink(missing_ok=True)
+
+    def was_deleted(self, project_id: str) -> bool:
+        """Whether it was looked at here, and is not there any more."""
+        return self._note_path(project_id).exists() and not self._objects.has(_manifest(project_id))
+
+    def tidy(self, in_use: frozenset[str]) -> None:
+        """Keep what pages wrote of the projects that were asked for since; delete those here that were unused longest."""
+        seen, self._seen = self._seen, set()
+        for project_id in seen:
+            if (self._projects / project_id).is_dir():
+                self._keep_or_forget(project_id)
+        if self._quota is None:
+            return
+        sizes = {note.stem: sum(entry.size for entry in self._held(note.stem).names.values()) for note in self._noted()}
+        over = sum(sizes.values()) - self._quota
+        for project_id in sorted(sizes.keys() - in_use, key=lambda one: self._used.get(one, 0.0)):
+            if over <= 0:
+                return
+            if time.monotonic() - self._used.get(project_id, -UNUSED_S) >= UNUSED_S:
+                self._evict(project_id)
+                over -= sizes[project_id]
+
+    def _evict(self, project_id: str) -> None:
+        with self._locks[project_id]:
+            self._keep_or_forget(project_id)
+            self._note_path(project_id).unlink(missing_ok=True)  # first: what is missing then is no deletion
+            delete_folder(self._projects / project_id)
+
+    def _keep_or_forget(self, project_id: str) -> None:
+        try:
+            self.keep(project_id)
+        except Lost as lost:
+            _log.warning("%s", lost)
+        except NotFound:  # deleted for good by another machine: a cache keeps nothing of it
+            self._note_path(project_id).unlink(missing_ok=True)
+            delete_folder(self._projects / project_id)
+
+    def _take_hold(self, project_id: str, holder: str) -> None:
+        known = self._held(project_id).names
+        for _ in range(TRIES):
+            found = self._objects.read(_manifest(project_id))
+            if found is None and known:
+                raise NotFound(f"{project_id}: the project was deleted", hint="see the list of projects")
+            with suppress(Changed):
+                content = _written(Manifest(_said(found).names, holder))
+                self._objects.write(_manifest(project_id), content, after=found.tag if found else None)
+                return
+        raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+
+    def _drop(self, project_id: str, held: Held, changed: Names, gone: set[str]) -> None:
+        """Have nothing here that a lost job made; raises Lost."""
+        for path in changed:
+            if path.startswith(_MADE_BY_JOBS):
+                (self._projects / project_id / path).unlink(missing_ok=True)
+        stale = {path for path in (*changed, *gone) if path.startswith(_MADE_BY_JOBS)}
+        kept = {path: entry for path, entry in held.names.items() if path not in stale}
+        self._note(project_id, Held(kept, None, held.recording))
+        del self._holders[project_id]
+        raise Lost(f"{project_id}: another machine goes on with its job")
+
+    def _take(self, project_id: str, held: Held, names: Names, wanted: Names) -> bool:
+        """Have the wanted files here; False where one was replaced meanwhile."""
+        root = self._projects / project_id
+        missing = {
+            path: entry for path, entry in wanted.items() if held.names.get(path) != entry and _state(root / path) != entry[1:]
+        }
+        try:
+            with ThreadPoolExecutor(AT_ONCE) as pool:
+                list(pool.map(lambda item: self._get(project_id, root / item[0], item[1]), missing.items()))
+        except FileNotFoundError:
+            return False
+        for path in held.names.keys() - names.keys():
+            if _state(root / path) == held.names[path][1:]:
+                (root / path).unlink(missing_ok=True)
+        return True
+
+    def _get(self, project_id: str, path: Path, entry: Entry) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f".{path.name}.{threading.get_ident()}.tmp")
+        try:
+            if self._objects.get(_object(project_id, entry), part) != entry.sha256:
+                raise Unavailable(f"{path.name}: the store gave other bytes than were kept", hint="try again in a moment")
+            os.utime(part, ns=(entry.mtime_ns, entry.mtime_ns))
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _give(self, project_id: str, changed: Names, there: set[str]) -> Names:
+        """Put what the store lacks; what it has then. A file that was written meanwhile is left for the next time."""
+        with ThreadPoolExecutor(AT_ONCE) as pool:
+            new = {path: entry for path, entry in changed.items() if entry.sha256 not in there}
+            put = pool.map(lambda item: self._put(project_id, *item), new.items())
+            failed = {path for path, whole in zip(new, put, strict=True) if not whole}
+        return {path: entry for path, entry in changed.items() if path not in failed}
+
+    def _put(self, project_id: str, path: str, entry: Entry) -> bool:
+        file, name = self._projects / project_id / path, _object(project_id, entry)
+        try:
+            self._objects.put(name, file)
+        except FileNotFoundError:
+            return False
+        whole = _state(file) == entry[1:]
+        if not whole:
+            self._objects.delete([name])
+        return whole
+
+    def _sweep(self, project_id: str, names: Names) -> None:
+        """Now and then, delete objects that were replaced and copies that were downloaded."""
+        if time.monotonic() - self._swept.setdefault(project_id, time.monotonic()) < UNNAMED.total_seconds():
+            return
+        self._swept[project_id] = time.monotonic()
+        named = {_object(project_id, entry) for entry in names.values()}
+        old = [name for part in ("files", "downloads") for name in self._objects.old(f"projects/{project_id}/{part}/", UNNAMED)]
+        self._objects.delete([name for name in old if name not in named])
+
+    def _held(self, project_id: str) -> Held:
+        if not (self._projects / project_id).is_dir():
+            return Held()
+        try:
+            said = json.loads(self._note_path(project_id).read_text())
+        except (FileNotFoundError, ValueError):
+            return Held()
+        return Held({path: Entry(*entry) for path, entry in said["names"].items()}, said["tag"], said["recording"])
+
+    def _note(self, project_id: str, held: Held) -> None:
+        said = {"names": held.names, "tag": held.tag, "recording": held.recording}
+        write_atomically(self._note_path(project_id), json.dumps(said, separators=(",", ":")).encode())
+
+    def _noted(self) -> Iterator[Path]:
+        return self._notes.glob("*.json")
+
+    def _note_path(self, project_id: str) -> Path:
+        return self._notes / f"{project_id}.json"
+
+
+def _wanted(names: Names, *, recording: bool) -> Names:
+    def wanted(path: str) -> bool:
+        return recording or not path.startswith(_RECORDING) or path == _CLICKS_BESIDE_IT
+
+    return {path: entry for path, entry in names.items() if wanted(path)}
+
+
+def _lying(root: Path) -> dict[str, tuple[int, int]]:
+    """Size and time of change of each file that is to be kept."""
+    found: dict[str, tuple[int, int]] = {}
+    for parent, folders, files in os.walk(root):
+        if Path(parent) == root:
+            folders[:] = [name for name in folders if name not in _MADE_ANEW]
+        for name in files:
+            path = Path(parent, name)
+            state = None if name == _HALF_MADE or name.endswith((".tmp", ".part")) else _state(path)
+            if state is not None:
+                found[path.relative_to(root).as_posix()] = state
+    return found
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except FileNotFoundError:  # workers write while this looks
+        return None
+    return found.st_size, found.st_mtime_ns
+
+
+def _said(found: Read | None) -> Manifest:
+    if found is None:
+        return Manifest({}, "")
+    said = json.loads(found.content)
+    return Manifest({path: Entry(*entry) for path, entry in said["files"].items()}, said.get("holder", ""))
+
+
+def _written(manifest: Manifest) -> bytes:
+    return json.dumps({"version": 1, "files": manifest.names, "holder": manifest.holder}, separators=(",", ":")).encode()
+
+
+def _manifest(project_id: str) -> str:
+    return f"projects/{project_id}/manifest.json"
+
+
+def _object(project_id: str, entry: Entry) -> str:
+    return f"projects/{project_id}/files/{entry.sha256}"
+
+
+def _log_of(project_id: str, log: Path) -> str:
+    return f"projects/{project_id}/logs/{log.name}"
+
+
+def _read(root: Path, states: dict[str, tuple[int, int]]) -> Names:
+    found: Names = {}
+    for path, state in states.items():
+        with suppress(FileNotFoundError), (root / path).open("rb") as handle:
+            found[path] = Entry(hashlib.file_digest(handle, "sha256").hexdigest(), *state)
+    return found

@@ -1,0 +1,164 @@
+"""Objects by name in S3, GCS, Azure, a folder or memory: the few things that are asked of them, with failures in our words."""
+
+import contextlib
+import fcntl
+import hashlib
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from app.errors import Unavailable
+from r2c2r_core.errors import EnvironmentProblem, InputError
+
+LINK_S = 600  # an address for a download is good for ten minutes: to begin it, not to end it
+_CHUNK = 8 << 20
+_HINT = "s3://BUCKET/PREFIX with AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or file:///FOLDER"
+
+
+class Read(NamedTuple):
+    """An object's content, and the tag that changes with it."""
+
+    content: bytes
+    tag: str
+
+
+class Changed(Exception):
+    """Somebody else wrote the object meanwhile."""
+
+
+class Objects:
+    """One object store."""
+
+    def __init__(self, store: Any, folder: Path | None = None) -> None:
+        self._store, self._folder = store, folder  # a folder knows no conditional writes of its own
+
+    def read(self, name: str, *, unless: str | None = None) -> Read | None:
+        """The object; None where there is none. Raises NotModified where its tag is still this one."""
+        import obstore
+
+        with _said():
+            try:
+                found = obstore.get(self._store, name, options={"if_none_match": unless} if unless else {})
+                return Read(bytes(found.bytes()), str(found.meta["e_tag"]))
+            except FileNotFoundError:
+                return None
+            except obstore.exceptions.NotModifiedError as error:
+                raise NotModified from error
+
+    def write(self, name: str, content: bytes, *, after: str | None) -> str:
+        """Write the object where its tag is still `after` (None: where there is none yet); its tag. Raises Changed."""
+        import obstore
+
+        with _said(), self._alone():
+            try:
+                if after is None:
+                    return str(obstore.put(self._store, name, content, mode="create")["e_tag"])
+                if self._folder is None:
+                    return str(obstore.put(self._store, name, content, mode={"e_tag": after})["e_tag"])
+                if obstore.head(self._store, name)["e_tag"] != after:
+                    raise Changed
+                return str(obstore.put(self._store, name, content)["e_tag"])
+            except (FileNotFoundError, obstore.exceptions.AlreadyExistsError, obstore.exceptions.PreconditionError) as error:
+                raise Changed from error
+
+    def put(self, name: str, path: Path) -> None:
+        """Write an object from a file, whatever is there."""
+        import obstore
+
+        with _said():
+            obstore.put(self._store, name, path)
+
+    def get(self, name: str, path: Path) -> str:
+        """Write a file from an object; the SHA-256 of its bytes. Raises FileNotFoundError where there is no object."""
+        import obstore
+
+        digest = hashlib.sha256()
+        with _said(), path.open("wb") as file:
+            for chunk in obstore.get(self._store, name).stream(min_chunk_size=_CHUNK):
+                digest.update(chunk)
+                file.write(chunk)
+        return digest.hexdigest()
+
+    def has(self, name: str) -> bool:
+        """Whether there is one."""
+        import obstore
+
+        with _said():
+            try:
+                obstore.head(self._store, name)
+            except FileNotFoundError:
+                return False
+            return True
+
+    def old(self, prefix: str, age: timedelta) -> list[str]:
+        """Names below the prefix that were written longer ago than that."""
+        import obstore
+
+        with _said():
+            found = [entry for chunk in obstore.list(self._store, prefix) for entry in chunk]
+        return [entry["path"] for entry in found if entry["last_modified"] <= datetime.now(UTC) - age]
+
+    def delete(self, names: list[str]) -> None:
+        """Delete those that are there."""
+        import obstore
+
+        with _said():
+            for name in names:
+                with contextlib.suppress(FileNotFoundError):
+                    obstore.delete(self._store, name)
+
+    def link(self, name: str, as_name: str) -> str | None:
+        """An address that gives the object to whoever has it for minutes, ending in `as_name`; None where a store has none."""
+        import obstore
+
+        if not isinstance(self._store, obstore.store.S3Store | obstore.store.GCSStore | obstore.store.AzureStore):
+            return None
+        with _said():
+            if not self.has(as_name):
+                obstore.copy(self._store, name, as_name)
+            return str(obstore.sign(self._store, "GET", as_name, timedelta(seconds=LINK_S)))
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        if self._folder is None:
+            yield
+            return
+        with (self._folder / ".lock").open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+
+
+class NotModified(Exception):
+    """The object is as it was."""
+
+
+def open_objects(address: str) -> Objects:
+    """The object store at an address; raises InputError for none, EnvironmentProblem without the library that speaks to it."""
+    try:
+        import obstore
+    except ModuleNotFoundError as error:
+        raise EnvironmentProblem(f"no module {error.name}", hint="pip install 'r2c2r[store]'") from error
+    folder = Path(address.removeprefix("file://")) if address.startswith("file://") else None
+    try:
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+        return Objects(obstore.store.from_url(address), folder)
+    except (obstore.exceptions.BaseError, ValueError, OSError) as error:
+        raise InputError(f"R2C2R_STORE {address[:80]!r}: {_first_line(error)}", hint=_HINT) from error
+
+
+@contextlib.contextmanager
+def _said() -> Iterator[None]:
+    import obstore
+
+    try:
+        yield
+    except (obstore.exceptions.NotFoundError, obstore.exceptions.AlreadyExistsError):
+        raise
+    except obstore.exceptions.BaseError as error:
+        raise Unavailable(f"the store of files: {_first_line(error)}", hint="try again in a moment") from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:200]
