@@ -21,6 +21,24 @@ import app
 Line = dict[str, Any]
 
 
+class Lines:
+    """What a worker said, in its order; whoever asks after its last word hears None, however often."""
+
+    def __init__(self) -> None:
+        self._queue: queue.Queue[Line | None] = queue.Queue()
+
+    def put(self, line: Line | None) -> None:
+        """One more; None after the last."""
+        self._queue.put(line)
+
+    def next(self, timeout: float) -> Line | None:
+        """The next; raises queue.Empty after the timeout."""
+        line = self._queue.get(timeout=timeout)
+        if line is None:
+            self._queue.put(None)  # for whoever asks again
+        return line
+
+
 class Worker:
     """A running worker. Its stderr, and whatever on stdout is not JSON, goes to the log.
 
@@ -30,7 +48,7 @@ class Worker:
     def __init__(self, command: Sequence[str], log: Path) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         self._log: IO[bytes] = log.open("ab")
-        self._lines: queue.Queue[Line | None] = queue.Queue()
+        self._lines = Lines()
         self._temporary = tempfile.TemporaryDirectory(prefix="r2c2r-worker-")
         self.process = subprocess.Popen(
             list(command),
@@ -55,10 +73,7 @@ class Worker:
 
     def next_line(self, timeout: float) -> Line | None:
         """The next message; raises queue.Empty after the timeout; None when the worker said its last."""
-        line = self._lines.get(timeout=timeout)
-        if line is None:
-            self._lines.put(None)  # for whoever asks again
-        return line
+        return self._lines.next(timeout)
 
     def say(self, message: Line) -> bool:
         """Send it a message; False when it is gone."""

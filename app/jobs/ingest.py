@@ -16,9 +16,10 @@ import cv2
 import numpy as np
 
 from app import archives
+from app.files import ProjectFiles
 from app.jobs.messages import run_stage
 from app.settings import Settings
-from r2c2r_core.errors import PromptError
+from r2c2r_core.errors import CaptureError, PromptError
 from r2c2r_core.limits import free_memory, limit_this_process
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.progress import Progress
@@ -27,6 +28,7 @@ from r2c2r_core.workspace import Workspace, write_atomically
 MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
 CPU_S = 4 * 3600  # a recording of an hour takes a tenth of that
 FILE_BYTES = 8 << 30
+SAME_PATH_M = 0.01  # poses are read, not estimated: another recording differs by decimetres
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -53,7 +55,27 @@ def ingest(workdir: Path, folder: Path, request: Path, progress: Progress) -> No
     capture: Capture | None = work.load_latest("ingest", "scene")
     if capture is None:
         raise PromptError("the recording was not read", hint="see the job's log")
+    files = ProjectFiles(folder, workdir)
+    if files.awaited_frames.is_file() and not files.frames.is_file():  # the first reading
+        refuse_another(source.name, frame_table(capture), json.loads(files.awaited_frames.read_text()))
     describe(capture, folder, source)
+
+
+def refuse_another(name: str, found: list[dict[str, Any]], awaited: list[dict[str, Any]]) -> None:
+    """Raise CaptureError for a recording that an imported project was not made from: by frames, and the camera's path."""
+    hint = "choose the recording that the project was made from"
+    if [entry["index"] for entry in found] != [entry["index"] for entry in awaited]:
+        raise CaptureError(f"{name}: {len(found)} frames, {len(awaited)} or others expected by the project", hint=hint)
+    for ours, theirs in zip(found, awaited, strict=True):
+        size, wanted = ((entry["width"], entry["height"]) for entry in (ours, theirs))
+        if size != wanted:
+            raise CaptureError(
+                f"{name}: frame {ours['index']} has {size[0]}x{size[1]} pixels, {wanted[0]}x{wanted[1]} expected", hint=hint
+            )
+    ways = [np.array([entry["camera"] for entry in table]) for table in (found, awaited)]
+    far_m = np.abs(np.subtract(*(np.linalg.norm(way - way[0], axis=1) for way in ways))).max()  # whichever way is up
+    if far_m > SAME_PATH_M:
+        raise CaptureError(f"{name}: its camera's path is {far_m:.2f} m off the project's", hint=hint)
 
 
 def describe(capture: Capture, folder: Path, source: Path | None) -> None:

@@ -4,7 +4,8 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import Engine
@@ -15,11 +16,13 @@ from app.db.engine import writing
 from app.errors import body
 from app.files import ProjectFiles
 from app.hub import Hub
+from app.jobs.far import ELEVATIONS, FarWorker
 from app.jobs.live_session import LiveSession
 from app.jobs.mask_store import MaskFile
 from app.jobs.plans import Commands
 from app.process import Worker
 from app.settings import Settings
+from app.store.protocol import Store
 from r2c2r_core.errors import R2C2RError
 
 _log = logging.getLogger(__name__)
@@ -34,15 +37,18 @@ VANISHED = body("worker-died", "the live segmenter ended early", "click again to
 class LiveSegmenters:
     """All live segmenters. `on_object` is told of every object whose masks came to an end.
 
-    `on_again` is told of every object whose masks are to be drawn anew, with their key, for clicks on these others.
+    `on_again` is told of every object whose masks are to be drawn anew, with their key, for clicks on these others. `far`
+    begins a process at a seat, where there is one for that.
     """
 
-    def __init__(self, engine: Engine, hub: Hub, settings: Settings, commands: Commands) -> None:
+    def __init__(self, engine: Engine, hub: Hub, settings: Settings, commands: Commands, store: Store) -> None:
         self._engine, self._hub, self._settings, self._commands = engine, hub, settings, commands
+        self._store = store
         self._sessions: dict[str, LiveSession] = {}
         self._ended: dict[str, LiveSession] = {}  # the last failure of each project
         self._lock = threading.RLock()
         self.telling = threading.Lock()  # held while objects are read and told: what is told last was read last
+        self.far: Callable[[str, ProjectFiles, tuple[str, ...]], FarWorker | None] = lambda project, files, options: None
         self.on_object: Callable[[str, int], None] = lambda project, number: None
         self.on_again: Callable[[str, int, str, list[int]], None] = lambda project, number, key, others: None
 
@@ -64,6 +70,18 @@ class LiveSegmenters:
         with self._lock:
             session = self._sessions.get(project) or self._ended.get(project)
             return session.status if session else schemas.LiveStatus(state="off", fraction=0.0, text="", error=None)
+
+    @property
+    def running(self) -> int:
+        """Projects that have a segmenter now."""
+        with self._lock:
+            return len(self._sessions)
+
+    @property
+    def projects(self) -> frozenset[str]:
+        """Those projects."""
+        with self._lock:
+            return frozenset(self._sessions)
 
     def runs(self, project: str) -> bool:
         """Whether there is a process for the project."""
@@ -118,6 +136,12 @@ class LiveSegmenters:
             task = session.tasks.get(number) if session else None
             return (task.state, task.masks) if task is not None and task.key == key else None
 
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """No masks come and none end meanwhile: what is told of them here is not overtaken by what is newer."""
+        with self._lock:
+            yield
+
     def close(self, project: str) -> None:
         """Stop the project's process."""
         with self._lock:
@@ -140,9 +164,9 @@ class LiveSegmenters:
             session.worker.close()
 
     def _started(self, project: str, files: ProjectFiles, segmenter: str) -> LiveSession:
-        width = str(self._settings.preview_width)
-        options = ("--width", width, "--segmenter", segmenter, "--elevations", str(files.elevations))
-        worker = Worker((*self._commands.live, str(files.work), *options), files.root / "logs" / "live.log")
+        options = ("--width", str(self._settings.preview_width), "--segmenter", segmenter)
+        command = (*self._commands.live, str(files.work), *options, ELEVATIONS, str(files.elevations))
+        worker = self.far(project, files, options) or Worker(command, files.root / "logs" / "live.log")
         told = self._tell_object, self._tell_again
         session = LiveSession(project, files, segmenter, worker, self._hub, self._lock, *told)
         session.proposals_path = None if files.proposals.is_file() else files.proposals
@@ -170,6 +194,8 @@ class LiveSegmenters:
             except OSError as error:  # a full disk must not end the process: the masks are shown, only not kept
                 _log.warning("live masks of %s: %s", session.project, error)
             self._store_work(session)
+            if "end" in line:
+                self._keep(session.project)
         session.worker.close()
         self._gone(session)
         self._store_work(session)
@@ -225,6 +251,13 @@ class LiveSegmenters:
 
     def _tell_again(self, project: str, number: int, key: str, others: list[int]) -> None:
         self.on_again(project, number, key, others)
+
+    def _keep(self, project: str) -> None:
+        """Have masks that ended where other servers see them; what fails is kept with the next, or when the cache is tidied."""
+        try:
+            self._store.keep(project)
+        except (R2C2RError, OSError) as error:
+            _log.warning("live masks of %s: %s", project, error)
 
     def _store_work(self, session: LiveSession) -> None:
         """Store when it was at work; not under the lock, for whoever writes to the database may wait for that."""

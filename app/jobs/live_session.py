@@ -18,6 +18,7 @@ from app.errors import told_body
 from app.files import ProjectFiles
 from app.hub import Hub
 from app.jobs import mask_store
+from app.jobs.far import FarWorker
 from app.jobs.mask_store import MaskFile, mask_path
 from app.process import Line, Worker
 from r2c2r_core.workspace import write_atomically
@@ -52,7 +53,7 @@ class LiveSession:
     project: str
     files: ProjectFiles
     segmenter: str
-    worker: Worker
+    worker: Worker | FarWorker
     hub: Hub
     lock: threading.RLock
     on_object: Callable[[str, int], None]

@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.motion import JointMotion, State
+from r2c2r_core.synthesize.marked import Marks, moved
 
 
 def motion_lines(motions: Iterable[JointMotion]) -> list[dict[str, Any]]:
@@ -23,6 +24,22 @@ def motion_lines(motions: Iterable[JointMotion]) -> list[dict[str, Any]]:
         for motion in motions
         if motion.kind != "fixed"
     ]
+
+
+def marked_line(line: dict[str, Any], marks: Marks) -> dict[str, Any]:
+    """The line with what a person marked of it (rad or m by frame), and what was measured in other frames moved along."""
+    found = JointMotion(
+        part=line["part"],
+        kind=line["kind"],
+        axis_world=None,
+        pivot_world=None,
+        covariance=None,
+        states={state["frame"]: State(value=state["value"], sigma=state["sigma"]) for state in line["states"]},
+        largest=line["largest"],
+        stop_seen=line["limit_source"] == "measured",
+        source=line["source"],
+    )
+    return motion_lines([moved(found, marks)])[0]
 
 
 def _rounded(value: float | None) -> float | None:

@@ -13,7 +13,7 @@ from sqlalchemy import func
 from sqlmodel import Session, select
 
 from app.db import history
-from app.db.queries import live_objects, newest_bundle
+from app.db.queries import READS_RECORDING, live_objects, newest_bundle
 from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
 from app.jobs.plans import NAMES
@@ -30,7 +30,7 @@ class KeptBundle(NamedTuple):
     row: Bundle | None  # None: it is the newest version already
 
 
-def forget_previews(session: Session, project: Project, files: ProjectFiles) -> None:
+def forget_previews(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
     """What was drawn of an older reading."""
     shutil.rmtree(files.previews, ignore_errors=True)
 
@@ -52,13 +52,15 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
 def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
     """The bundle becomes a version, unless it is the same as the newest one."""
     adopt_bundle(session, project, files, job.payload.get("inputs", ""), kept)
-    request = files.request(job.id or 0)
-    write_atomically(files.finished_prompts, request.with_name("prompts.json").read_bytes())
-    names = request.with_name(NAMES)
+    names = files.request(job.id or 0).with_name(NAMES)
     named: dict[str, str] = json.loads(names.read_text()) if names.is_file() else {}  # none beside an older version's request
     for item in live_objects(session, project.id):
         item.run_name = named.get(str(item.id), item.run_name)
         session.add(item)
+
+
+def vary_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
+    """Nothing: the variants lie in a folder of their own, which says itself what they are."""
 
 
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
@@ -67,12 +69,12 @@ def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles)
     Of an upload that never could be read nothing else stays: asking again would end the same.
     """
     project.updated = time.time()
-    if job.kind in ("import", "sample"):
+    if job.kind in READS_RECORDING:
         project.status = "failed"
         cancelled = {"kind": "cancelled", "message": "the import was cancelled", "hint": "retry it, or delete the project"}
         project.error = job.error or cancelled
         refused = not project.capture and (job.error or {}).get("kind") == "capture"
-        if refused and Path(project.source_path or "").is_relative_to(files.source):
+        if refused and files.here(project.source_path or "").is_relative_to(files.source):
             project.source_path = None
             _delete_what_was_read(files)
     session.add(project)
@@ -84,6 +86,12 @@ def _delete_what_was_read(files: ProjectFiles) -> None:
         delete_folder(folder)
     for path in (files.frames, files.facts, *files.scan_pictures):
         path.unlink(missing_ok=True)
+
+
+def run_files(session: Session, job: Job, project: Project, files: ProjectFiles) -> KeptBundle:
+    """The bundle, kept as a version, and the prompts that the workspace's masks are of by now."""
+    write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
+    return keep_bundle(session, project, files)
 
 
 def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> KeptBundle:
@@ -112,7 +120,8 @@ def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> Kept
 FINISHERS: dict[str, Finisher] = {
     "import": Finisher(import_done, forget_previews),
     "sample": Finisher(sample_done, forget_previews),
-    "run": Finisher(run_done, keep_bundle),
+    "run": Finisher(run_done, run_files),
+    "vary": Finisher(vary_done),
 }
 
 

@@ -1,8 +1,8 @@
 """What a job runs: one process per stage, and how long each is likely to take beside the others."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,11 @@ from app.db.tables import Job, Project
 from app.files import ProjectFiles
 from app.process import python_module
 from app.settings import Settings
+from r2c2r_core.align.protocol import MATCHERS
+from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.registry import Backend, Registry
+from r2c2r_core.robot.arms import NO_ARM
+from r2c2r_core.segment.stage import SEGMENTERS
 from r2c2r_core.workspace import write_atomically
 
 
@@ -24,6 +29,16 @@ class Step:
     stage: str
     command: tuple[str, ...]
     weight: float  # share of the job's time; only ratios mean something
+    took_s: float | None = None  # the most it took in the project's last jobs; None: it was never done there
+    side_by_side: bool = False  # its objects, in as many processes as a job may start
+    objects: int = 0  # of a step that goes by them
+    object_s: float = 0.0  # what each of them is likely to take
+    learned: bool = False  # by a model that a GPU makes quicker
+
+    def of(self, names: Collection[str], request: Path | None = None) -> "Step":
+        """The step for these objects alone (r2c2r_core.worker --only), perhaps by a request that lies elsewhere."""
+        given = () if request is None else ("--request", str(request))  # the last one counts
+        return replace(self, command=(*self.command, *given, "--only", *names))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +49,7 @@ class Commands:
     probe: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.alone", "app.jobs.probe"))
     ingest: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.alone", "app.jobs.ingest"))
     sample: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.sample"))
+    vary: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.vary"))
     live: tuple[str, ...] = field(default_factory=lambda: python_module("app.jobs.live_segment"))
 
 
@@ -46,12 +62,17 @@ NAMES = "names.json"  # beside a request: what each object, by its number, is ca
 
 Planner = Callable[[Job, Project, ProjectFiles, Commands], list[Step]]
 
+# without a model, by two processes side by side: lines through kitchens of 5, 14 and 40 objects (benchmarks/speed.json)
+_OBJECT_S = {"segment": 0.6, "generate": 1.6, "align": 0.4, "a model": 20.0}
 _WEIGHTS = {"segment": 30.0, "generate": 30.0, "align": 25.0, "synthesize": 3.0, "warp": 4.0, "export": 8.0}
 
 
 def steps_of(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
     """The processes of a job, in order."""
     return _PLANNERS[job.kind](job, project, files, commands)
+
+
+_AS_RECORDED: dict[str, Any] = {"register_depth": False, "scale": 1.0}
 
 
 def request_of(session: Session, job: Job, project: Project, files: ProjectFiles) -> dict[str, Any]:
@@ -62,18 +83,46 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
     """
     path, payload = files.request(job.id or 0), job.payload
     if path.is_file():
-        found: dict[str, Any] = json.loads(path.read_text())
-        return found
+        return placed_request(path, files)
     tools = {key: payload[key] for key in ("segmenter", "generator", "matcher") if payload.get(key)}
-    request: dict[str, Any] = {"source": project.source_path, "prompts": "prompts.json", "overrides": "overrides.json"}
-    if project.register_depth:
-        request["config"] = {"ingest": {"register_depth": True}}
+    source = None if project.source_path is None else str(files.here(project.source_path))
+    request: dict[str, Any] = {"source": source, "prompts": "prompts.json", "overrides": "overrides.json"}
+    said = {"register_depth": project.register_depth, "scale": project.scale}
+    config: dict[str, Any] = {}
+    if reading := {name: value for name, value in said.items() if value != _AS_RECORDED[name]}:
+        config["ingest"] = reading
+    if payload.get("arm", NO_ARM) != NO_ARM:
+        config["export"] = {"arm": True}
+    if config:
+        request["config"] = config
     request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": project.inputs}
     write_json(path.with_name("prompts.json"), prompts_document(session, project.id))
-    write_json(path.with_name("overrides.json"), overrides_document(session, project.id))
+    write_json(path.with_name("overrides.json"), _placed_overrides(overrides_document(session, project.id), files))
     write_json(path.with_name(NAMES), {item.id or 0: item.name for item in live_objects(session, project.id)})
     write_json(path, request)
     return request
+
+
+def placed_request(path: Path, files: ProjectFiles) -> dict[str, Any]:
+    """The request that was written before, perhaps on another machine, with its paths as they are here."""
+    request: dict[str, Any] = json.loads(path.read_text())
+    overrides = path.with_name("overrides.json")
+    written = json.loads(overrides.read_text())
+    placed = _placed_overrides(json.loads(overrides.read_text()), files)
+    if placed != written:
+        write_json(overrides, placed)
+    if request["source"] and str(files.here(request["source"])) != request["source"]:
+        request["source"] = str(files.here(request["source"]))
+        write_json(path, request)
+    return request
+
+
+def _placed_overrides(document: dict[str, Any], files: ProjectFiles) -> dict[str, Any]:
+    """overrides.json whose uploaded meshes are where they are here."""
+    for entry in document["objects"].values():
+        if isinstance(entry.get("candidate"), str):
+            entry["candidate"] = str(files.here(entry["candidate"]))
+    return document
 
 
 def write_json(path: Path, document: Any) -> None:
@@ -93,9 +142,39 @@ def _sample(job: Job, project: Project, files: ProjectFiles, commands: Commands)
 
 def _run(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
     given = ("--request", str(files.request(job.id or 0)))
-    return [
-        Step(stage, (*commands.worker, str(files.work), "--until", stage, *given), _WEIGHTS[stage]) for stage in STAGES["run"]
-    ]
+
+    names = files.request(job.id or 0).with_name(NAMES)
+    count = len(json.loads(names.read_text())) if names.is_file() else 0
+
+    def step(stage: str) -> Step:
+        command = (*commands.worker, str(files.work), "--until", stage, *given)
+        if stage not in _TOOLS:
+            return Step(stage, command, _WEIGHTS[stage])
+        backend = _backend(stage, job.payload)
+        each_s = _OBJECT_S["a model" if backend.alone else stage]
+        return Step(
+            stage,
+            command,
+            _WEIGHTS[stage],
+            side_by_side=True,
+            objects=count,
+            object_s=each_s,
+            learned=backend.weights is not None,
+        )
+
+    return [step(stage) for stage in STAGES["run"]]
+
+
+def _vary(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
+    wish = job.payload
+    places = (str(files.bundles / wish["bundle"]), str(files.variants / wish["name"]))
+    return [Step("vary", (*commands.vary, *places, "--count", str(wish["count"]), "--seed", str(wish["seed"])), 1.0)]
+
+
+def _backend(stage: str, payload: dict[str, Any]) -> Backend:
+    """The stage's tool of a job."""
+    seam, backends = _TOOLS[stage]
+    return backends.get(payload.get(seam) or backends.default)
 
 
 def _ingest(job: Job, files: ProjectFiles, commands: Commands) -> Step:
@@ -103,4 +182,11 @@ def _ingest(job: Job, files: ProjectFiles, commands: Commands) -> Step:
     return Step("ingest", (*commands.ingest, str(files.work), str(files.root), *given), 40.0)
 
 
-_PLANNERS: dict[str, Planner] = {"import": _import, "sample": _sample, "run": _run}
+_TOOLS: dict[str, tuple[str, Registry[Any]]] = {
+    "segment": ("segmenter", SEGMENTERS),
+    "generate": ("generator", GENERATORS),
+    "align": ("matcher", MATCHERS),
+}
+"""Stages that go object by object, each with the tool that a job chooses for it."""
+
+_PLANNERS: dict[str, Planner] = {"import": _import, "sample": _sample, "run": _run, "vary": _vary}

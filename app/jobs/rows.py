@@ -1,27 +1,32 @@
 """What becomes of a job's row: each step is one transaction with an event beside it, and shown to every tab."""
 
 import os
+import secrets
+import socket
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from sqlalchemy import Engine, text
-from sqlmodel import Session, col, select
+from sqlmodel import Session, col, delete, or_, select, update
 
-from app.db.engine import reading, writing
+from app.db.engine import is_shared, now, reading, writing
 from app.db.queries import STAGES, job_row, job_shapes, note_size, project_row
-from app.db.tables import Job, JobEvent, Project
-from app.errors import told_body
-from app.files import ProjectFiles, folder_bytes, project_files, require_free
+from app.db.tables import Job, JobEvent, Part, Project
+from app.errors import NotFound, told_body
+from app.files import ProjectFiles, project_files, require_free
 from app.hub import Hub
+from app.jobs.durations import longest
 from app.jobs.plans import Commands, Step, request_of, steps_of
 from app.privacy import without_places
 from app.process import Worker, end_orphan, started_at
 from app.settings import Settings
+from app.store.protocol import Store
 
 
-def _nothing(session: Session, project: Project, files: ProjectFiles) -> None:
+def _nothing(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
     """Nothing takes long."""
 
 
@@ -29,36 +34,54 @@ class Finisher(NamedTuple):
     """How what a finished job made is taken over: files first, while others may write, then rows, in one transaction."""
 
     store: Callable[[Session, Job, Project, ProjectFiles, Any], None]  # the last is what `files` returned
-    files: Callable[[Session, Project, ProjectFiles], Any] = _nothing
+    files: Callable[[Session, Job, Project, ProjectFiles], Any] = _nothing
 
 
 Ender = Callable[[Session, Job, Project, ProjectFiles], None]
 
-_CLAIM = text(
-    "UPDATE jobs SET state='running', owner_pid=:pid, attempts=attempts+1, started=COALESCE(started, :now), "
+_CLAIM = (
+    "UPDATE jobs SET state='running', owner=:owner, attempts=attempts+1, started=COALESCE(started, :now), "
     "heartbeat=:now, error=NULL, stage='', stage_fraction=0 "
     "WHERE id=(SELECT id FROM jobs AS waiting WHERE state='queued' AND NOT EXISTS (SELECT 1 FROM jobs AS other "
-    "WHERE other.project_id=waiting.project_id AND other.state IN ('running', 'cancelling')) ORDER BY id LIMIT 1) RETURNING id"
+    "WHERE other.project_id=waiting.project_id AND other.state IN ('running', 'cancelling')) ORDER BY id LIMIT 1{locked}) "
+    "RETURNING id"
 )
+_AT_WORK = ("running", "cancelling")
 
 
 class JobRows:
-    """The table of jobs. `finishers` take over what a finished job made, `ended` what one that came to no end leaves."""
+    """The table of jobs. `finishers` take over what a finished job made, `ended` what one that came to no end leaves.
 
-    def __init__(self, engine: Engine, hub: Hub, settings: Settings, finishers: dict[str, Finisher], ended: Ender) -> None:
-        self.engine, self.hub, self.settings = engine, hub, settings
+    A running job is its owner's: whoever lost it, taken for dead by another server, changes nothing of it any more.
+    """
+
+    def __init__(
+        self, engine: Engine, hub: Hub, settings: Settings, store: Store, finishers: dict[str, Finisher], ended: Ender
+    ) -> None:
+        self.engine, self.hub, self.settings, self.store = engine, hub, settings, store
+        self.owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
+        self.shared = is_shared(engine)
+        self._claim = text(_CLAIM.format(locked=" FOR UPDATE SKIP LOCKED" if self.shared else ""))
         self._finishers, self._ended = finishers, ended
 
     def recover(self) -> None:
-        """Take up what an earlier server left: its workers are ended, its jobs wait again."""
-        left = select(Job).where(col(Job.state).in_(("running", "cancelling")))
+        """Take up what a server that is gone left: its workers are ended, its jobs wait again.
+
+        In a file, which one server holds at a time, that is all that ran before; where servers share a database, what had no
+        sign of life for long.
+        """
+        if not self.shared:
+            self._forget_parts()
         with reading(self.engine) as session:
-            orphans = [(row.worker_pid, row.worker_started) for row in session.exec(left)]
-        for pid, started in orphans:  # outside the transaction: nobody else can write while it lasts
-            end_orphan(pid, started)
+            left = self._left(session)
+        if not left:
+            return
+        for row in filter(self._is_here, left):  # outside the transaction: nobody else can write while it lasts
+            end_orphan(row.worker_pid, row.worker_started)
         with writing(self.engine) as session:
-            for row in session.exec(left):
-                row.worker_pid = row.worker_started = row.owner_pid = None
+            left = self._left(session)
+            for row in left:
+                row.worker_pid = row.worker_started = row.owner = None
                 if row.state == "cancelling":
                     row.state, row.finished = "cancelled", time.time()
                 elif row.attempts >= self.settings.job_losses:
@@ -74,12 +97,21 @@ class JobRows:
                 if row.state in ("failed", "cancelled"):
                     self._leave(session, row)
                 session.add(row)
+        for row in left:
+            self._tell_end(row.id or 0)
 
     def claim(self) -> int | None:
         """Take the oldest waiting job whose project's workspace nobody writes; no two threads or servers get the same one."""
         with writing(self.engine) as session:
-            found = session.execute(_CLAIM, {"pid": os.getpid(), "now": time.time()}).first()
+            found = session.execute(self._claim, {"owner": self.owner, "now": now(session)}).first()
         return int(found[0]) if found else None
+
+    def beat(self) -> dict[int, bool]:
+        """Say that this server lives; the jobs that are its own by now, and whether somebody wants each stopped."""
+        mine = update(Job).where(col(Job.owner) == self.owner, col(Job.state).in_(_AT_WORK))
+        with writing(self.engine, lasting=False) as session:
+            rows = session.execute(mine.values(heartbeat=now(session)).returning(col(Job.id), col(Job.state)))
+            return {number: state == "cancelling" for number, state in rows}
 
     def next_waits(self, why: str) -> None:
         """Say once why the job that is next does not start; `why` begins the same as long as the reason is the same."""
@@ -91,27 +123,49 @@ class JobRows:
             session.add(row)
         self.tell(number)
 
+    def project_of(self, job_id: int) -> str:
+        """The project of a job that this server runs."""
+        with reading(self.engine) as session:
+            return self._own(session, job_id).project_id
+
     def begin(self, job_id: int, commands: Commands) -> tuple[list[Step], Path]:
         """Write down what the job is given; its processes, and its log. Raises NoSpace where there is no room for it."""
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             project = project_row(session, row.project_id)
             files = self._files(session, row)
             require_free(files.root, 0, self.settings.min_free_bytes)
             given = request_of(session, row, project, files)
             row.payload = {**row.payload, "inputs": given["inputs"]}
             session.add(row)
-            return steps_of(row, project, files, commands), files.root / "logs" / f"job-{job_id}.log"
+            took, steps = longest(session, row), steps_of(row, project, files, commands)
+            return [replace(step, took_s=took.get(step.stage)) for step in steps], files.root / "logs" / f"job-{job_id}.log"
 
-    def began_step(self, job_id: int, stage: str, log: Path, worker: Worker, progress: float, eta_s: float | None) -> None:
-        """A process of the job was started."""
+    def is_cancelling(self, job_id: int) -> bool:
+        """Whether somebody, at any server, wants a job stopped that this server runs."""
+        with reading(self.engine) as session:
+            return self._own(session, job_id).state == "cancelling"
+
+    def step_of(self, job_id: int, stage: str, commands: Commands) -> tuple[Step, ProjectFiles]:
+        """A stage of a job that any process runs, and where its files are here."""
+        with reading(self.engine) as session:
+            row = job_row(session, job_id)
+            files = self._files(session, row)
+            steps = steps_of(row, project_row(session, row.project_id), files, commands)
+        return next(step for step in steps if step.stage == stage), files
+
+    def began_step(
+        self, job_id: int, stage: str, fraction: float, log: Path, worker: Worker, progress: float, eta_s: float | None
+    ) -> None:
+        """A process of the job was started; the first of a stage, at its fraction 0, is its beginning."""
         began = started_at(worker.pid)
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             row.log_path, row.worker_pid, row.worker_started = str(log), worker.pid, began
-            _note(session, row, "stage", stage, stage=stage)
-            _set_progress(session, row, stage, 0.0, progress, eta_s)
-            if row.state == "running":
+            if fraction == 0.0:
+                _note(session, row, "stage", stage, stage=stage)
+            _set_progress(session, row, stage, fraction, progress, eta_s)
+            if row.state == "running" and fraction == 0.0:
                 row.message = ""
         self.tell(job_id)
 
@@ -119,8 +173,8 @@ class JobRows:
         self, job_id: int, stage: str, fraction: float, message: str | None, progress: float, eta_s: float | None
     ) -> None:
         """How far it is; without a message it only lives."""
-        with writing(self.engine) as session:
-            row = job_row(session, job_id)
+        with writing(self.engine, lasting=False) as session:
+            row = self._own(session, job_id)
             if message is not None:
                 _note(session, row, "progress", message, stage=stage, fraction=fraction)
                 row.message = message if row.state == "running" else row.message
@@ -130,7 +184,7 @@ class JobRows:
     def got_further(self, job_id: int, stages: int) -> bool:
         """So many stages are finished; whether that is more than ever: what was tried in vain does not count any more."""
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             further = stages > row.reached
             if further:
                 row.reached, row.attempts = stages, 1
@@ -140,12 +194,13 @@ class JobRows:
     def finish(self, job_id: int) -> None:
         """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""
         with reading(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             finisher, files = self._finishers[row.kind], self._files(session, row)
-            made = finisher.files(session, project_row(session, row.project_id), files)
-        size = folder_bytes(files.root)
+            made = finisher.files(session, row, project_row(session, row.project_id), files)
+        self.store.keep(row.project_id)  # all of it, before a row names it: this machine may be gone after that
+        size = self.store.size(row.project_id)
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             note_size(session, row.project_id, size)
             finisher.store(session, row, project_row(session, row.project_id), files, made)
             row.state, row.finished, row.progress, row.stage_fraction = "done", time.time(), 1.0, 1.0
@@ -157,7 +212,7 @@ class JobRows:
     def end(self, job_id: int, state: str, error: dict[str, Any]) -> None:
         """It failed or was cancelled."""
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             row.state, row.finished, row.eta_s, row.worker_pid = state, time.time(), None, None
             error = {k: without_places(v, self.settings) if isinstance(v, str) else v for k, v in error.items()}
             row.error = None if state == "cancelled" else told_body(error)
@@ -170,23 +225,23 @@ class JobRows:
     def queue_again(self, job_id: int, why: str) -> None:
         """Wait for another try after its process vanished."""
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             _set_waiting(session, row, "taken up again after its process ended early")
             _note(session, row, "state", f"{why}; taken up again")
         self.tell(job_id)
 
-    def give_back(self, job_id: int) -> None:
-        """Wait for the next server: this one stops, and that is no failed try."""
+    def give_back(self, job_id: int, why: str) -> None:
+        """Wait for the next server, or for what is away: that is no failed try."""
         with writing(self.engine) as session:
-            row = job_row(session, job_id)
+            row = self._own(session, job_id)
             row.attempts = max(row.attempts - 1, 0)
-            _set_waiting(session, row, "waits for the server")
+            _set_waiting(session, row, why)
 
     def cancel(self, job_id: int) -> bool:
-        """Cancel it where it only waits; whether it runs and is to be stopped now."""
+        """Cancel it where it only waits; whether it runs here and is to be stopped now."""
         with writing(self.engine) as session:
             row = job_row(session, job_id)
-            running = row.state == "running"
+            running, here = row.state == "running", row.owner == self.owner
             if row.state == "queued":
                 row.state, row.finished, row.message = "cancelled", time.time(), "cancelled before it started"
                 _note(session, row, "state", "cancelled")
@@ -196,12 +251,12 @@ class JobRows:
                 _note(session, row, "state", "cancelling")
             session.add(row)
         self.tell(job_id)
-        return running
+        return running and here
 
     def busy(self, project_id: str) -> bool:
         """Whether a process works for the project."""
         with reading(self.engine) as session:
-            query = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(("running", "cancelling")))
+            query = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(_AT_WORK))
             return session.exec(query).first() is not None
 
     def tell(self, job_id: int) -> None:
@@ -210,6 +265,32 @@ class JobRows:
             row = session.get(Job, job_id)
             if row is not None:
                 self.hub.publish("job", row.project_id, job=job_shapes(session, [row])[0].model_dump())
+
+    def _forget_parts(self) -> None:
+        with reading(self.engine) as session:
+            if session.exec(select(Part.id).limit(1)).first() is None:
+                return
+        with writing(self.engine) as session:
+            session.execute(delete(Part))
+
+    def _left(self, session: Session) -> list[Job]:
+        """Jobs at work by their rows, whose owner is gone."""
+        of = select(Job).where(col(Job.state).in_(_AT_WORK))
+        if self.shared:
+            silent_since = now(session) - self.settings.beats_missed_s
+            of = of.where(or_(col(Job.heartbeat).is_(None), col(Job.heartbeat) < silent_since))
+        return list(session.exec(of))
+
+    def _is_here(self, row: Job) -> bool:
+        """Whether its worker, known by its process id, was one of this machine."""
+        return not self.shared or (row.owner or "").startswith(f"{socket.gethostname()}:")
+
+    def _own(self, session: Session, job_id: int) -> Job:
+        """A job that this server runs; raises NotFound where there is none, or another has taken it up meanwhile."""
+        row = job_row(session, job_id)
+        if row.owner != self.owner:
+            raise NotFound(f"job {job_id} is run by {row.owner or 'nobody'} now, where {self.owner} ran it")
+        return row
 
     def _tell_end(self, job_id: int) -> None:
         self.tell(job_id)
@@ -228,14 +309,14 @@ class JobRows:
 
 
 def _set_progress(session: Session, row: Job, stage: str, fraction: float, progress: float, eta_s: float | None) -> None:
-    row.stage, row.stage_fraction, row.heartbeat = stage, round(fraction, 4), time.time()
+    row.stage, row.stage_fraction, row.heartbeat = stage, round(fraction, 4), now(session)
     row.progress, row.eta_s = round(progress, 4), eta_s
     session.add(row)
 
 
 def _set_waiting(session: Session, row: Job, message: str) -> None:
     row.state, row.message = "queued", message
-    row.worker_pid, row.owner_pid, row.eta_s = None, None, None
+    row.worker_pid, row.owner, row.eta_s = None, None, None
     session.add(row)
 
 

@@ -1,11 +1,13 @@
 """The queue: durable rows, one process per stage, at most `heavy_jobs` at a time.
 
 A job belongs to the server that runs it. When a server dies, the next one ends what it left running and queues its jobs
-again; finished stages are found in the workspace, so little is done twice.
+again; finished stages are found in the workspace, so little is done twice. Servers that share a database say every few seconds
+that they live, and take up the jobs of those that do not.
 """
 
 import errno
 import logging
+import secrets
 import threading
 import time
 from collections import Counter
@@ -14,17 +16,26 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from opentelemetry.trace import StatusCode, TracerProvider
 
-from app.errors import NoSpace, NotFound, told
+from app.errors import NoSpace, NotFound, Unavailable, told
+from app.jobs.compute import seat_of
 from app.jobs.plans import Commands, Step
 from app.jobs.rows import JobRows
+from app.jobs.seats import OwnSeat
+from app.jobs.sharing import SharedStage, Sharing
 from app.jobs.steps import HEARTBEAT_S, STORE_EVERY_S, VANISHED, JobProgress, listen, outcome
-from app.process import Worker
+from app.logs import JOB
+from app.metrics import Histogram
+from app.privacy import without_places
+from app.process import Line, Worker
 from app.settings import Settings
 from r2c2r_core.errors import EnvironmentProblem, R2C2RError
 
 _log = logging.getLogger(__name__)
 
+PREPARED, SHARED = 0.1, 0.9  # of a stage whose objects several seats compute, when that begins and ends
+AWAY_S = 5.0  # until a job is tried again whose rows or files did not answer
 UNEXPECTED = {"kind": "internal", "message": "the queue met an unexpected error", "hint": "see the server's log, then retry"}
 
 
@@ -35,9 +46,17 @@ class ServerStops(Exception):
 class Runner:
     """Takes jobs from the table and runs them in threads that only wait for processes."""
 
-    def __init__(self, rows: JobRows, settings: Settings, commands: Commands) -> None:
-        self.rows, self.settings, self.commands = rows, settings, commands
+    def __init__(
+        self, rows: JobRows, settings: Settings, commands: Commands, stages: Histogram, traces: TracerProvider
+    ) -> None:
+        self.rows, self.settings, self.commands, self._stages = rows, settings, commands, stages
+        self._tracer = traces.get_tracer("r2c2r")
+        self._files, self._seat = rows.store, OwnSeat(rows.engine, rows.owner, settings)
+        self._compute = seat_of(settings, rows.store)
         self._wake, self._stopping = threading.Event(), threading.Event()
+        self._sharing = Sharing(rows, settings, commands, self._compute, self._stopping)
+        self.draining, self.began = False, time.time()  # draining: it takes no further job
+        self._at: dict[int, tuple[str, Path | None]] = {}  # project and log of each job that runs here
         self._threads: list[threading.Thread] = []
         self._workers: dict[int, Worker] = {}
         self._cancelled: set[int] = set()
@@ -45,12 +64,17 @@ class Runner:
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Take up what an earlier server left, and begin."""
+        """Take up what an earlier server left, and begin; raises EnvironmentProblem beside seats of another version."""
+        if self.rows.shared:
+            self._seat.join()
         self.rows.recover()
         for number in range(self.settings.heavy_jobs):
             thread = threading.Thread(target=self._loop, name=f"jobs-{number}", daemon=True)
             thread.start()
             self._threads.append(thread)
+        if self.rows.shared:
+            self._threads.append(threading.Thread(target=self._beat, name="jobs-beat", daemon=True))
+            self._threads[-1].start()
 
     def stop(self) -> None:
         """End the running workers; their jobs wait in the queue for the next start."""
@@ -58,6 +82,19 @@ class Runner:
         self._wake.set()
         for thread in self._threads:
             thread.join()
+        if self._threads and self.rows.shared:
+            self._seat.leave()
+
+    @property
+    def busy(self) -> int:
+        """Jobs that run here."""
+        with self._lock:
+            return len(self._workers)
+
+    @property
+    def projects(self) -> frozenset[str]:
+        """Projects of the jobs, and of parts of others' jobs, that run here."""
+        return self._sharing.projects.union(project_id for project_id, _ in tuple(self._at.values()))
 
     def queued(self, job_id: int) -> None:
         """A job waits: show it, and look whether it can begin."""
@@ -83,41 +120,92 @@ class Runner:
 
     def _loop(self) -> None:
         unfinished: int | None = None  # a job whose end could not be written: a full disk, say
+        away: Unavailable | None = None  # why it has no end yet: what it needs is not there now
         while not self._stopping.is_set():
             job_id = unfinished
             try:
                 if unfinished is not None:
-                    self._end(unfinished, UNEXPECTED)
-                    unfinished = None
+                    if away is None or self._was_cancelled(unfinished):
+                        self._end(unfinished, UNEXPECTED)
+                    else:
+                        self.rows.give_back(unfinished, without_places(f"waits: {away.message}", self.settings))
+                    unfinished = away = None
                     continue
-                job_id = self.rows.claim() if self._has_memory() else None
+                takes = not self.draining and self._has_memory()
+                job_id = self.rows.claim() if takes else None
                 if job_id is None:
-                    self._wake.wait(1.0)
-                    self._wake.clear()
+                    if not (takes and self._sharing.help()):
+                        self._wake.wait(1.0)
+                        self._wake.clear()
                     continue
-                self._run(job_id)
-            except NotFound:
-                _log.warning("job %s was deleted with its project", job_id)
+                with self._tracer.start_as_current_span("job", attributes={"job": job_id, "seat": self.rows.owner}):
+                    self._run(job_id)
+                JOB.set(None)
+            except NotFound as error:  # deleted with its project, or taken up by another server
+                _log.warning("job %s: %s", job_id, error)
+                self._forget(job_id or 0)
                 unfinished = None
+            except Unavailable as error:  # rows or files
+                _log.warning("job %s: %s", job_id, error)
+                unfinished, away = job_id, error
+                self._stopping.wait(AWAY_S)
             except Exception:  # the edge of a job: whatever it was, the queue goes on
                 _log.exception("job %s", job_id)
-                unfinished = job_id
+                unfinished, away = job_id, None
                 self._stopping.wait(1.0)
+
+    def _beat(self) -> None:
+        """Live for the other servers, and hear of them."""
+        while not self._stopping.wait(self.settings.beat_s):
+            try:
+                with self._lock:
+                    running = dict(self._workers)
+                mine, self.draining = self.rows.beat(), self._seat.beat()
+                for job_id, worker in running.items():
+                    if mine.get(job_id, True):  # cancelled at another server, or lost to one
+                        self._stop(job_id, worker)
+                self.rows.recover()
+                for project_id, log in tuple(self._at.values()):
+                    if log is not None:
+                        self._files.keep_log(project_id, log)
+            except R2C2RError as error:  # the database is away: there is nothing else to do than to try again
+                _log.warning("sign of life: %s", error)
+
+    def _stop(self, job_id: int, worker: Worker) -> None:
+        """Stop the job if it is still this worker that runs it: what was queued again meanwhile goes on."""
+        with self._lock:
+            if self._workers.get(job_id) is worker:
+                self._cancelled.add(job_id)
+                worker.ask_to_stop()
 
     def _has_memory(self) -> bool:
         """Whether a job may start now; the one that is next says why it waits."""
-        free, needed = psutil.virtual_memory().available, self.settings.job_memory_bytes
+        free, needed = psutil.virtual_memory().available, self._compute.memory_bytes
         if free < needed:
             self.rows.next_waits(f"waits for memory: {free / 1e9:.1f} GB free, {needed / 1e9:.1f} GB needed")
         return free >= needed
 
     def _run(self, job_id: int) -> None:
+        JOB.set(job_id)
         try:
+            project_id = self.rows.project_of(job_id)
+            self._at[job_id] = project_id, None
+            holder = f"{self.rows.owner} {job_id} {secrets.token_hex(4)}"
+            self._sharing.end(project_id)
+            self._compute.ready(project_id, holder)
             steps, log = self.rows.begin(job_id, self.commands)
+            self._at[job_id] = project_id, log
             progress = JobProgress(steps)
             for number, step in enumerate(steps):
                 progress.at(number)
-                failure = self._run_step(job_id, step, progress, log)
+                about = {"job": job_id, "project": project_id}
+                with self._tracer.start_as_current_span(f"stage {step.stage}", attributes=about) as span:
+                    failure = self._run_stage(job_id, project_id, step, progress, log, holder)
+                    if failure is not None:
+                        span.set_status(StatusCode.ERROR, failure["message"])
+                self._compute.ended(project_id)
+                self._files.keep_log(project_id, log)
+                self._files.keep(project_id)
                 if failure is not None:
                     self._failed(job_id, failure)
                     return
@@ -126,17 +214,65 @@ class Runner:
             self.rows.finish(job_id)
             self._forget(job_id)
         except ServerStops:
-            self.rows.give_back(job_id)
+            self.rows.give_back(job_id, "waits for the server")
+        except Unavailable:
+            raise
         except (R2C2RError, OSError) as error:
             self._end(job_id, told(_said(error)))
+        finally:
+            self._at.pop(job_id, None)
 
-    def _run_step(self, job_id: int, step: Step, progress: JobProgress, log: Path) -> dict[str, Any] | None:
-        """Run one process; None when it did its work, else why not."""
-        worker = Worker(step.command, log)
+    def _run_stage(
+        self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path, holder: str
+    ) -> dict[str, Any] | None:
+        """Run a step, with other seats where that is sooner; None when it did its work, else why not."""
+        began, failure, complete = time.monotonic(), None, False
+        if self._sharing.is_worthwhile(step, step.objects):
+            failure, complete = self._share(job_id, project_id, step, progress, log, holder)
+        if failure is None and not complete:
+            failure = self._run_step(job_id, project_id, step, progress, log)[0]
+        self._ended(job_id, step.stage, failure, time.monotonic() - began)
+        return failure
+
+    def _share(
+        self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path, holder: str
+    ) -> tuple[dict[str, Any] | None, bool]:
+        """Have the step's objects computed at all seats that are free: why that ends it, if it does; whether all are done."""
+        progress.span = (0.0, PREPARED)
+        failure, last = self._run_step(job_id, project_id, step.of(()), progress, log)
+        left = last.get("left", ())
+        if failure is not None or not self._sharing.is_worthwhile(step, len(left)):
+            progress.span = (PREPARED, 1.0)
+            return failure, not left
+        progress.span = (PREPARED, SHARED)
+        stage = SharedStage(
+            job_id=job_id,
+            project_id=project_id,
+            step=step,
+            holder=holder,
+            log=log,
+            progress=progress,
+            store=partial(self._store, job_id, step, progress),
+            stop=lambda: self._stopping.is_set() or self._was_cancelled(job_id),
+        )
+        complete = self._sharing.share(stage, left)
+        progress.span = (SHARED, 1.0)
+        if self._was_cancelled(job_id) or self.rows.is_cancelling(job_id):
+            self._cancelled.add(job_id)
+            return {"kind": "Cancelled", "message": f"{step.stage}: cancelled", "hint": ""}, False
+        if self._stopping.is_set():
+            raise ServerStops
+        return None, complete
+
+    def _run_step(
+        self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path
+    ) -> tuple[dict[str, Any] | None, Line]:
+        """Run one process; None when it did its work, else why not, and its last word."""
+        worker = self._compute.start(job_id, project_id, step, log)
         with self._lock:
             self._workers[job_id] = worker
         try:
-            self.rows.began_step(job_id, step.stage, log, worker, progress.overall, progress.eta_s)
+            self.rows.began_step(job_id, step.stage, progress.fraction, log, worker, progress.overall, progress.eta_s)
             last = listen(
                 worker,
                 step.stage,
@@ -151,10 +287,15 @@ class Runner:
             status = worker.close(self.settings.kill_grace_s)
         if self._stopping.is_set() and not self._was_cancelled(job_id) and "done" not in last:
             raise ServerStops
-        return outcome(last, status, step.stage)
+        return outcome(last, status, step.stage), last
+
+    def _ended(self, job_id: int, stage: str, failure: dict[str, Any] | None, took_s: float) -> None:
+        ended = "done" if failure is None else "cancelled" if self._was_cancelled(job_id) else "failed"
+        self._stages.observe(took_s, stage, ended)
+        _log.info("stage %s: %s", stage, ended, extra={"stage": stage, "seconds": round(took_s, 2)})
 
     def _heard(self, job_id: int, step: Step, progress: JobProgress, fraction: float, words: str) -> None:
-        progress.fraction = fraction
+        progress.reached(fraction)
         if progress.is_due(STORE_EVERY_S):
             self._store(job_id, step, progress, words)
 

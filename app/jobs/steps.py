@@ -14,6 +14,7 @@ from r2c2r_core.limits import HOURS_VARIABLE
 POLL_S = 0.15
 STORE_EVERY_S = 0.5
 HEARTBEAT_S = 2.0
+SHORTEST_S = 0.1  # a step is a process: none takes less to start
 
 
 @dataclass(slots=True)
@@ -24,23 +25,44 @@ class JobProgress:
     began: float = field(default_factory=time.monotonic)
     at_step: int = 0
     fraction: float = 0.0  # of the step
+    span: tuple[float, float] = (0.0, 1.0)  # of the step, that the process at hand does
     stored: float = 0.0
 
     @property
     def overall(self) -> float:
         """Share of all steps that is done."""
-        weights = [step.weight for step in self.steps]
+        weights, _ = self._weights
         return (sum(weights[: self.at_step]) + weights[self.at_step] * self.fraction) / sum(weights)
 
     @property
     def eta_s(self) -> float | None:
-        """Seconds left if the rest goes like what is done; None while too little is."""
+        """Seconds left: what the rest took before in this project, or more if this job is slower; None while nothing tells.
+
+        A job that finds most of its work done gets through the first steps at once: its own pace alone would promise a rest
+        as fast, and the time left would rise.
+        """
+        weights, measured = self._weights
         elapsed, overall = time.monotonic() - self.began, self.overall
-        return round(elapsed * (1 - overall) / overall, 1) if overall > 0.02 and elapsed > 2 else None
+        before = sum(weights) * (1 - overall) if measured else None
+        paced = elapsed * (1 - overall) / overall if overall > 0.02 and elapsed > 2 else None
+        told = [seconds for seconds in (before, paced) if seconds is not None]
+        return round(max(told), 1) if told else None
+
+    @property
+    def _weights(self) -> tuple[list[float], bool]:
+        """Of all steps, and whether they are seconds that these took before."""
+        took = [max(step.took_s, SHORTEST_S) for step in self.steps if step.took_s is not None]
+        measured = len(took) == len(self.steps)
+        return took if measured else [step.weight for step in self.steps], measured
 
     def at(self, step: int) -> None:
         """The next step begins, and that is stored."""
-        self.at_step, self.fraction, self.stored = step, 0.0, time.monotonic()
+        self.at_step, self.fraction, self.span, self.stored = step, 0.0, (0.0, 1.0), time.monotonic()
+
+    def reached(self, fraction: float) -> None:
+        """How far the process at hand is with its part of the step."""
+        low, high = self.span
+        self.fraction = low + (high - low) * fraction
 
     def is_due(self, every_s: float) -> bool:
         """Whether it is time to store it again; then it counts as stored."""
