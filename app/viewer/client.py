@@ -86,6 +86,14 @@ class Viewer:
         """Put the object that is being moved somewhere; with None, where it is."""
         return self._ask_view(project, workdir, session, {"cmd": "place", "pose": pose})[1]
 
+    def picked(self, project: str, workdir: Path, session: str) -> dict[str, Any]:
+        """What the last click in the session's view was on."""
+        return self._ask_view(project, workdir, session, {"cmd": "picked"})[1]
+
+    def camera(self, project: str, workdir: Path, session: str) -> dict[str, Any]:
+        """Where the camera of the session's view stands, and what it looks at."""
+        return self._ask_view(project, workdir, session, {"cmd": "camera"})[1]
+
     def port(self, token: str, session: str) -> int:
         """The loopback port behind a token, its view started anew where it has stopped.
 

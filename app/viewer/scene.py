@@ -1,33 +1,37 @@
 """What a project's 3D view shows, read from its workspace. Runs in the viewer's process."""
 
-import warnings
-from dataclasses import dataclass, field
+import json
+from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from app.viewer import gizmo as handles
+from app.viewer import heat
+from app.viewer.assembly import Assembly, Draw, JointValue, Style, assemble, undressed
+from app.viewer.camera import AXES, USUAL_FOV, Lens, from_axis
+from app.viewer.clip import Span, clip_of, span_of
+from app.viewer.picking import Picked, first_of, nearest_point
 from app.viewer.reduced import MAX_FACES, reduced
 from r2c2r_core.errors import InputError
+from r2c2r_core.export.plan import facing
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.model.mesh import TexturedMesh
+from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.overrides import overrides_from
+from r2c2r_core.synthesize.corrected import corrected, differs
 from r2c2r_core.workspace import Workspace
 
+_PIN_M = 0.012  # of a comment
+_TAPE = (230, 60, 150)
+_ONE_RUN = float(np.cos(np.radians(15.0)))  # units that face within this are one run
+_AHEAD_M = 2.0  # what a photo's camera is turned about afterwards
 MAX_POINTS = 300_000
-_HALF_VIEW_RAD = np.radians(75.0 / 2)  # viser's field of view, upright
 POINTS_PER_NODE = 150_000  # one websocket frame each, so that the page stays alive while they arrive
-
-
-@dataclass(slots=True)
-class Joint:
-    """One joint of the shown scene."""
-
-    name: str
-    lower: float
-    upper: float
-    value: float
 
 
 @dataclass(slots=True)
@@ -38,45 +42,74 @@ class View:
     work: Workspace
     shown: list[Any] = field(default_factory=list)
     cloud: list[Any] = field(default_factory=list)
-    cloud_full: bool = False
-    urdf: Any = None
-    joints: list[Joint] = field(default_factory=list)
+    cloud_of: tuple[Any, ...] = ()  # which of its points are shown
+    assembly: Assembly | None = None
+    assembled: tuple[Any, ...] = ()  # what the assembly was made from
+    preview: list[str] = field(default_factory=list)  # names of its objects that are not shown as the last run made them
+    showing: int = 0  # a node that comes in the place of one of the same name keeps that one's text in the browser
     mode: str = ""
+    chosen: str = ""  # name of the object of the scene that is looked at
     text: str = ""
     full: bool = False  # every point and face was asked for
     reduced: bool = False  # fewer points or faces are shown than there are
     gizmo: handles.Gizmo | None = None
     known_capture: Any = None
+    known_tree: Any = None  # of the scan's points
     looked_at: tuple[Any, ...] = ()  # what the camera was turned to last
     steady: bool = False  # it stays where the person moved it
+    placed: list[tuple[str, np.ndarray, np.ndarray]] = field(default_factory=list)  # name, vertices and faces over the scan
+    picked: Picked = field(default_factory=Picked)
+    lens: Lens = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.lens = Lens(self.server)
+        self.server.scene.on_click()(self._pick)
 
     def show(self, wish: dict[str, Any]) -> None:
         """Replace what is shown. The camera is turned to what was not shown before, and to what `look` asks for."""
-        subject = (wish["mode"], wish.get("name"), wish.get("candidate"), wish.get("box") is not None)
+        of_scene = wish["mode"] == "scene"  # whichever object of it is chosen
+        subject = (wish["mode"], *(() if of_scene else (wish.get("name"), wish.get("candidate"), wish.get("box") is not None)))
         self.steady = subject == self.looked_at and wish.get("look") is None
-        values = {joint.name: joint.value for joint in self.joints} if subject == self.looked_at else {}
-        self._clear()
+        values = {joint.name: joint.value for joint in self.joints} if wish["mode"] == self.mode else {}
+        self._clear(keep_assembly=of_scene)
+        self.showing += 1
         self.full, self.reduced = bool(wish.get("full")), False
-        self._show_cloud(bool(wish.get("cloud", True)) or wish["mode"] == "cloud")
-        self.mode = wish["mode"]
-        self.text = _MODES[self.mode](self, wish)
+        self.lens.use(parallel=bool(wish.get("parallel")))
+        self.mode, self.chosen = wish["mode"], wish.get("name") or wish.get("made") or ""
+        wanted = (bool(wish.get("cloud", True)) and self.mode != "candidate") or self.mode == "cloud"
+        try:
+            self.text = _MODES[self.mode](self, wish | {"values": values})
+        finally:
+            self._show_cloud(wanted, wish.get("clip"))  # also where there is no scene yet
         for number, mark in enumerate(wish.get("marks", ())):
-            self._add_mark(f"/marks/{number}", mark)
-        whole = wish.get("look") == "scene" or not self.looked_at  # at first all of the scene
-        if wish.get("focus") and not whole:
+            self._add_mark(f"/marks/{self.showing}/{number}", mark)
+        self._add_tape(np.asarray(wish.get("tape") or (), dtype=np.float64).reshape(-1, 3))
+        if wish.get("focus") and wish.get("look") == "object":
             self._look_from_path(np.asarray(wish["focus"], dtype=np.float64), distance=0.6)
+        if wish.get("look") in AXES:
+            self._look(*from_axis(wish["look"], self._facing(), *self._bounds()))
+        if wish.get("look") == "run":
+            self._look(*from_axis("front", *self._run()))
+        if wish.get("look") == "photo" and wish.get("frame") is not None:
+            self._stand_where_filmed(wish["frame"])
+        if wish.get("camera"):
+            self.lens.stand(np.asarray(wish["camera"]["position"]), np.asarray(wish["camera"]["target"]))
         self.move({joint.name: values[joint.name] for joint in self.joints if joint.name in values})
         self.looked_at = subject
 
     def move(self, values: dict[str, float]) -> None:
         """Set joints, clamped to their limits; unknown names are refused."""
-        known = {joint.name: joint for joint in self.joints}
-        for name, value in values.items():
+        known = {joint.name for joint in self.joints}
+        for name in values:
             if name not in known:
                 raise InputError(f"the shown scene has no joint '{name[:60]}'", hint="show the scene first")
-            known[name].value = float(min(max(value, known[name].lower), known[name].upper))
-        if self.urdf is not None and self.joints:
-            self.urdf.update_cfg(np.array([joint.value for joint in self.joints]))
+        if self.assembly is not None:
+            self.assembly.move(values)
+
+    @property
+    def joints(self) -> list[JointValue]:
+        """Where the joints of the shown scene stand."""
+        return list(self.assembly.joints.values()) if self.assembly is not None else []
 
     def place(self, pose: np.ndarray) -> None:
         """Put what is being moved at a pose, world_from_object (4, 4)."""
@@ -89,36 +122,43 @@ class View:
         """Where what is being moved is, world_from_object; None when nothing is."""
         return self.gizmo.pose.matrix.tolist() if self.gizmo is not None else None
 
-    def _clear(self) -> None:
+    def _clear(self, *, keep_assembly: bool) -> None:
         for handle in self.shown:
             handle.remove()
         self.shown.clear()
+        self.placed.clear()
         if self.gizmo is not None:
             self.gizmo.remove()
             self.gizmo = None
-        if self.urdf is not None:
-            with warnings.catch_warnings(action="ignore"):  # it removes frames before the meshes that hang on them
-                self.urdf.remove()
-        self.urdf, self.joints = None, []
+        if self.assembly is not None and not keep_assembly:
+            self._disassemble()
 
-    def _show_cloud(self, wanted: bool) -> None:
-        if wanted and (not self.cloud or self.full != self.cloud_full):
+    def _disassemble(self) -> None:
+        if self.assembly is not None:
+            self.assembly.remove()
+        self.assembly, self.assembled, self.preview = None, (), []
+
+    def _show_cloud(self, wanted: bool, box: dict[str, Any] | None = None) -> None:
+        made_of = (self.full, json.dumps(box), self.mode == "scene" and self.assembled)
+        if wanted and (not self.cloud or (made_of if box else made_of[:2]) != self.cloud_of):
             for handle in self.cloud:
                 handle.remove()
-            self.cloud = self._add_cloud()
-            self.cloud_full = self.full
+            self.cloud = self._add_cloud(box)
+            self.cloud_of = made_of if box else made_of[:2]
         for handle in self.cloud:
             handle.visible = wanted
         self.reduced |= wanted and not self.full and len(self._capture().surface.vertices_world) > MAX_POINTS
 
-    def _add_cloud(self) -> list[Any]:
+    def _add_cloud(self, box: dict[str, Any] | None) -> list[Any]:
         surface = self._capture().surface
         order = np.random.default_rng(0).permutation(len(surface.vertices_world))
+        if box:
+            order = order[clip_of(self._span(), box["low"], box["high"]).keeps(surface.vertices_world[order])]
         order = order if self.full else order[:MAX_POINTS]
         size = max(surface.voxel_m, 0.004)
         return [
             self.server.scene.add_point_cloud(
-                f"/cloud/{start}",
+                f"/cloud/{self.showing}/{start}",
                 surface.vertices_world[part].astype(np.float32),
                 surface.colours[part],
                 point_size=size,
@@ -129,20 +169,39 @@ class View:
             for part in (order[start : start + POINTS_PER_NODE],)
         ]
 
+    def _span(self) -> Span:
+        """What a clip box cuts: the scene where one is shown, else most of the scan."""
+        if self.assembly is not None:
+            return self.assembly.span
+        low, high = self._bounds()
+        return span_of(self._facing(), [np.array([low, high, [low[0], high[1], low[2]], [high[0], low[1], high[2]]])])
+
+    @property
+    def span_m(self) -> list[float] | None:
+        """Width, depth and height of what a clip box cuts; None where there is nothing to cut."""
+        if self.mode not in ("scene", "cloud"):
+            return None
+        span = self._span()
+        return [float(side) for side in span.high - span.low]
+
+    def part_of(self, name: str | None) -> dict[str, list[float]] | None:
+        """What an object of the scene reaches, as shares of that; None where it is not there."""
+        found = self.assembly.parts.get(name or "") if self.assembly is not None else None
+        return {"low": found[0].tolist(), "high": found[1].tolist()} if found is not None else None
+
     def _show_scan(self, wish: dict[str, Any]) -> str:
         surface = self._capture().surface
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         low, high = np.percentile(surface.vertices_world, (5, 95), axis=0)
         self._look(positions.mean(axis=0), (low + high) / 2)
         count = len(surface.vertices_world)
-        return f"{min(count, MAX_POINTS) if not self.cloud_full else count} of {count} points of the scan"
+        return f"{count if self.full else min(count, MAX_POINTS)} of {count} points of the scan"
 
     def _show_candidate(self, wish: dict[str, Any]) -> str:
         asset = self._asset(wish)
         rotation = np.asarray(wish.get("rotation", np.eye(3)), dtype=np.float64)
         vertices = asset.mesh.vertices @ rotation.T
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        self._show_cloud(False)  # a candidate has its own frame: the scan means nothing beside it
         self.shown.append(self._add_mesh("/shown/0", asset.mesh, vertices, float(wish.get("opacity", 1.0))))
         radius = float(np.linalg.norm(vertices, axis=1).max())
         self._look(np.array([-0.5, -1.6, 0.6]) * 1.6 * radius, np.zeros(3))
@@ -168,6 +227,7 @@ class View:
                 self._add_mesh(f"{handles.NODE}/mesh", asset.mesh, local, opacity)
             else:
                 self.shown.append(self._add_mesh(f"/shown/{number}", asset.mesh, vertices, opacity))
+            self.placed.append((name, vertices, asset.mesh.faces))
             centres.append((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
         if not centres:
             raise InputError("nothing is placed yet", hint="run the project first")
@@ -175,29 +235,79 @@ class View:
         return f"{len(centres)} placed mesh{'es' if len(centres) > 1 else ''} over the scan"
 
     def _show_scene(self, wish: dict[str, Any]) -> str:
-        if not wish.get("bundle"):
-            raise InputError("there is no finished scene yet", hint="run the project first")
-        from viser.extras import ViserUrdf
+        """The newest scene, with what geometry shows of corrections that no run has seen yet."""
+        stage, scene = self._scene()
+        kind = json.dumps([wish.get(key) for key in ("corrections", "undressed", "draw", "full", "clip")])
+        made_from = (kind, self.work.noun_path(stage, "scene").stat().st_mtime_ns)
+        if made_from != self.assembled:
+            self._disassemble()
+            said = overrides_from({"objects": wish.get("corrections") or {}}, self.work.root / "overrides.json")
+            kept = [(item, self._corrected(item, said)) for item in scene.objects if not said.of(item.name).left_out]
+            gone = {item.name for item in scene.objects} - {item.name for item, _ in kept} | set(wish.get("undressed") or ())
+            self.preview = sorted(gone | {item.name for item, now in kept if differs(item, now)})
+            objects = tuple(now for _, now in kept)
+            shown = undressed(replace(scene, objects=objects), wish.get("undressed") or ())
+            style, root = self._style(wish), f"/scene/{self.showing}"
+            self.assembly = assemble(self.server, root, shown, style, self._add_fitted, wish["values"])
+            self.assembled = made_from
+        assert self.assembly is not None
+        self.assembly.hide(wish.get("hidden") or ())
+        self._look_at_all(*self.assembly.bounds)
+        return f"{len(self.joints)} joints" + (", colliders" if wish.get("draw") in ("colliders", "both") else "")
 
-        collision = bool(wish.get("collision"))
-        robot = _loaded(Path(wish["bundle"]) / "scene.urdf", collision)
-        self.urdf = ViserUrdf(
-            self.server, robot, root_node_name="/urdf", load_meshes=not collision, load_collision_meshes=collision
+    def _corrected(self, item: SceneObject, said: Overrides) -> SceneObject:
+        track: MaskTrack | None = self.work.load_latest("segment", item.name) if item.joints else None
+        return corrected(item, said.of(item.name), track.motions if track is not None else ())
+
+    def _style(self, wish: dict[str, Any]) -> Style:
+        draw: Draw = wish.get("draw") or "meshes"
+        box = wish.get("clip")
+        if draw in heat.HEATS and self.known_tree is None:
+            self.known_tree = cKDTree(self._capture().surface.vertices_world)
+        filmed = np.mean([frame.world_from_camera.translation for frame in self._capture().frames], axis=0)
+        middle = np.mean(self._capture().surface.vertices_world, axis=0)
+        return Style(
+            draw=draw,
+            clip=(box["low"], box["high"]) if box else None,
+            paint=partial(heat.colours, draw, self.known_tree) if draw in heat.HEATS else None,
+            ahead=(float(filmed[0] - middle[0]), float(filmed[1] - middle[1])),
         )
-        limits = self.urdf.get_actuated_joint_limits()
-        self.joints = [_joint(name, *limits[name]) for name in self.urdf.get_actuated_joint_names()]
-        self.move({})  # until the first configuration every joint stands at the origin
-        self._look_at_all(robot.collision_scene if collision else robot.scene)
-        return f"{len(self.joints)} joints" + (", colliders" if collision else "")
+
+    def _scene(self) -> tuple[str, ArticulatedScene]:
+        """The newest scene and its stage: what a run fitted, else what it built."""
+        for stage in ("warp", "synthesize"):
+            found: ArticulatedScene | None = self.work.load_latest(stage, "scene")
+            if found is not None:
+                return stage, found
+        raise InputError("there is no finished scene yet", hint="run the project first")
+
+    def _add_fitted(self, node: str, mesh: TexturedMesh) -> None:
+        self._add_mesh(node, mesh, mesh.vertices, 1.0)
 
     def _add_mark(self, node: str, mark: dict[str, Any]) -> None:
-        """A line or a word in the scene: joint axes, what the certificate found, what people said."""
+        """Lines or a word in the scene: joint axes, what the certificate found, what people said and where."""
         scene, colour = self.server.scene, tuple(mark.get("colour", (255, 225, 77)))
-        if mark.get("line"):
-            ends = np.asarray(mark["line"], dtype=np.float32)[None]
+        if mark.get("lines"):
+            ends = np.asarray(mark["lines"], dtype=np.float32)
             self.shown.append(scene.add_line_segments(f"{node}/line", ends, colour, thickness=0.008))
+        if mark.get("pin"):
+            self.shown.append(scene.add_icosphere(f"{node}/pin", radius=_PIN_M, color=colour, position=tuple(mark["at"])))
         if mark.get("text"):
             self.shown.append(scene.add_label(f"{node}/text", mark["text"], position=tuple(mark["at"])))
+
+    def _add_tape(self, points: np.ndarray) -> None:
+        """A tape from one point to another, with its length."""
+        scene = self.server.scene
+        for k, point in enumerate(points):
+            self.shown.append(
+                scene.add_icosphere(f"/tape/{self.showing}/{k}", radius=_PIN_M / 2, color=_TAPE, position=tuple(point))
+            )
+        if len(points) == 2:
+            self.shown.append(
+                scene.add_line_segments(f"/tape/{self.showing}/line", points[None].astype(np.float32), _TAPE, thickness=0.006)
+            )
+            length = f"{1000 * float(np.linalg.norm(points[1] - points[0])):.0f} mm"
+            self.shown.append(scene.add_label(f"/tape/{self.showing}/text", length, position=tuple(points.mean(axis=0))))
 
     def _asset(self, wish: dict[str, Any]) -> Any:
         found = self.work.load_latest("generate", wish["name"])
@@ -226,13 +336,12 @@ class View:
         _ = shown.vertex_normals  # without them every face is shaded flat
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 
-    def _look_at_all(self, scene: Any) -> None:
+    def _look_at_all(self, low: np.ndarray, high: np.ndarray) -> None:
         """From where the person who filmed stood, as far back as all of it takes."""
-        low, high = np.asarray(scene.bounds, dtype=np.float64)
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         back = positions.mean(axis=0) - (low + high) / 2
         away = max(float(np.linalg.norm(back)), 1e-6)
-        needed = float(np.linalg.norm(high - low)) / 2 / np.sin(_HALF_VIEW_RAD)
+        needed = float(np.linalg.norm(high - low)) / 2 / np.sin(USUAL_FOV / 2)
         self._look_from_path((low + high) / 2, distance=max(needed / away, 1.0))
 
     def _look_from_path(self, target: np.ndarray, distance: float = 1.15) -> None:
@@ -242,12 +351,53 @@ class View:
         self._look(target + distance * (start - target), target)
 
     def _look(self, position: np.ndarray, target: np.ndarray) -> None:
-        if self.steady:
-            return
-        place, aim = tuple(float(v) for v in position), tuple(float(v) for v in target)
-        self.server.initial_camera.position, self.server.initial_camera.look_at = place, aim
-        for client in self.server.get_clients().values():
-            client.camera.position, client.camera.look_at = place, aim
+        if not self.steady:
+            self.lens.look(position, target)
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner of what is shown: all of the scene, else most of the scan."""
+        if self.assembly is not None:
+            return self.assembly.bounds
+        low, high = np.percentile(self._capture().surface.vertices_world, (2, 98), axis=0)
+        return low, high
+
+    def _facing(self) -> np.ndarray:
+        """Where the fronts face; without any that open, to where the person who filmed stood."""
+        found = facing(self.assembly.plan) if self.assembly is not None else None
+        low, high = self._bounds()
+        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
+        return found if found is not None else positions.mean(axis=0) - (low + high) / 2
+
+    def _run(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the chosen object's front faces, and the corners of all whose fronts face there; all of it without one."""
+        bodies = self.assembly.plan.bodies if self.assembly is not None else ()
+        ahead = next((-b.world_from_body.rotation[:, 1] for b in bodies if b.object_name == self.chosen), None)
+        if self.assembly is None or ahead is None:
+            return self._facing(), *self._bounds()
+        facing_there = {b.object_name for b in bodies if -b.world_from_body.rotation[:, 1] @ ahead > _ONE_RUN}
+        return ahead, *self.assembly.bounds_of(facing_there)
+
+    def _stand_where_filmed(self, index: int) -> None:
+        """Where a photo was taken from, with its lens, upright."""
+        frame = next((frame for frame in self._capture().frames if frame.index == index), None)
+        if frame is None:
+            raise InputError(f"the recording has no frame {index}", hint="choose a photo of the object first")
+        pose, camera = frame.world_from_camera, frame.rgb_camera
+        upright = abs(pose.rotation[2, 1]) > abs(pose.rotation[2, 0])  # else the phone was held on its side
+        half = camera.height / 2 / camera.fy if upright else camera.width / 2 / camera.fx
+        self.lens.stand(pose.translation, pose.translation + _AHEAD_M * pose.rotation[:, 2], 2 * float(np.arctan(half)))
+
+    def _pick(self, event: Any) -> None:
+        """What is under a click: an object, or where nothing but the scan is, its nearest point."""
+        origin, direction = np.array(event.ray_origin, dtype=np.float64), np.array(event.ray_direction, dtype=np.float64)
+        hit = self.assembly.hit(origin, direction) if self.assembly is not None else first_of(self.placed, origin, direction)
+        if hit is None and self.cloud and self.cloud[0].visible:
+            hit = nearest_point(self._capture().surface.vertices_world, origin, direction)
+        self.picked = Picked(
+            number=self.picked.number + 1,
+            name=hit.name if hit else "",
+            point=hit.point_world.tolist() if hit else None,
+        )
 
     def _capture(self) -> Any:
         if self.known_capture is None:
@@ -255,32 +405,6 @@ class View:
             if self.known_capture is None:
                 raise InputError("the recording has not been read yet", hint="wait for the import")
         return self.known_capture
-
-
-def _loaded(path: Path, collision: bool) -> Any:
-    """The URDF, its textures as dull as they are: without a word about metal, GLB means all metal, which is drawn dark."""
-    import trimesh
-    import yourdfpy
-
-    robot = yourdfpy.URDF.load(
-        str(path),
-        build_scene_graph=not collision,
-        load_meshes=not collision,
-        build_collision_scene_graph=collision,
-        load_collision_meshes=collision,
-        filename_handler=partial(yourdfpy.filename_handler_magic, dir=str(path.parent)),
-    )
-    for shape in (robot.collision_scene if collision else robot.scene).geometry.values():
-        image = getattr(getattr(shape.visual, "material", None), "image", None)
-        if image is not None:
-            dull = trimesh.visual.material.PBRMaterial(baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.9)
-            shape.visual = trimesh.visual.TextureVisuals(uv=shape.visual.uv, material=dull)
-    return robot
-
-
-def _joint(name: str, lower: float | None, upper: float | None) -> Joint:
-    low, high = lower if lower is not None else 0.0, upper if upper is not None else np.pi
-    return Joint(name, float(low), float(high), float(min(max(0.0, low), high)))
 
 
 _MODES = {"cloud": View._show_scan, "candidate": View._show_candidate, "aligned": View._show_aligned, "scene": View._show_scene}

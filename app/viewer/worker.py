@@ -1,7 +1,7 @@
 """The viewer's process: `python -m app.viewer.worker`, one viser server per open view, commanded by JSON lines.
 
-Reads {"id", "cmd": "open" | "show" | "joints" | "place" | "close", "view", …} and prints {"id", "ok": {…}}
-or {"id", "error": {…}}. The first line is the key that the app's proxy will show. End of input ends it.
+Reads {"id", "cmd": "open" | "show" | "joints" | "place" | "picked" | "camera" | "close", "view", …} and prints
+{"id", "ok": {…}} or {"id", "error": {…}}. The first line is the key that the app's proxy will show. End of input ends it.
 """
 
 import json
@@ -77,6 +77,15 @@ def _place(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[st
     return {"pose": view.pose}
 
 
+def _picked(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    return asdict(_view(views, command).picked)
+
+
+def _camera(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
+    position, target = _view(views, command).lens.pose
+    return {"position": position, "target": target}
+
+
 def _close(views: dict[str, View], key: str, command: dict[str, Any]) -> dict[str, Any]:
     view = views.pop(command["view"], None)
     if view is not None:
@@ -92,12 +101,14 @@ def _view(views: dict[str, View], command: dict[str, Any]) -> View:
 
 def _state(view: View) -> dict[str, Any]:
     joints = [asdict(joint) for joint in view.joints]
-    return {"mode": view.mode, "text": view.text, "reduced": view.reduced, "joints": joints}
+    shown = {"mode": view.mode, "text": view.text, "reduced": view.reduced, "joints": joints, "preview": view.preview}
+    return shown | {"span_m": view.span_m, "part": view.part_of(view.chosen)}
 
 
 def _prepared(server: Any) -> Any:
     server.scene.set_up_direction("+z")
     server.scene.configure_default_lights(cast_shadow=False)
+    server.initial_camera.position = server.initial_camera.position  # said: otherwise each page has a place of its own
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     return server
@@ -108,6 +119,8 @@ _COMMANDS: dict[str, Callable[[dict[str, View], str, dict[str, Any]], dict[str, 
     "show": _show,
     "joints": _joints,
     "place": _place,
+    "picked": _picked,
+    "camera": _camera,
     "close": _close,
 }
 
