@@ -27,6 +27,8 @@ def check_archive(path: Path, name: str, *, max_bytes: int, max_files: int) -> N
             members = archive.infolist()
     except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError, OverflowError) as error:
         raise CaptureError(f"{name} is damaged or cut short ({error})", hint="copy it from the phone again") from error
+    if members and min(member.header_offset for member in members) > 0:  # the end is that of a zip inside it
+        raise CaptureError(f"{name} is cut short: its table of contents is missing", hint="copy it again")
     _refuse_unsafe(members, path.stat().st_size, max_bytes, max_files)
 
 

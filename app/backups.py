@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.db.moving import copy_rows
 from app.db.sqlite import copy_database
 from app.db.usable import require_usable
 from app.errors import Conflict
@@ -38,18 +39,16 @@ def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> Move
     settings, target = Settings(data_dir=resolved(data_dir)), target.expanduser().absolute()
     if target.exists():
         raise InputError(f"{target}: is there already", hint="choose a new name: backups are never written over")
-    if not settings.database.is_file():
-        raise InputError(f"{settings.database}: no such file", hint="name the data folder: r2c2r backup DATA -o OUT")
-    require_usable(settings.database)
+    size = _require_rows(settings)
     only_database = target.suffix == ".db"
     files = 0 if only_database else folder_bytes(_projects(settings))
-    require_free(target.parent, settings.database.stat().st_size + files, settings.min_free_bytes)
+    require_free(target.parent, size + files, settings.min_free_bytes)
     progress.at(0.0, "copying the database")
     if only_database:
-        copy_database(settings.database, target)
+        copy_rows(settings, target)
         return Moved(target.stat().st_size, 0, 0, 0)
     part = target.with_name(f".{target.name}.part")
-    copy_database(settings.database, part / DATABASE)  # first: what it names is there, for files come before their rows
+    copy_rows(settings, part / DATABASE)  # first: what it names is there, for files come before their rows
     moved = _copy_missing(_projects(settings), part / "projects", files, progress.part(0.1, 1.0))
     part.rename(target)
     return Moved((target / DATABASE).stat().st_size, *moved)
@@ -66,6 +65,8 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Mov
         raise InputError(f"{database}: no such file", hint="name a .db file or a folder that r2c2r backup made")
     if database.resolve() == settings.database:
         raise Conflict(f"{database}: that is the database itself", hint="name a backup")
+    if settings.postgres:
+        raise Conflict("the rows are in a Postgres", hint=f"r2c2r db restore {database}, and copy the folder projects/")
     require_usable(database, to_write=False)
     keep_private(settings.data_dir, DATABASE)
     with only_server(settings.data_dir):
@@ -80,6 +81,16 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Mov
         if source.is_dir():
             moved = _copy_missing(source / "projects", _projects(settings), files, progress.part(0.1, 1.0))
     return Moved(settings.database.stat().st_size, *moved)
+
+
+def _require_rows(settings: Settings) -> int:
+    """Bytes that the database file takes, 0 for a Postgres; raises InputError where there is none."""
+    if settings.postgres:
+        return 0
+    if not settings.database.is_file():
+        raise InputError(f"{settings.database}: no such file", hint="name the data folder: r2c2r backup DATA -o OUT")
+    require_usable(settings.database)
+    return settings.database.stat().st_size
 
 
 def _projects(settings: Settings) -> Path:

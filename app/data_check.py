@@ -41,6 +41,8 @@ def check_data(data_dir: Path, *, progress: Progress = SILENT) -> list[DataFindi
     Raises InputError where there is no data folder or no database in it, DatabaseUnusable for one that cannot be read.
     """
     settings = Settings(data_dir=resolved(data_dir))
+    if settings.postgres:  # a file beside it would be of before the rows were moved
+        raise InputError("the rows are in a Postgres, and check-data looks into a file", hint="r2c2r db check")
     if not settings.data_dir.is_dir():
         raise InputError(f"{data_dir}: no such folder", hint="name the data folder")
     revision = require_usable(settings.database, to_write=False)

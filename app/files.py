@@ -83,6 +83,11 @@ class ProjectFiles:
         return self.root / "bundles"
 
     @property
+    def variants(self) -> Path:
+        """Variants of bundles, a folder each."""
+        return self.root / "variants"
+
+    @property
     def finished_prompts(self) -> Path:
         """The clicks that the masks in the workspace were made from."""
         return self.root / "finished-prompts.json"
@@ -95,6 +100,11 @@ class ProjectFiles:
     def requests(self) -> Path:
         """What its jobs were given, a folder each."""
         return self.root / "requests"
+
+    def here(self, path: str) -> Path:
+        """Where a file is that a machine named by a path of its own: what it had in this project's folder is in this one."""
+        _, in_project, below = path.partition(f"/projects/{self.root.name}/")
+        return self.root / below if in_project else Path(path)
 
     def write(self, path: Path, content: bytes) -> None:
         """Write a file below the project's folder; raises NotFound where the project was deleted meanwhile.
@@ -117,6 +127,11 @@ class ProjectFiles:
         return self.root / "frames.json"
 
     @property
+    def awaited_frames(self) -> Path:
+        """The frames of the recording that an imported project was made from (awaited-frames.json): no other may be read."""
+        return self.root / "awaited-frames.json"
+
+    @property
     def facts(self) -> Path:
         """What the recording is (facts.json), written when it was read."""
         return self.root / "facts.json"
@@ -125,6 +140,28 @@ class ProjectFiles:
     def scan_pictures(self) -> tuple[Path, ...]:
         """Pictures of the fused scan that there may be."""
         return tuple(self.root.glob("scan-*.png"))
+
+
+@dataclass(frozen=True, slots=True)
+class VariantFiles:
+    """Variants of one bundle that were made together; they are whole once there are facts."""
+
+    folder: Path
+
+    @property
+    def archive(self) -> Path:
+        """All of them, as `r2c2r vary` makes them."""
+        return self.folder / "variants.zip"
+
+    @property
+    def wall(self) -> Path:
+        """The first of them, as a picture."""
+        return self.folder / "wall.jpg"
+
+    @property
+    def facts(self) -> Path:
+        """How many of which seed, and what was found of them."""
+        return self.folder / "facts.json"
 
 
 def project_files(data_dir: Path, project_id: str, work: str | None = None) -> ProjectFiles:

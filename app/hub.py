@@ -1,6 +1,8 @@
 """What happened, told to every open tab: numbered messages in memory, so that a tab that was away can catch up.
 
 A message is encoded once, in ASCII: whatever is in it, no tab's connection can fail of it. What is kept is bounded by bytes.
+Where several servers share a database each has a hub with numbers of its own: what is published at one is carried to the
+others (app.db.channel), and they `hear` it.
 """
 
 import asyncio
@@ -8,13 +10,15 @@ import json
 import secrets
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 KEPT_BYTES = 16 * 1024 * 1024  # of messages, for tabs that were away; a mask is some kilobytes
 WAITING_BYTES = 8 * 1024 * 1024  # of messages waiting for one tab
 PRESENCE_S = 0.2  # who is here is told at most this often: 300 tabs that come at once are a few messages each
+
+Presences = dict[str, list[dict[str, Any]]]  # by project: its tabs' people
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +70,12 @@ class Listener:
 
 @dataclass(slots=True)
 class Hub:
-    """Safe to publish to from any thread; tabs join, move and leave on their event loop."""
+    """Safe to publish to from any thread; tabs join, move and leave on their event loop.
 
+    `carry` takes what other servers are to hear: of which kind, and what.
+    """
+
+    carry: Callable[[str, dict[str, Any]], None] = lambda kind, said: None
     epoch: str = field(default_factory=lambda: secrets.token_hex(8))
     _seq: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -76,18 +84,37 @@ class Hub:
     _recent_bytes: int = 0
     _told: dict[tuple[str, int], int] = field(default_factory=dict)  # versions, by what they are of
     _presence_due: set[str] = field(default_factory=set)  # projects whose people will be told who is here
+    _elsewhere: dict[str, Presences] = field(default_factory=dict)  # by server
 
     def publish(self, type: str, project: str | None, **content: Any) -> None:
-        """Number the message, remember it, hand it to every tab that wants it."""
-        with self._lock:
-            self._publish(type, project, content)
+        """Number the message, remember it, hand it to every tab that wants it, here and at other servers."""
+        self.hear(type, project, content)
+        self.carry("message", {"type": type, "project": project, "content": content})
 
     def publish_state(self, type: str, project: str, number: int, version: int, **content: Any) -> None:
         """The same of how a row is by now; nothing once a newer version of it was told: who stored first may come second."""
+        self.hear(type, project, content, (number, version))
+        self.carry("message", {"type": type, "project": project, "content": content, "state": (number, version)})
+
+    def hear(self, type: str, project: str | None, content: dict[str, Any], state: Sequence[int] | None = None) -> None:
+        """Tell the tabs here; `state` is the number and the version of the row it is about."""
         with self._lock:
-            if version >= self._told.get((type, number), version):
+            if state is not None:
+                number, version = state
+                if version < self._told.get((type, number), version):
+                    return
                 self._told[type, number] = version
-                self._publish(type, project, content)
+            self._publish(type, project, content)
+
+    def start_anew(self) -> None:
+        """Messages were lost: every tab is told to fetch everything anew."""
+        with self._lock:
+            self.epoch = secrets.token_hex(8)
+            self._recent.clear()
+            self._recent_bytes = 0
+            for listener in tuple(self._listeners):
+                hello = {"epoch": self.epoch, "reset": True, "tab": listener.tab}
+                self._hand(listener, self._message("hello", listener.project, hello))
 
     def tell(self, listener: Listener, type: str, **content: Any) -> None:
         """Say something to one tab alone; it is not remembered."""
@@ -128,10 +155,10 @@ class Hub:
         for told in {before, project}:
             self._people_changed(told)
 
-    def show_out(self, project: str) -> None:
+    def show_out(self, project: str, why: str = "is kept to its members now") -> None:
         """Tell the tabs at the project whose person does not see it any more: what they show is not theirs to see."""
         with self._lock:
-            gone = self._message("gone", project, {"why": "is kept to its members now"})
+            gone = self._message("gone", project, {"why": why})
             for listener in tuple(self._listeners):
                 if listener.project == project and not listener.sees(project):
                     self._hand(listener, gone)
@@ -139,12 +166,39 @@ class Hub:
     def watched(self, project: str) -> bool:
         """Whether any tab looks at the project."""
         with self._lock:
-            return any(listener.project == project for listener in self._listeners)
+            here = any(listener.project == project for listener in self._listeners)
+            return here or any(projects.get(project) for projects in self._elsewhere.values())
+
+    @property
+    def presences(self) -> Presences:
+        """Who is at which project, of the tabs of this server."""
+        with self._lock:
+            return self._presences()
+
+    def hear_presence(self, server: str, project: str, people: list[dict[str, Any]]) -> None:
+        """Another server's tabs at one project."""
+        self.hear_presences(server, {**self._elsewhere.get(server, {}), project: people})
+
+    def hear_presences(self, server: str, presences: Presences) -> None:
+        """All that another server's tabs are at; nothing, where it is gone."""
+        with self._lock:
+            before = self._elsewhere.pop(server, {})
+            if presences:
+                self._elsewhere[server] = presences
+            for project in before.keys() | presences.keys():
+                if before.get(project) != presences.get(project):
+                    self._tell_who_is_at(project)
 
     def tabs_of(self, who: str) -> int:
         """How many tabs of a person are connected."""
         with self._lock:
             return sum(listener.who == who for listener in self._listeners)
+
+    @property
+    def tabs(self) -> int:
+        """How many tabs are connected."""
+        with self._lock:
+            return len(self._listeners)
 
     @property
     def seq(self) -> int:
@@ -173,17 +227,31 @@ class Hub:
         """Tell everybody at the project who is there, once for all changes of a moment."""
         if project is not None and project not in self._presence_due:
             self._presence_due.add(project)
-            asyncio.get_running_loop().call_later(PRESENCE_S, self._tell_who_is_here, project)
+            asyncio.get_running_loop().call_later(PRESENCE_S, self._tell_presence, project)
 
-    def _tell_who_is_here(self, project: str) -> None:
-        """Presence is a state, not an event: it is told as it is now, and never told again to a tab that was away."""
+    def _tell_presence(self, project: str) -> None:
         self._presence_due.discard(project)
         with self._lock:
-            here = [each for each in self._listeners if each.who and each.project == project and each.sees(project)]
-            people = [{"tab": each.tab, "who": each.who, "page": each.page, "object": each.object} for each in here]
-            message = self._message("presence", project, {"people": people})
-            for listener in here:
+            self._tell_who_is_at(project)
+            people = self._presences().get(project, [])
+        self.carry("presence", {"project": project, "people": people})
+
+    def _tell_who_is_at(self, project: str) -> None:
+        """Presence is a state, not an event: it is told as it is now, and never told again to a tab that was away."""
+        everywhere = (self._presences(), *self._elsewhere.values())
+        people = [person for presences in everywhere for person in presences.get(project, [])]
+        message = self._message("presence", project, {"people": people})
+        for listener in tuple(self._listeners):
+            if listener.who and listener.project == project and listener.sees(project):
                 self._hand(listener, message)
+
+    def _presences(self) -> Presences:
+        found: Presences = {}
+        for each in self._listeners:
+            if each.who and each.project is not None and each.sees(each.project):
+                person = {"tab": each.tab, "who": each.who, "page": each.page, "object": each.object}
+                found.setdefault(each.project, []).append(person)
+        return found
 
     def _missed(self, since: int | None, epoch: str | None) -> tuple[list[Message], bool]:
         if since is None or not epoch:  # its first visit: there is nothing it could have missed

@@ -10,53 +10,76 @@ import anyio
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from opentelemetry.trace import TracerProvider
 from starlette.exceptions import HTTPException
 
 from app import errors, schemas
+from app.db.channel import Channel, join_hubs
 from app.db.engine import open_engine
 from app.gates import Gates
 from app.hub import Hub
+from app.jobs.far import FarWorkers
 from app.jobs.live import LiveSegmenters
 from app.jobs.outcomes import FINISHERS, job_ended
 from app.jobs.plans import Commands, commands_of
 from app.jobs.rows import JobRows
 from app.jobs.runner import Runner
+from app.metrics import Metrics
 from app.privacy import without_places
 from app.process import Workers
 from app.routes import (
     elevations,
+    health,
+    honeypots,
+    inbox,
     jobs,
+    lengths,
     live,
     media,
     members,
+    opinions,
     pages,
     people,
     projects,
     prompts,
     proposals,
+    providers,
     reviews,
     scenes,
+    seats,
     states,
     system,
+    templates,
+    tokens,
+    trash,
     unknown,
     uploads,
+    variants,
     viewer,
+    webhooks,
 )
 from app.routes.addresses import Addresses
+from app.routes.fetched import Fetched
+from app.routes.measured import Measured
 from app.routes.members import MembersOnly
 from app.routes.once import Once
 from app.routes.packed import Packed
 from app.routes.static import PageFiles
-from app.security import Guard, Person
+from app.security import BehindProxies, Guard, Person
 from app.services import leftovers, masks, sending, sizes
 from app.services.access import Access
 from app.services.at_work import AtWork
 from app.services.context import Context
+from app.services.crossing import hear_others
 from app.services.descriptions import Descriptions
+from app.services.oidc import Provider
 from app.services.people import People
+from app.services.posting import Posting
 from app.services.prompts import segment_again, tell_object
 from app.services.uploads import forget_stopped
 from app.settings import MEBIBYTE, Settings, shipped
+from app.store.opening import open_store
+from app.traces import of_requests, open_traces
 from app.viewer.client import Viewer
 from r2c2r_core.errors import R2C2RError
 
@@ -65,34 +88,53 @@ _log = logging.getLogger(__name__)
 TIDY_S = 30.0
 MOST_BODY_BYTES = 16 * MEBIBYTE  # of what is read at once; routes that store a stream count its bytes themselves
 ROUTERS = (
+    health,
     system,
     people,
+    tokens,
+    webhooks,
     projects,
+    templates,
     members,
     uploads,
     prompts,
     elevations,
     proposals,
     jobs,
+    seats,
     reviews,
     states,
+    honeypots,
+    opinions,
+    lengths,
+    inbox,
     scenes,
+    variants,
     media,
     viewer,
     live,
+    trash,
     unknown,
+    providers,
     pages,
 )
 STATUS_KINDS = {404: "not-found", 405: "method-not-allowed", 413: "too-large", 422: "invalid"}
 
 
-def create_app(settings: Settings, *, commands: Commands | None = None, viewer_client: Viewer | None = None) -> FastAPI:
-    """The app; `commands` and `viewer_client` are other processes in the place of the real ones, for tests."""
-    static = shipped("static", "index.html")
+def create_app(
+    settings: Settings,
+    *,
+    commands: Commands | None = None,
+    viewer_client: Viewer | None = None,
+    traces: TracerProvider | None = None,
+) -> FastAPI:
+    """The app; what else is given stands in the place of the real processes and of the collector of traces, for tests."""
+    static, metrics, traces = shipped("static", "index.html"), Metrics(), traces or open_traces(settings.traces)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        context = await anyio.to_thread.run_sync(_open, settings, commands or commands_of(settings), viewer_client)
+        chosen = commands or commands_of(settings)
+        context = await anyio.to_thread.run_sync(_open, settings, chosen, viewer_client, metrics, traces)
         app.state.context = context
         tidying = asyncio.create_task(_tidy(context))
         try:
@@ -110,6 +152,7 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
         redoc_url=None,
         openapi_url="/api/openapi.json",
         max_body_size=MOST_BODY_BYTES,
+        telemetry=of_requests(traces),
         responses={code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422, 429)},
     )
     for module in ROUTERS:
@@ -117,46 +160,73 @@ def create_app(settings: Settings, *, commands: Commands | None = None, viewer_c
     app.mount("/static", PageFiles(directory=static), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
+    if settings.store:
+        app.add_middleware(Fetched, context_of=lambda: app.state.context)
     app.add_middleware(Addresses)
     app.add_middleware(Once, context_of=lambda: app.state.context)
     app.add_middleware(MembersOnly, context_of=lambda: app.state.context)
     app.add_middleware(Packed)
-    app.add_middleware(Guard, person_of=lambda session: _person_of(app, session), allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(
+        Guard,
+        person_of=lambda session: _people(app).of(session),
+        allowed_hosts=settings.allowed_hosts,
+        named_in=settings.identity_header,
+        session_of=lambda name, client: _people(app).named_by_proxy(name, client),
+    )
+    app.add_middleware(Measured, metrics=metrics)
+    if settings.trusted_proxies:
+        app.add_middleware(BehindProxies, trusted=settings.trusted_proxies)
     return app
 
 
-def _open(settings: Settings, commands: Commands, viewer_client: Viewer | None) -> Context:
+def _open(
+    settings: Settings, commands: Commands, viewer_client: Viewer | None, metrics: Metrics, traces: TracerProvider
+) -> Context:
     """Everything that runs: the database, the queue, the live segmenters, the viewer."""
-    engine, hub, gates = open_engine(settings.database), Hub(), Gates()
-    runner = Runner(JobRows(engine, hub, settings, FINISHERS, job_ended), settings, commands)
+    engine, hub, gates, store = open_engine(settings.rows), Hub(), Gates(), open_store(settings)
+    rows = JobRows(engine, hub, settings, store, FINISHERS, job_ended)
+    runner = Runner(rows, settings, commands, metrics.stages, traces)
     context = Context(
         settings=settings,
         engine=engine,
         hub=hub,
+        channel=Channel(engine, rows.owner, settings.beat_s) if rows.shared else None,
+        store=store,
         people=People(engine, settings, gates.passwords),
         access=Access(engine),
         uploads=AtWork(),
         descriptions=Descriptions(engine, settings),
+        posting=Posting(engine, settings),
         person=Person(settings.user, "admin"),
         runner=runner,
-        live=LiveSegmenters(engine, hub, settings, commands),
+        live=LiveSegmenters(engine, hub, settings, commands, store),
         viewer=viewer_client or Viewer(settings),
         gates=gates,
         probes=Workers(),
+        metrics=metrics,
+        provider=Provider(settings) if settings.identity_issuer else None,
         static=shipped("static", "index.html"),
     )
     context.descriptions.start()
+    context.posting.start()
     context.live.on_object = lambda project, number: _tell(context, project, number)
     context.live.on_again = lambda project, number, key, others: _again(context, project, number, key, others)
+    if context.channel is not None:
+        join_hubs(context.channel, hub)
+        hear_others(context, context.channel)
+        context.live.far = FarWorkers(context.channel).start
     if settings.run_jobs:
         runner.start()
+    if context.channel is not None:
+        context.channel.start()
+    if settings.run_jobs:
         masks.resume(context)
     return context
 
 
-async def _person_of(app: FastAPI, session: str) -> Person | None:
+def _people(app: FastAPI) -> People:
     context: Context = app.state.context
-    return await context.people.of(session)
+    return context.people
 
 
 async def _tidy(context: Context) -> None:
@@ -167,6 +237,8 @@ async def _tidy(context: Context) -> None:
         for tidy in TIDYING:
             try:
                 await anyio.to_thread.run_sync(tidy, context, limiter=thread)
+            except errors.Unavailable as error:
+                _log.warning("tidying: %s", error)
             except Exception:  # a full disk or a locked database now must not end tidying for good
                 _log.exception("tidying")
 
@@ -183,12 +255,17 @@ def _forget_ended(context: Context) -> None:
     context.people.forget_ended()
 
 
+def _tidy_store(context: Context) -> None:
+    context.store.tidy(context.runner.projects | context.live.projects)
+
+
 TIDYING = (
     _close_idle_views,
     _look_at_members,
     _forget_ended,
     forget_stopped,
     leftovers.tidy,
+    _tidy_store,
     sending.tidy,
     sizes.measure,
 )
@@ -225,6 +302,9 @@ def _close(context: Context) -> None:
     _end_waits(context)
     context.live.stop()
     context.runner.stop()
+    if context.channel is not None:
+        context.channel.stop()
+    context.posting.stop()
     context.descriptions.stop()
     context.engine.dispose()
 

@@ -5,23 +5,29 @@ database knows (app.services.people), so a restart keeps people in and signing o
 """
 
 import json
-from collections.abc import Awaitable, Callable
+import logging
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 from urllib.parse import parse_qs, quote, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import cookie_parser
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from app.errors import body, kind_of
 from r2c2r_core.errors import R2C2RError
 
+_log = logging.getLogger(__name__)
+
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
-OPEN_PATHS = ("/api/health", "/api/login", "/login", "/static/", "/favicon.ico")
+OPEN_PATHS = ("/healthz", "/readyz", "/api/health", "/api/login", "/login", "/static/", "/favicon.ico")
 Role = Literal["annotator", "reviewer", "admin"]
+TokenScope = Literal["metrics", "read", "annotator", "reviewer", "admin"]  # how far a token reaches
 Refusal = tuple[int, str, str, str]  # status, kind, message, hint
 ROLES: tuple[Role, ...] = ("annotator", "reviewer", "admin")  # each may do what those before it may
+TOKEN_PREFIX = "r2c2r_"  # by it a token is known where it was left by mistake
 TLS_POLICY = "max-age=31536000"  # a year: a browser that came by TLS never again comes without
 FEATURE_POLICY = "camera=(), microphone=(), geolocation=(), payment=(), usb=(), serial=(), bluetooth=(), display-capture=()"
 PAGE_POLICY = (
@@ -39,6 +45,7 @@ class Person:
     name: str
     role: Role
     account: bool = False  # named; else whoever started the server
+    scope: TokenScope | None = None  # of the token by which a program acts for the person
 
     def may(self, needed: Role) -> bool:
         """Whether this person's role reaches as far as the needed one."""
@@ -46,9 +53,12 @@ class Person:
 
 
 def cookie_name(scope: Scope) -> str:
-    """What the session's cookie is called: browsers send a host's cookies to each of its ports, so it says which is ours."""
-    server = scope.get("server")
-    return f"r2c2r_session_{server[1]}" if server else "r2c2r_session"
+    """What the session's cookie is called: browsers send a host's cookies to each of its ports, so it says which is ours.
+
+    That is the port which the browser sees: servers behind one address share its sessions, whichever they listen on.
+    """
+    port = Headers(scope=scope).get("host", "").rpartition(":")[2]
+    return f"r2c2r_session_{port}" if port.isdecimal() else "r2c2r_session"
 
 
 def session_in(scope: Scope, cookie_header: str) -> str:
@@ -58,13 +68,32 @@ def session_in(scope: Scope, cookie_header: str) -> str:
     )  # other apps of this machine may have set anything beside it
 
 
+class BehindProxies:
+    """Believes trusted proxies of who connects, and whether by TLS; notes that it was one of them, before it is forgotten."""
+
+    def __init__(self, app: ASGIApp, trusted: Sequence[str]) -> None:
+        self.believing: Any = ProxyHeadersMiddleware(app, list(trusted))  # type: ignore[arg-type]  # uvicorn's name of the type
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass it on as the proxy tells it."""
+        peer = scope.get("client")
+        scope.setdefault("state", {})["proxied"] = peer is not None and peer[0] in self.believing.trusted_hosts
+        await self.believing(scope, receive, send)
+
+
 class Guard:
-    """The middleware."""
+    """The middleware. `session_of` is that of whom a trusted proxy names in the header `named_in`, from an address."""
 
     def __init__(
-        self, app: ASGIApp, person_of: Callable[[str], Awaitable[Person | None]], allowed_hosts: tuple[str, ...]
+        self,
+        app: ASGIApp,
+        person_of: Callable[[str], Awaitable[Person | None]],
+        allowed_hosts: tuple[str, ...],
+        named_in: str,
+        session_of: Callable[[str, str], Awaitable[str]],
     ) -> None:
         self.app, self.person_of, self.allowed_hosts = app, person_of, allowed_hosts
+        self.named_in, self.session_of = named_in, session_of
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse what may not pass; say whose request it is to what may."""
@@ -72,29 +101,46 @@ class Guard:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        session = session_in(scope, headers.get("cookie", ""))
-        refusal, person = self._foreign(scope, headers), None
+        token = _bearer(headers)
+        session = token or session_in(scope, headers.get("cookie", ""))
+        named = headers.getlist(self.named_in) if self.named_in else []
+        refusal, person = self._foreign(scope, headers, by_token=bool(token)) or self._misnamed(scope, named), None
         if refusal is None and not scope["path"].startswith(OPEN_PATHS):
-            person, refusal = await self._enter(scope, session)
+            session, person, refusal = await self._enter(scope, session, "" if token else "".join(named))
         if refusal is not None:
             await _refuse(scope, receive, _with_safe_headers(send, scope), *refusal)
             return
         scope.setdefault("state", {}).update(session=session if person else "", person=person)
         await self.app(scope, receive, _with_safe_headers(send, scope) if scope["type"] == "http" else send)
 
-    async def _enter(self, scope: Scope, session: str) -> tuple[Person | None, Refusal | None]:
-        """Whose request it is, or why nobody in particular may ask that."""
+    async def _enter(self, scope: Scope, session: str, named: str) -> tuple[str, Person | None, Refusal | None]:
+        """Whose request it is, and by which session, or why nobody in particular may ask that."""
         try:
+            session = await self.session_of(named, _client(scope)) if named else session
             person = await self.person_of(session) if session else None
-        except R2C2RError as error:  # the database does not answer
+        except R2C2RError as error:  # the database does not answer, or the proxy names nobody
             kind, status = kind_of(error)
-            return None, (status, kind, error.message, error.hint)
+            return session, None, (status, kind, error.message, error.hint)
         if person is None and not _brings_token(scope):
-            return None, (401, "unauthorised", "no session", NO_SESSION)
-        return person, None
+            return session, None, (401, "unauthorised", "no session", NO_SESSION)
+        if person is not None and not _reaches(person, scope):
+            said = f"this token is for {person.scope} alone"
+            return session, None, (403, "forbidden", said, "make another one: r2c2r token add")
+        return session, person, None
 
-    def _foreign(self, scope: Scope, headers: Headers) -> Refusal | None:
-        """Why a request does not come from our own pages, or not to us."""
+    def _misnamed(self, scope: Scope, named: Sequence[str]) -> Refusal | None:
+        """Why what the header says of who asks is not believed: whoever else could send it would be anybody."""
+        if named and not scope.get("state", {}).get("proxied"):
+            _log.warning("%s from %s, which is no trusted proxy: refused", self.named_in, _client(scope))
+            said = f"{self.named_in} is believed of trusted proxies alone, and this came from {_client(scope)}"
+            return 403, "forbidden", said, "come by the proxy's address; R2C2R_TRUSTED_PROXIES says which proxies are trusted"
+        if len(named) > 1:
+            _log.warning("%s twice in a request that a trusted proxy passed on: refused", self.named_in)
+            return 403, "forbidden", f"{self.named_in} stands twice in the request", "the proxy must replace it, not add to it"
+        return None
+
+    def _foreign(self, scope: Scope, headers: Headers, *, by_token: bool) -> Refusal | None:
+        """Why a request does not come from our own pages, or not to us; no page makes a browser send a token by itself."""
         host = headers.get("host", "")
         if _host_name(host) not in self.allowed_hosts:
             return 421, "forbidden", f"this app does not answer for host '{host[:80]}'", "use the address it printed"
@@ -102,11 +148,30 @@ class Guard:
         if origin is not None and _network_location(origin) != host:
             return 403, "forbidden", "the request comes from another site", "use the app's own pages"
         if scope["type"] == "websocket":
-            if origin is None:
+            if origin is None and not by_token:
                 return 403, "forbidden", "a connection without an Origin is refused", "connect from the app's own pages"
-        elif scope["method"] not in SAFE_METHODS and "x-requested-with" not in headers:
+        elif scope["method"] not in SAFE_METHODS and "x-requested-with" not in headers and not by_token:
             return 403, "forbidden", "the header X-Requested-With is missing", "send X-Requested-With: r2c2r"
         return None
+
+
+def _client(scope: Scope) -> str:
+    """The address that asks, as far as trusted proxies tell it."""
+    client = scope.get("client")
+    return str(client[0]) if client else ""
+
+
+def _bearer(headers: Headers) -> str:
+    """The token of a program; empty when there is none."""
+    kind, _, token = headers.get("authorization", "").partition(" ")
+    return token.strip() if kind.lower() == "bearer" and token.strip().startswith(TOKEN_PREFIX) else ""
+
+
+def _reaches(person: Person, scope: Scope) -> bool:
+    """Whether the token by which the person's program comes is for that."""
+    if person.scope == "metrics":
+        return bool(scope["path"] == "/metrics")
+    return person.scope != "read" or (scope["type"] == "http" and scope["method"] in SAFE_METHODS)
 
 
 def _brings_token(scope: Scope) -> bool:

@@ -16,16 +16,21 @@ import uvicorn
 from fastapi import FastAPI
 from sqlalchemy import Engine
 from sqlmodel import select
+from uvicorn.config import LOGGING_CONFIG
 
 from app.db.engine import opened, writing
 from app.db.tables import Project
+from app.db.usable import require_projects_known
 from app.files import only_server, project_files, running_server
 from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts
+from app.logs import log_as
 from app.main import create_app, let_go
 from app.services import accounts, launch_keys
 from app.services.adopting import adopt_all
+from app.services.oidc import Provider
 from app.services.projects import new_project
 from app.settings import DATABASE, LOOPBACK, MAX_UPLOAD_BYTES, Quotas, Settings
+from app.store.usable import require_store
 from r2c2r_core.disk import keep_private, resolved
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
@@ -53,17 +58,26 @@ def serve(
     recordings may be imported from by path, beside the home folder.
     """
     data_dir = resolved(data_dir)
-    proxies = [_network(address) for address in behind_proxy]
-    settings = _settings(data_dir, host, names, shared=bool(proxies))
+    proxies = tuple(_network(address) for address in (*behind_proxy, *Settings(data_dir=data_dir).trusted_proxies))
+    settings = _settings(data_dir, host, names, proxies)
+    _check_identity(settings)
     settings = replace(settings, heavy_jobs=heavy_jobs, workers=workers, max_upload_bytes=max_upload_bytes, quotas=quotas)
     settings = replace(settings, import_roots=(*settings.roots, *(resolved(folder) for folder in import_from)))
+    if heavy_jobs == 0 and not settings.postgres:
+        raise InputError("--jobs 0: no other machine takes jobs from a file", hint="leave it out, or set R2C2R_DATABASE")
+    if settings.log:
+        log_as(settings.log)
+    require_store(settings)
     keep_private(data_dir, DATABASE)
     with only_server(data_dir) as announce, _bound(host, port) as listening:
-        with opened(settings.database, anew=adopt) as engine:  # what is wrong with it is said before an address is
+        with opened(settings.rows, anew=adopt) as engine:  # what is wrong with it is said before an address is
             if adopt:
                 sys.stderr.writelines(f"r2c2r: {line}\n" for line in adopt_all(engine, data_dir, settings.user))
-            if settings.accounts_only:
+            elif settings.postgres:
+                require_projects_known(engine, data_dir)
+            if settings.accounts_only and not settings.identity:
                 _require_accounts(engine, proxies)
+            launch_keys.forget(engine)
         address = f"http://{names[0] if names else _shown_host(host)}:{listening.getsockname()[1]}"
         announce({"address": address, "accounts_only": settings.accounts_only})
         page = f"/p/{open_project}" if open_project else "/"
@@ -77,8 +91,8 @@ def serve(
             ws_per_message_deflate=False,  # scenes and masks are compressed or not compressible: it only costs time
             timeout_graceful_shutdown=3,
             server_header=False,
-            proxy_headers=bool(proxies),
-            forwarded_allow_ips=proxies,
+            proxy_headers=False,  # the app knows which proxies it believes
+            log_config=None if settings.log else LOGGING_CONFIG,  # none: its loggers go where all others do
         )
         _Server(config, app).run(sockets=[listening])
 
@@ -116,7 +130,7 @@ def new_address(data_dir: Path) -> str:
     if running["accounts_only"]:
         hint = "open its address and sign in; r2c2r user password NAME sets a new password"
         raise EnvironmentProblem("people sign in to this server by name and password", hint=hint)
-    with opened(Settings(data_dir=data_dir).database) as engine:
+    with opened(Settings(data_dir=data_dir).rows) as engine:
         return f"{running['address']}/?token={launch_keys.new(engine)}"
 
 
@@ -131,9 +145,10 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
     if capture is None:
         raise InputError(f"{workdir}: holds no finished run", hint="run it first")
     settings = Settings(data_dir=data_dir)
-    with opened(settings.database) as engine, writing(engine) as session:
+    with opened(settings.rows) as engine, writing(engine) as session:
         found = session.exec(select(Project).where(Project.work_path == str(workdir))).first()
         project = found or new_project(session, name, source.name, source.resolve(), workdir)
+        project.trashed = None
         files = project_files(data_dir, project.id, project.work_path)
         files.root.mkdir(parents=True, exist_ok=True)
         describe(capture, files.root, source.resolve())
@@ -152,16 +167,27 @@ def require_database(data_dir: Path) -> None:
     """Raise DatabaseUnusable for a database that the app could not work with, before long work is begun for it."""
     settings = Settings(data_dir=resolved(data_dir))
     keep_private(settings.data_dir, DATABASE)
-    with opened(settings.database):
+    with opened(settings.rows):
         pass
 
 
-def _settings(data_dir: Path, host: str, names: Sequence[str], *, shared: bool) -> Settings:
-    settings = Settings(data_dir=data_dir, host=host, allowed_hosts=(*LOOPBACK, *(name.lower() for name in names)))
-    if _is_loopback(host) and not names and not shared:
+def _settings(data_dir: Path, host: str, names: Sequence[str], proxies: tuple[str, ...]) -> Settings:
+    called = (*LOOPBACK, *(name.lower() for name in names))
+    settings = Settings(data_dir=data_dir, host=host, allowed_hosts=called, trusted_proxies=proxies)
+    if _is_loopback(host) and not names and not proxies:
         return settings
     reached = (*settings.allowed_hosts, host, socket.gethostname().lower(), *_own_addresses())
     return replace(settings, accounts_only=True, allowed_hosts=reached)
+
+
+def _check_identity(settings: Settings) -> None:
+    """Raise InputError where nobody could be believed about who asks, or be given a role."""
+    if settings.identity_header and not settings.trusted_proxies:
+        hint = "R2C2R_TRUSTED_PROXIES=ADDRESS, or --behind-proxy ADDRESS, says which proxy is"
+        raise InputError(f"R2C2R_IDENTITY {settings.identity}: no proxy is trusted", hint=hint)
+    accounts.known_role(settings.default_role)
+    if settings.identity_issuer:
+        Provider(settings)
 
 
 def _require_accounts(engine: Engine, proxies: Sequence[str]) -> None:
@@ -189,7 +215,8 @@ def _network(address: str) -> str:
         return str(ipaddress.ip_network(address) if "/" in address else ipaddress.ip_address(address))
     except ValueError as error:
         raise InputError(
-            f"--behind-proxy {address}: {error}", hint="the address from which the proxy connects: 127.0.0.1"
+            f"--behind-proxy or R2C2R_TRUSTED_PROXIES {address}: {error}",
+            hint="the address from which the proxy connects: 127.0.0.1",
         ) from error
 
 

@@ -2,6 +2,7 @@
 
 import getpass
 import os
+import re
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
@@ -14,6 +15,10 @@ MEBIBYTE = 1024 * 1024
 MAX_UPLOAD_BYTES = 16 * 1024 * MEBIBYTE
 DATABASE = "r2c2r.db"  # in the data folder; by it the folder is known to be one
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_IDENTITIES = {
+    "proxy": re.compile(r"[A-Za-z0-9-]{1,80}"),
+    "oidc": re.compile(r"https://[^\s/?#]+(/[^\s?#]*)?|http://(localhost|127\.0\.0\.1)(:\d+)?(/[^\s?#]*)?"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +51,21 @@ class Settings:
     """One running app. Paths are absolute; sizes in bytes; times in seconds."""
 
     data_dir: Path
+    postgres: str = field(default_factory=lambda: os.environ.get("R2C2R_DATABASE", ""))  # its address; empty: a SQLite file
+    store: str = field(default_factory=lambda: os.environ.get("R2C2R_STORE", ""))  # of files; empty: the data folder
+    cache_gb: str = field(
+        default_factory=lambda: os.environ.get("R2C2R_CACHE_GB", "")
+    )  # of a store's; empty: all that was used
+    log: str = field(default_factory=lambda: os.environ.get("R2C2R_LOG", ""))  # "json": one object a line
+    traces: str = field(default_factory=lambda: os.environ.get("R2C2R_TRACES", ""))  # "otlp": told to a collector
+    compute: str = field(default_factory=lambda: os.environ.get("R2C2R_COMPUTE", ""))  # ray; empty: this machine
+    identity: str = field(default_factory=lambda: os.environ.get("R2C2R_IDENTITY", ""))  # proxy:HEADER or oidc:ISSUER
+    oidc_client: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_CLIENT", ""))
+    oidc_secret: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_SECRET", ""), repr=False)
+    oidc_roles: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_ROLES", ""))  # group=role,…
+    default_role: str = field(default_factory=lambda: os.environ.get("R2C2R_DEFAULT_ROLE", "annotator"))  # at first sight
+    trusted_proxies: tuple[str, ...] = field(default_factory=lambda: _listed(os.environ.get("R2C2R_TRUSTED_PROXIES", "")))
+    webhooks_to: str = field(default_factory=lambda: os.environ.get("R2C2R_WEBHOOKS_TO", ""))  # networks beside public ones
     launch_token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     host: str = "127.0.0.1"
     allowed_hosts: tuple[str, ...] = LOOPBACK
@@ -62,6 +82,9 @@ class Settings:
     workers: int = 0  # objects of a job side by side; 0: as cores, shared by the heavy jobs, and memory allow
     job_attempts: int = 3  # how often a job whose process vanishes is begun without getting further
     job_losses: int = 10  # the same when its server vanishes, which is hardly the job's doing
+    sharing_costs_s: float = 6.0  # what a stage takes longer whose objects several seats compute: two starts of a process
+    beat_s: float = 5.0  # between two signs of life of a server that shares its database
+    beats_missed_s: float = 60.0  # without one, another server takes up its jobs
     kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0
@@ -72,13 +95,51 @@ class Settings:
     @property
     def workers_a_job(self) -> int:
         """Processes that one job may start; 0 leaves it to the cores and the memory that are there."""
-        shared = max(1, len(os.sched_getaffinity(0)) // self.heavy_jobs)
-        return self.workers or (0 if self.heavy_jobs == 1 else shared)
+        if self.on_ray:  # which keeps so many cores free for it
+            return self.workers or 1
+        shared = max(1, len(os.sched_getaffinity(0)) // max(1, self.heavy_jobs))
+        return self.workers or (0 if self.heavy_jobs <= 1 else shared)
 
     @property
     def database(self) -> Path:
         """The SQLite file."""
         return self.data_dir / DATABASE
+
+    @property
+    def rows(self) -> Path | str:
+        """Where the rows are: the address of a Postgres, or the SQLite file."""
+        return self.postgres or self.database
+
+    @property
+    def cache_bytes(self) -> int | None:
+        """What may lie here of what a store holds; raises InputError."""
+        if self.cache_gb and not self.cache_gb.isdecimal():
+            raise InputError(f"R2C2R_CACHE_GB {self.cache_gb[:40]!r}: no whole number", hint="gigabytes, or leave it out")
+        return int(self.cache_gb) * 10**9 if self.cache_gb else None
+
+    @property
+    def on_ray(self) -> bool:
+        """Whether jobs are computed by a Ray cluster; raises InputError."""
+        if self.compute not in ("", "ray"):
+            raise InputError(f"R2C2R_COMPUTE {self.compute[:40]!r}: not known", hint="ray, or leave it out")
+        return self.compute == "ray"
+
+    @property
+    def identity_header(self) -> str:
+        """The header by which a trusted proxy says who asks; empty where none does. Raises InputError."""
+        return self._identity("proxy")
+
+    @property
+    def identity_issuer(self) -> str:
+        """The OpenID provider at which people sign in; empty for none. Raises InputError."""
+        return self._identity("oidc")
+
+    def _identity(self, wanted: str) -> str:
+        kind, _, who = self.identity.partition(":")
+        if self.identity and (kind not in _IDENTITIES or not _IDENTITIES[kind].fullmatch(who)):
+            hint = "proxy:HEADER, such as X-Forwarded-User, or oidc:https://ISSUER"
+            raise InputError(f"R2C2R_IDENTITY {self.identity[:80]!r}: not known", hint=hint)
+        return who if kind == wanted else ""
 
     @property
     def uploads(self) -> Path:
@@ -108,6 +169,11 @@ def shipped(name: str, marker: str) -> Path:
         if (place / marker).is_file():
             return place
     raise FileNotFoundError(f"{name}/{marker} is neither beside {package} nor in it; reinstall r2c2r")
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    """What commas part."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def _user_name() -> str:

@@ -1,4 +1,4 @@
-"""`r2c2r user`: accounts, from the command line of the machine that serves them."""
+"""`r2c2r user` and `r2c2r token`: who may come in, from the command line of the machine that serves them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,8 +6,9 @@ from pathlib import Path
 
 from sqlalchemy import Engine
 
+from app import schemas
 from app.db.engine import opened
-from app.services import accounts
+from app.services import accounts, tokens
 from app.settings import DATABASE, Settings
 from r2c2r_core.disk import keep_private, resolved
 
@@ -42,9 +43,27 @@ def set_password(data_dir: Path, name: str, password: str) -> None:
         accounts.change(engine, name, password=password)
 
 
+def add_token(data_dir: Path, owner: str | None, name: str, scope: str) -> str:
+    """A new token's secret."""
+    with _engine(data_dir) as engine:
+        return tokens.add(engine, owner, name, scope)[0]
+
+
+def tokens_of(data_dir: Path) -> list[schemas.ApiToken]:
+    """Everybody's."""
+    with _engine(data_dir) as engine:
+        return tokens.everyone(engine)
+
+
+def revoke_token(data_dir: Path, number: int) -> None:
+    """It opens nothing from now on."""
+    with _engine(data_dir) as engine:
+        tokens.revoke(engine, number)
+
+
 @contextmanager
 def _engine(data_dir: Path) -> Iterator[Engine]:
     settings = Settings(data_dir=resolved(data_dir))
     keep_private(settings.data_dir, DATABASE)
-    with opened(settings.database) as engine:
+    with opened(settings.rows) as engine:
         yield engine

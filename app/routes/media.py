@@ -3,17 +3,19 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import FileResponse, Response
+from fastapi import Path as PathParam
+from fastapi.responses import FileResponse, RedirectResponse, Response, StreamingResponse
 
 from app import schemas
 from app.deps import Ctx
 from app.routes.files import send
 from app.routes.numbers import FrameNumber, RowId
-from app.services import bundles, elevations, media, overlays
+from app.services import bundle_inside, bundles, differences, elevations, media, overlays, project_export, variants
 
 router = APIRouter(prefix="/media/{project}", tags=["media"], default_response_class=Response)
 
 Formats = Annotated[tuple[str, ...], Query(max_length=10)]
+PictureName = Annotated[str, PathParam(pattern=r"^[A-Za-z0-9_]+\.(jpg|svg)$", max_length=200)]
 Width = Annotated[int | None, Query(ge=16, le=4096)]
 
 
@@ -59,6 +61,14 @@ def candidate_picture(context: Ctx, request: Request, project: str, object: RowI
     return send(request, media.candidate_png(context, project, object, candidate), "image/png", immutable=bool(v))
 
 
+@router.get("/candidates/{object}/{candidate}/turns.png", operation_id="candidateTurns")
+def candidate_turns(
+    context: Ctx, request: Request, project: str, object: RowId, candidate: str, against: str = "", v: str = ""
+) -> Response:
+    """A candidate from 24 sides, from left to right; in another colour what lies off the candidate `against`."""
+    return send(request, differences.strip(context, project, object, candidate, against), "image/png", immutable=bool(v))
+
+
 @router.get("/overlay/{object}/{frame}.png", operation_id="overlayPicture")
 def overlay_picture(
     context: Ctx,
@@ -88,12 +98,18 @@ def scene_picture(context: Ctx, request: Request, project: str, v: str = "") -> 
 
 @router.get("/report.html", operation_id="sceneReport")
 def scene_report(context: Ctx, request: Request, project: str) -> Response:
-    """The newest bundle's report, without the right to run anything."""
+    """The newest bundle's report, without the right to run anything; its pictures are asked for as this origin's."""
     answer = send(request, bundles.member(context, project, "report.html"), "text/html", immutable=False)
     answer.headers["content-security-policy"] = (
-        "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'self'"
+        "sandbox allow-same-origin; default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'self'"
     )
     return answer
+
+
+@router.get("/README.txt", operation_id="sceneReadme")
+def scene_readme(context: Ctx, request: Request, project: str) -> Response:
+    """How to load the newest bundle; its report links to it."""
+    return send(request, bundles.member(context, project, "README.txt"), "text/plain; charset=utf-8", immutable=False)
 
 
 @router.get("/review.html", operation_id="sceneReview")
@@ -107,10 +123,64 @@ def scene_review(context: Ctx, request: Request, project: str, v: str = "") -> R
     return answer
 
 
+@router.get("/project.zip", operation_id="downloadProject")
+async def download_project(context: Ctx, project: str, recording: bool = False) -> Response:
+    """The project as one file, which an upload to another server makes a project of; with its recording where asked for."""
+    export = await context.gates.looks.run(context.who, project_export.gathered, context, project, recording=recording)
+    headers = {"content-disposition": f'attachment; filename="{export.file_name}"', "cache-control": "no-store"}
+    return StreamingResponse(project_export.streamed(export), media_type="application/zip", headers=headers)
+
+
 @router.get("/bundles/{version}.zip", operation_id="downloadBundle")
-def download_bundle(context: Ctx, project: str, version: RowId, formats: Formats = ()) -> FileResponse:
+def download_bundle(context: Ctx, project: str, version: RowId, formats: Formats = ()) -> Response:
     """A bundle, or some formats of it; ranges are answered, so a download can go on where it stopped."""
     bundle = bundles.part(context, project, version, frozenset(formats)) if formats else bundles.file(context, project, version)
+    return _download(context, project, bundle)
+
+
+@router.get("/bundles/{version}/objects/{object_name}.zip", operation_id="downloadObject")
+def download_object(context: Ctx, project: str, version: RowId, object_name: str) -> Response:
+    """One object of a bundle alone, with its meshes and textures."""
+    return _download(context, project, bundle_inside.object_alone(context, project, version, object_name))
+
+
+@router.get("/bundles/{version}/pictures/{folder}/{picture}", operation_id="bundlePicture")
+def bundle_picture(
+    context: Ctx, request: Request, project: str, version: RowId, folder: Literal["gripper", "arm"], picture: PictureName
+) -> Response:
+    """What a robot did at a joint, or where an arm stands."""
+    kind = "image/svg+xml" if picture.endswith(".svg") else "image/jpeg"
+    answer = send(request, bundles.picture(context, project, version, f"{folder}/{picture}"), kind, immutable=True)
+    answer.headers["content-security-policy"] = "sandbox; default-src 'none'; style-src 'unsafe-inline'"
+    return answer
+
+
+@router.get("/variants/{variants_name}.zip", operation_id="downloadVariants")
+def download_variants(context: Ctx, project: str, variants_name: schemas.VariantsName) -> Response:
+    """Variants of a bundle that were made together."""
+    return _download(context, project, variants.archive(context, project, variants_name))
+
+
+@router.get("/variants/{variants_name}.jpg", operation_id="variantsWall")
+def variants_wall(context: Ctx, request: Request, project: str, variants_name: schemas.VariantsName, v: str = "") -> Response:
+    """The first of them as they start, side by side."""
+    return send(request, variants.wall(context, project, variants_name), "image/jpeg", immutable=bool(v))
+
+
+@router.get("/{folder}/{picture}", operation_id="reportPicture")
+def report_picture(
+    context: Ctx, request: Request, project: str, folder: Literal["pictures", "gripper", "arm"], picture: PictureName
+) -> Response:
+    """What the newest bundle's report shows."""
+    kind = "image/svg+xml" if picture.endswith(".svg") else "image/jpeg"
+    answer = send(request, bundles.member(context, project, f"{folder}/{picture}"), kind, immutable=False)
+    answer.headers["content-security-policy"] = "sandbox; default-src 'none'; style-src 'unsafe-inline'"
+    return answer
+
+
+def _download(context: Ctx, project: str, bundle: bundles.BundleFile) -> Response:
+    if link := context.store.link(project, bundle.path, bundle.file_name):
+        return RedirectResponse(link, 302, {"cache-control": "no-store", "x-sha256": bundle.sha256})
     return FileResponse(
         bundle.path,
         media_type="application/zip",

@@ -19,7 +19,7 @@ from app.services.context import Context
 router = APIRouter(prefix="/api/projects/{project}/members", tags=["projects"])
 
 _ROW_ID = TypeAdapter(Annotated[int, Field(ge=0, lt=2**63)])
-_OF_A_PROJECT = re.compile(r"/(?:api/projects|media)/([^/]+)(?:/.*)?", re.DOTALL)
+OF_A_PROJECT = re.compile(r"/(?:api/projects|media)/([^/]+)(?:/.*)?", re.DOTALL)
 _OF_A_JOB = re.compile(r"/api/jobs/([^/]+)(?:/.*)?", re.DOTALL)
 _OF_A_VIEW = re.compile(r"/viewer/([^/]+)(?:/.*)?", re.DOTALL)
 
@@ -59,7 +59,7 @@ class MembersOnly:
         if person is None:  # signs in, or brings the printed key: the guard lets nobody else come this far
             return True
         context = self.context_of()
-        if found := _OF_A_PROJECT.fullmatch(path):
+        if found := OF_A_PROJECT.fullmatch(path):
             return context.access.sees(person, found[1])
         if found := _OF_A_VIEW.fullmatch(path):
             return context.access.sees(person, context.viewer.project_of(found[1]))

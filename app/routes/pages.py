@@ -1,7 +1,7 @@
 """The pages of the front end, and the exchange of the printed key for a session."""
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app.deps import OpenCtx
 from app.errors import Unauthorised
@@ -14,7 +14,10 @@ REVALIDATED = {"cache-control": "no-cache"}
 
 
 @router.get("/")
+@router.get("/inbox")
 @router.get("/people")
+@router.get("/templates")
+@router.get("/webhooks")
 @router.get("/p/{rest:path}")
 def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None, frame: str = "") -> Response:
     """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address.
@@ -27,7 +30,7 @@ def page(context: OpenCtx, request: Request, rest: str = "", token: str | None =
             give_cookie(request, answer, context.people.enter_with_key(token, address_of(request)))
         except Unauthorised:
             if request.state.person is None:
-                return FileResponse(context.static / "login.html", status_code=401, headers=REVALIDATED)
+                return HTMLResponse(pages.sign_in(context), status_code=401, headers=REVALIDATED)
         return answer
     return HTMLResponse(pages.html(context, request.url.path, frame, request.state.person), headers=REVALIDATED)
 
@@ -35,4 +38,4 @@ def page(context: OpenCtx, request: Request, rest: str = "", token: str | None =
 @router.get("/login")
 def login_page(context: OpenCtx) -> Response:
     """Where people sign in."""
-    return FileResponse(context.static / "login.html", headers=REVALIDATED)
+    return HTMLResponse(pages.sign_in(context), headers=REVALIDATED)

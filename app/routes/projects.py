@@ -6,7 +6,7 @@ from app import schemas
 from app.deps import AdminCtx, Ctx
 from app.routes.numbers import STREAMED, Count, FrameNumber, OptionalId
 from app.schemas.text import FileName, Title
-from app.services import cameras, imports, projects, rereading, uploads
+from app.services import cameras, copies, imports, project_export, projects, rereading, trash, uploads
 
 router = APIRouter(prefix="/api/projects", tags=["projects"])
 
@@ -45,7 +45,7 @@ def get_project(context: Ctx, project: str) -> schemas.Project:
 
 @router.patch("/{project}", operation_id="changeProject")
 def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> schemas.Project:
-    """A new name, or another segmenter (refused while its libraries or weights are missing)."""
+    """A new name, tags, in the archive or not, or another segmenter (refused while its libraries or weights are missing)."""
     return projects.change(context, project, body)
 
 
@@ -56,9 +56,27 @@ def read_again(context: Ctx, project: str, body: schemas.ReadingIn) -> schemas.P
 
 
 @router.delete("/{project}", operation_id="deleteProject")
-async def delete_project(context: AdminCtx, project: str) -> schemas.Deleted:
-    """Delete the project and its files; a recording imported by path stays where it is."""
-    return await context.gates.deletions.run(context.who, projects.delete, context, project)
+async def delete_project(context: AdminCtx, project: str) -> schemas.Trashed:
+    """Put the project into the trash, where all of it is kept."""
+    return await context.gates.deletions.run(context.who, trash.put, context, project)
+
+
+@router.post("/{project}/duplicate", operation_id="duplicateProject", status_code=201)
+async def duplicate_project(context: Ctx, project: str) -> schemas.Project:
+    """A second project that is as this one, as a draft of yours."""
+    return await context.gates.looks.run(context.who, copies.duplicate, context, project)
+
+
+@router.get("/{project}/file", operation_id="offerProjectFile")
+async def offer_project_file(context: Ctx, project: str) -> schemas.ProjectFileOffer:
+    """How large the project would be as one file (/media/{project}/project.zip), and its recording."""
+    return await context.gates.looks.run(context.who, project_export.offer, context, project)
+
+
+@router.put("/{project}/recording", operation_id="giveRecording", status_code=202)
+async def give_recording(context: Ctx, project: str, body: schemas.RecordingIn) -> schemas.Project:
+    """The recording of a project that has none, from an upload that is complete; starts the import."""
+    return await context.gates.looks.run(context.who, uploads.give, context, project, body)
 
 
 @router.get("/{project}/frames", operation_id="listFrames")

@@ -7,7 +7,7 @@ from app import schemas
 from app.deps import Ctx
 from app.routes.encoded import as_json
 from app.routes.numbers import FrameNumber, RowId
-from app.services import clouds, masks, prompt_files, prompts, undoing
+from app.services import clouds, masks, openings, prompt_files, prompts, undoing
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["prompts"])
 
@@ -137,7 +137,7 @@ def get_lanes(context: Ctx, project: str) -> list[schemas.Lane]:
 @router.get("/openings", operation_id="getOpenings")
 def get_openings(context: Ctx, project: str) -> list[schemas.Opening]:
     """How fronts were filmed to move: their states by frame."""
-    return masks.openings(context, project)
+    return openings.openings(context, project)
 
 
 @router.get("/masks/{frame}", operation_id="getMasks", response_model=list[schemas.FrameMask])

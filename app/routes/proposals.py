@@ -16,9 +16,9 @@ def get_proposals(context: Ctx, project: str) -> schemas.Proposals:
 
 
 @router.post("/confirm", operation_id="confirmProposals", status_code=201)
-def confirm_proposals(context: Ctx, project: str, body: schemas.ProposalIds) -> list[schemas.SceneObject]:
+def confirm_proposals(context: Ctx, project: str, body: schemas.ProposalsConfirmed) -> list[schemas.SceneObject]:
     """Make objects of them; undo takes each back."""
-    return proposals.confirm(context, project, body.ids)
+    return proposals.confirm(context, project, body.ids, body.category)
 
 
 @router.post("/dismiss", operation_id="dismissProposals")

@@ -2,13 +2,15 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 
 from app import schemas
 from app.deps import Ctx, ReviewerCtx
 from app.routes.numbers import STREAMED, RowId
-from app.services import mesh_uploads, overlays, reviews
+from app.services import differences, mesh_uploads, overlays, reviews
 
+Name = Annotated[str, Path(max_length=200)]
+Candidate = Annotated[str, Query(max_length=200)]
 Version = Annotated[int | None, Query(ge=0)]
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
@@ -26,6 +28,12 @@ def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.Candida
     return reviews.group(context, project, object)
 
 
+@router.get("/objects/{object}/differences", operation_id="getDifferences")
+async def get_differences(context: Ctx, project: str, object: RowId, against: Candidate) -> schemas.Differences:
+    """By how much every candidate lies off `against`, and the crops they were made from."""
+    return await context.gates.views.run(context.who, differences.differences, context, project, object, against)
+
+
 @router.post("/objects/{object}/candidates", operation_id="uploadCandidate", status_code=201, max_body_size=STREAMED)
 async def upload_candidate(
     context: ReviewerCtx,
@@ -38,6 +46,12 @@ async def upload_candidate(
 ) -> schemas.Reviewed:
     """A mesh (the request's body: GLB, OBJ, PLY or STL) as this object's candidate, chosen by a person."""
     return await mesh_uploads.upload(context, project, object, filename, request.stream(), rerun, version)
+
+
+@router.patch("/scene/{name}/override", operation_id="correctMade")
+def correct_made(context: ReviewerCtx, project: str, name: Name, body: schemas.OverridePatch) -> schemas.Reviewed:
+    """Correct a worktop or plinth that was made from the scan; what depends on it runs again."""
+    return reviews.correct_made(context, project, name, body)
 
 
 @router.post("/objects/{object}/verdicts", operation_id="giveVerdict")

@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from app import schemas
 from app.deps import Ctx
 from app.routes.numbers import OtherId, RowId
-from app.services import bundles, scenes
+from app.services import bundle_inside, bundles, scenes
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["scenes"])
 
@@ -32,6 +32,12 @@ def list_bundles(context: Ctx, project: str) -> list[schemas.Bundle]:
 def check_bundle(context: Ctx, project: str, version: RowId) -> schemas.BundleCheck:
     """Look at a bundle now: its bytes against its checksum, and the linter's findings."""
     return bundles.check(context, project, version)
+
+
+@router.get("/bundles/{version}/inside", operation_id="bundleInside")
+def bundle_inside_of(context: Ctx, project: str, version: RowId) -> schemas.BundleInside:
+    """What a bundle holds for robots: its objects alone, what robots did in it, each simulator's lines."""
+    return bundle_inside.inside(context, project, version)
 
 
 @router.get("/bundles/{version}/changes", operation_id="compareBundles")

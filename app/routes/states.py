@@ -1,11 +1,12 @@
 """Review states, comments, and what a project cost."""
 
 from fastapi import APIRouter
+from fastapi.responses import Response
 
 from app import schemas
 from app.deps import Ctx
 from app.routes.numbers import RowId
-from app.services import comments, states
+from app.services import comments, effort, states
 
 router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
 
@@ -26,6 +27,17 @@ def step_review(context: Ctx, project: str, body: schemas.ReviewStep) -> schemas
 def get_figures(context: Ctx, project: str) -> schemas.Figures:
     """Clicks an object, automatic choices kept, time from upload to approval."""
     return states.figures(context, project)
+
+
+@router.get("/effort.csv", operation_id="getEffort", response_class=Response)
+async def get_effort(context: Ctx, project: str) -> Response:
+    """Clicks, verdicts, comments and minutes of each person on each object, as a table to download.
+
+    To admins a honeypot's also says what each object really is.
+    """
+    text = await context.gates.looks.run(context.who, effort.table, context, project)
+    headers = {"content-disposition": f'attachment; filename="effort-{project}.csv"', "cache-control": "no-store"}
+    return Response(text, media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @router.get("/comments", operation_id="listComments")

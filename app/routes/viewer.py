@@ -35,6 +35,18 @@ async def place_in_viewer(context: Ctx, request: Request, project: str, body: sc
     return await context.gates.views.run(context.who, viewers.place, context, project, request.state.session, body)
 
 
+@router.get("/api/projects/{project}/viewer/picked", operation_id="getPicked")
+async def get_picked(context: Ctx, request: Request, project: str) -> schemas.ViewerPicked:
+    """What the last click in the 3D view was on."""
+    return await context.gates.views.run(context.who, viewers.picked, context, project, request.state.session)
+
+
+@router.get("/api/projects/{project}/viewer/camera", operation_id="getViewerCamera")
+async def get_viewer_camera(context: Ctx, request: Request, project: str) -> schemas.ViewerCamera:
+    """Where the camera of the 3D view stands."""
+    return await context.gates.views.run(context.who, viewers.camera, context, project, request.state.session)
+
+
 @router.get("/viewer/{token}/{path:path}", include_in_schema=False)
 async def viewer_page(context: Ctx, request: Request, token: str, path: str) -> Response:
     """The 3D view's page."""

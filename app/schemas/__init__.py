@@ -1,10 +1,25 @@
 """What goes over the wire. Times are seconds since 1970; lengths are metres; pixels are of the stored RGB frame."""
 
 from app.schemas.base import ErrorBody
-from app.schemas.bundles import Bundle, BundleChange, BundleCheck, Certificate, Finding
+from app.schemas.bundles import (
+    Bundle,
+    BundleChange,
+    BundleCheck,
+    BundleInside,
+    Certificate,
+    Finding,
+    ObjectAsset,
+    RobotGrip,
+    RobotTrial,
+    SimulatorLines,
+    StandingPlace,
+)
 from app.schemas.captures import CaptureFacts, FrameCamera, FrameInfo
 from app.schemas.elevations import Elevation, ElevationLines, Elevations, FoundFront
+from app.schemas.honeypots import Honeypot, HoneypotIn, HoneypotScore, TrueObject
+from app.schemas.inbox import AssigneeIn, Inbox, InboxMention, InboxObject, InboxProject, News, PersonsChanges, SeenIn
 from app.schemas.jobs import Job, JobEvent, RunRequest, StageState
+from app.schemas.lengths import TrueLength, TrueLengthIn, TrueLengths
 from app.schemas.live import ProjectId, Watch
 from app.schemas.masks import FrameMask, Lane, LiveState, LiveStatus, MaskBits, Opening, OpenState
 from app.schemas.objects import (
@@ -23,6 +38,7 @@ from app.schemas.objects import (
     Undone,
     UndoRequest,
 )
+from app.schemas.opinions import Agreed, AgreedObject, Agreement, Opinion, OpinionIn
 from app.schemas.people import (
     AccountIn,
     AccountInfo,
@@ -33,7 +49,16 @@ from app.schemas.people import (
     Credentials,
     PasswordChange,
 )
-from app.schemas.photos import ObjectPhotos, OverlayLook, OverlayOf, Photo, PhotoState
+from app.schemas.photos import Leaf, ObjectPhotos, OverlayLook, OverlayOf, Photo, PhotoState
+from app.schemas.project_file import (
+    ProjectFile,
+    ProjectFileComment,
+    ProjectFileFrame,
+    ProjectFileLength,
+    ProjectFileOffer,
+    ProjectFileRecording,
+    RecordingIn,
+)
 from app.schemas.projects import (
     Deleted,
     ImportPath,
@@ -45,15 +70,44 @@ from app.schemas.projects import (
     ProjectSummary,
     ReadingIn,
     SampleRequest,
+    Trashed,
 )
-from app.schemas.proposals import Proposal, ProposalIds, Proposals
-from app.schemas.reviews import Candidate, CandidateGroup, OverrideData, OverridePatch, Placement, Reviewed, VerdictIn
-from app.schemas.scenes import SceneItem, SceneJoint, SceneSummary, StageInfo
+from app.schemas.proposals import Proposal, ProposalIds, Proposals, ProposalsConfirmed
+from app.schemas.reviews import (
+    Candidate,
+    CandidateGroup,
+    Crop,
+    Difference,
+    Differences,
+    OverrideData,
+    OverridePatch,
+    Placement,
+    Reviewed,
+    VerdictIn,
+)
+from app.schemas.scenes import LeftOut, SceneItem, SceneJoint, SceneSummary, StageInfo
+from app.schemas.seats import Seat, SeatIn, SeatJob, Seats
 from app.schemas.states import Comment, CommentIn, CommentPatch, Figures, ReviewMove, ReviewStatus, ReviewStep
 from app.schemas.system import Backend, BundleFormat, Category, FolderEntry, FolderListing, SystemInfo
+from app.schemas.templates import ChecklistIn, ListedObject, Template, TemplateIn
+from app.schemas.tokens import ApiToken, ApiTokenIn, NewApiToken
 from app.schemas.unknown import UnknownFolder, UnknownKind
 from app.schemas.uploads import Upload, UploadIn
-from app.schemas.viewer import JointValues, ViewerBox, ViewerPlace, ViewerPlaced, ViewerSession, ViewerShow, ViewerShown
+from app.schemas.variants import MOST_VARIANTS, Variants, VariantSet, VariantsIn, VariantsName, VariantsOffer
+from app.schemas.viewer import (
+    JointValues,
+    ViewerBox,
+    ViewerCamera,
+    ViewerClip,
+    ViewerLook,
+    ViewerPicked,
+    ViewerPlace,
+    ViewerPlaced,
+    ViewerSession,
+    ViewerShow,
+    ViewerShown,
+)
+from app.schemas.webhooks import Delivery, NewWebhook, Webhook, WebhookIn
 from r2c2r_core.schema.prompts import (
     PromptsFile,
     PromptsFileCrop,
@@ -64,9 +118,16 @@ from r2c2r_core.schema.prompts import (
 )
 
 __all__ = [
+    "MOST_VARIANTS",
     "AccountIn",
     "AccountInfo",
     "AccountPatch",
+    "Agreed",
+    "AgreedObject",
+    "Agreement",
+    "ApiToken",
+    "ApiTokenIn",
+    "AssigneeIn",
     "AuditAction",
     "AuditEntry",
     "AuditPage",
@@ -75,16 +136,22 @@ __all__ = [
     "BundleChange",
     "BundleCheck",
     "BundleFormat",
+    "BundleInside",
     "Candidate",
     "CandidateGroup",
     "CaptureFacts",
     "Category",
     "Certificate",
+    "ChecklistIn",
     "Comment",
     "CommentIn",
     "CommentPatch",
     "Credentials",
+    "Crop",
     "Deleted",
+    "Delivery",
+    "Difference",
+    "Differences",
     "Elevation",
     "ElevationLines",
     "Elevations",
@@ -100,26 +167,43 @@ __all__ = [
     "FrameMask",
     "FrameSaid",
     "HistoryEntry",
+    "Honeypot",
+    "HoneypotIn",
+    "HoneypotScore",
     "ImportPath",
+    "Inbox",
+    "InboxMention",
+    "InboxObject",
+    "InboxProject",
     "Job",
     "JobEvent",
     "JointValues",
     "Lane",
+    "Leaf",
+    "LeftOut",
+    "ListedObject",
     "LiveState",
     "LiveStatus",
     "MaskBits",
     "MembersIn",
+    "NewApiToken",
+    "NewWebhook",
+    "News",
+    "ObjectAsset",
     "ObjectIn",
     "ObjectPatch",
     "ObjectPhotos",
     "ObjectPoints",
     "OpenState",
     "Opening",
+    "Opinion",
+    "OpinionIn",
     "OverlayLook",
     "OverlayOf",
     "OverrideData",
     "OverridePatch",
     "PasswordChange",
+    "PersonsChanges",
     "Photo",
     "PhotoState",
     "Placement",
@@ -129,6 +213,12 @@ __all__ = [
     "PointsIn",
     "Project",
     "ProjectCounts",
+    "ProjectFile",
+    "ProjectFileComment",
+    "ProjectFileFrame",
+    "ProjectFileLength",
+    "ProjectFileOffer",
+    "ProjectFileRecording",
     "ProjectId",
     "ProjectMembers",
     "ProjectPatch",
@@ -142,33 +232,62 @@ __all__ = [
     "Proposal",
     "ProposalIds",
     "Proposals",
+    "ProposalsConfirmed",
     "ReadingIn",
+    "RecordingIn",
     "ReviewMove",
     "ReviewStatus",
     "ReviewStep",
     "Reviewed",
+    "RobotGrip",
+    "RobotTrial",
     "RunRequest",
     "SampleRequest",
     "SceneItem",
     "SceneJoint",
     "SceneObject",
     "SceneSummary",
+    "Seat",
+    "SeatIn",
+    "SeatJob",
+    "Seats",
+    "SeenIn",
     "SegmentState",
+    "SimulatorLines",
     "StageInfo",
     "StageState",
+    "StandingPlace",
     "SystemInfo",
+    "Template",
+    "TemplateIn",
+    "Trashed",
+    "TrueLength",
+    "TrueLengthIn",
+    "TrueLengths",
+    "TrueObject",
     "UndoRequest",
     "Undone",
     "UnknownFolder",
     "UnknownKind",
     "Upload",
     "UploadIn",
+    "VariantSet",
+    "Variants",
+    "VariantsIn",
+    "VariantsName",
+    "VariantsOffer",
     "VerdictIn",
     "ViewerBox",
+    "ViewerCamera",
+    "ViewerClip",
+    "ViewerLook",
+    "ViewerPicked",
     "ViewerPlace",
     "ViewerPlaced",
     "ViewerSession",
     "ViewerShow",
     "ViewerShown",
     "Watch",
+    "Webhook",
+    "WebhookIn",
 ]

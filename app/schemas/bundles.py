@@ -1,5 +1,7 @@
 """Finished bundles and the proof in them."""
 
+from pydantic import Field
+
 from app.schemas.base import Shape
 
 
@@ -14,6 +16,68 @@ class Bundle(Shape):
     created: float
     passed: bool | None
     current: bool  # nothing was changed since
+
+
+class ObjectAsset(Shape):
+    """One object of a bundle, to be downloaded by itself."""
+
+    name: str
+    category: str
+    formats: list[str]  # suffixes of its files
+    url: str
+
+
+class RobotGrip(Shape):
+    """How a gripper or an arm did at one joint or thing."""
+
+    kind: str
+    name: str
+    method: str | None
+    passed: bool
+    grip_n: float | None
+    opened: float | None  # 0..1 of the travel
+    why: str
+    picture: str | None  # address of a sheet of moments
+
+
+class StandingPlace(Shape):
+    """Where an arm stands, and for which joints."""
+
+    x_m: float
+    y_m: float
+    lift_m: float
+    joints: list[str]
+
+
+class RobotTrial(Shape):
+    """What one robot did in a bundle."""
+
+    name: str
+    joints: int
+    joints_opened: int
+    grips: list[RobotGrip]
+    places: list[StandingPlace] = Field(default_factory=list)
+    map: str | None = None  # address of the floor plan with its places
+
+
+class SimulatorLines(Shape):
+    """How a bundle is taken into one simulator."""
+
+    simulator: str
+    install: str
+    language: str
+    code: str
+    note: str
+    loader: str | None  # of the certificate: it loads the same file
+
+
+class BundleInside(Shape):
+    """What a bundle holds for robots."""
+
+    version: int
+    assets: list[ObjectAsset]
+    robots: list[RobotTrial]
+    simulators: list[SimulatorLines]
 
 
 class BundleChange(Shape):
@@ -46,6 +110,7 @@ class LoaderVerdict(Shape):
     loader: str
     state: str
     detail: str
+    steps_per_s: list[list[float]] = Field(default_factory=list)  # pairs: worlds at once, and steps of all in a second
 
 
 class BlockerVerdict(Shape):
@@ -78,6 +143,7 @@ class Certificate(Shape):
     """The proof in the newest bundle."""
 
     version: int
+    current: bool  # nothing was changed since
     passed: bool
     findings: list[Finding]
     loaders: list[LoaderVerdict]

@@ -51,8 +51,8 @@ class CaptureFacts(Shape):
     moments: list[CaptureMoment] = Field(default_factory=list)
 
 
-class FrameCamera(Shape):
-    """The pinhole camera of a frame: pixels of the stored frame, OpenCV axes, in the recording's own world."""
+class Pinhole(Shape):
+    """A frame's size and pinhole camera, in pixels of the stored frame; its axes are OpenCV's."""
 
     width: int
     height: int
@@ -60,6 +60,11 @@ class FrameCamera(Shape):
     fy: float
     cx: float
     cy: float
+
+
+class FrameCamera(Pinhole):
+    """The camera of a frame in the recording's own world."""
+
     camera_from_capture: list[list[float]]
 
 

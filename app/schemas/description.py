@@ -30,6 +30,7 @@ class DescribedObject(Shape):
     points: list[DescribedPoint]
     front: dict[str, Any] | None = None
     crop: dict[str, Any] | None = None
+    assignee: str | None = None
     run_name: str = ""  # what the last run called it, where that is another name
     frames: dict[str, Any] = Field(default_factory=dict)
     override: dict[str, Any] = Field(default_factory=dict)
@@ -37,14 +38,16 @@ class DescribedObject(Shape):
 
 
 class Description(Shape):
-    """The whole file; `project`, `comments` and `bundles` are rows (db/tables.py)."""
+    """The whole file; `project`, `comments`, `true_lengths` and `bundles` are rows (db/tables.py)."""
 
     version: Literal[1] = 1
     id: str
     changed: float  # when anybody last changed what is in it
     project: dict[str, Any]
     owner: str | None = None  # accounts go by name: another database numbers them otherwise
+    assignee: str | None = None
     members: list[str] | None = None  # None where it was not told
     objects: list[DescribedObject]
     comments: list[dict[str, Any]] = Field(default_factory=list)
+    true_lengths: list[dict[str, Any]] | None = None  # None where an r2c2r wrote it that told of none
     bundles: list[dict[str, Any]] = Field(default_factory=list)

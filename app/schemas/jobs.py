@@ -8,7 +8,7 @@ from app.schemas.base import ErrorBody, Shape
 from app.schemas.text import Word
 
 JobState = Literal["queued", "running", "cancelling", "cancelled", "failed", "done"]
-JobKind = Literal["import", "sample", "run"]
+JobKind = Literal["import", "sample", "run", "vary"]
 
 
 class StageState(Shape):
@@ -60,4 +60,5 @@ class RunRequest(Shape):
     segmenter: Word | None = None
     generator: Word | None = None
     matcher: Word | None = None
+    arm: Word | None = None
     seed: int = Field(default=0, ge=0, lt=2**31)

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from app.schemas.base import Shape
 
-ProjectId = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+ProjectId = Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 class Watch(Shape):

@@ -47,7 +47,7 @@ class OpenState(Shape):
 
     frame: int
     value: float | None
-    sigma: float | None  # its standard deviation
+    sigma: float | None  # its standard deviation; null where a person said so
 
 
 class Opening(Shape):

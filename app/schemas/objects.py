@@ -67,13 +67,17 @@ class ObjectIn(Shape):
 
 
 class ObjectPatch(Shape):
-    """What changes, a drawn front and a crop box also to none; with `version`, only if nobody changed it meanwhile."""
+    """What changes, a drawn front, a crop box and whose turn it is also to none.
+
+    With `version`, only if nobody changed it meanwhile.
+    """
 
     name: Word | None = None
     category: Word | None = None
     colour: int | None = Field(default=None, ge=0, le=999)
     front: PromptsFileFront | None = None
     crop: PromptsFileCrop | None = None
+    assignee: Word | None = None
     version: int | None = None
 
 
@@ -91,6 +95,7 @@ class SceneObject(Shape):
     front: PromptsFileFront | None  # drawn; None: what the clicks find
     frames: list[FrameSaid]  # set right by a person
     crop: PromptsFileCrop | None  # a box that it lies in, drawn by a person
+    assignee: str | None  # whose turn it is
     can_undo: bool
     can_redo: bool
     segment: SegmentState

@@ -8,7 +8,20 @@ from app.schemas.base import Shape
 from app.schemas.text import Word
 
 RoleName = Literal["annotator", "reviewer", "admin"]
-AuditAction = Literal["signed in", "signed out", "refused", "added", "removed", "role", "password"]
+AuditAction = Literal[
+    "signed in",
+    "signed out",
+    "refused",
+    "added",
+    "removed",
+    "role",
+    "password",
+    "token made",
+    "token revoked",
+    "webhook made",
+    "webhook removed",
+    "honeypot",
+]
 
 
 class Credentials(Shape):

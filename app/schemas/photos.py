@@ -3,9 +3,25 @@
 from typing import Literal
 
 from app.schemas.base import Shape
+from app.schemas.captures import Pinhole
+from app.schemas.masks import Opening
 
 OverlayOf = Literal["placed", "primitive", "fitted"]
 OverlayLook = Literal["ghost", "outline", "residual"]
+
+
+class Leaf(Shape):
+    """What a joint of the object moves: its front as a box, closed, and the line it turns about or goes along."""
+
+    joint: str
+    part: str  # which of the object's it is: marks are by this
+    type: Literal["revolute", "prismatic"]
+    most: float  # how far it can open at all, rad or m
+    pose: list[list[float]]  # world_from_leaf, 4x4
+    size_m: list[float]
+    axis: list[float]  # world; opening turns about it by the right-hand rule, or goes along it
+    pivot: list[float]
+    opening: Opening | None  # as it was filmed and marked
 
 
 class PhotoState(Shape):
@@ -14,19 +30,13 @@ class PhotoState(Shape):
     joint: str
     type: Literal["revolute", "prismatic"]
     value: float | None
-    sigma: float | None
+    sigma: float | None  # null where a person said so
 
 
-class Photo(Shape):
-    """A frame that shows the object well, with its pinhole camera (pixels of the stored frame, OpenCV axes)."""
+class Photo(Pinhole):
+    """A frame that shows the object well, with its camera."""
 
     frame: int
-    width: int
-    height: int
-    fx: float
-    fy: float
-    cx: float
-    cy: float
     camera_from_world: list[list[float]]
     confidence: float
     box: list[float]  # left, top, right, bottom of its mask, as shares of the image
@@ -45,3 +55,4 @@ class ObjectPhotos(Shape):
     of: list[OverlayOf]  # what there is to lay over them
     world_from_object: list[list[float]] | None
     dimensions_m: list[float] | None
+    leaves: list[Leaf]  # of the finished scene

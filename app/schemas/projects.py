@@ -9,6 +9,7 @@ from app.schemas.bundles import Bundle
 from app.schemas.captures import CaptureFacts
 from app.schemas.jobs import Job
 from app.schemas.states import ReviewState
+from app.schemas.templates import ListedObject
 from app.schemas.text import ServerPath, Title, Word
 
 
@@ -43,7 +44,11 @@ class ProjectSummary(Shape):
     segmenter: str  # draws the masks
     generator: str  # makes the candidates
     matcher: str  # aligns them
+    arm: str  # tries the joints of the bundle
     review_state: ReviewState
+    tags: list[str]
+    archived: bool  # done with: lists show it when asked for
+    assignee: str | None  # whose turn it is
 
 
 class Project(ProjectSummary):
@@ -52,21 +57,28 @@ class Project(ProjectSummary):
     capture: CaptureFacts | None
     notices: list[str]
     register_depth: bool  # whether depth is moved onto the colour images when the recording is read
+    scale: float  # on every length of the recording when it is read
+    checklist: list[ListedObject]  # objects that are to be clicked, those that are already among them
+    awaits_recording: bool  # it has none, and may be given one
 
 
 class ProjectPatch(Shape):
-    """What changes: its name, or which backends do its stages."""
+    """What changes: its name, tags, whether it is archived, or which backends do its stages."""
 
     name: Title | None = None
+    tags: list[Word] | None = Field(default=None, max_length=20)
+    archived: bool | None = None
     segmenter: Word | None = None
     generator: Word | None = None
     matcher: Word | None = None
+    arm: Word | None = None
 
 
 class ReadingIn(Shape):
     """How the recording is to be read."""
 
-    register_depth: bool
+    register_depth: bool | None = None  # None: as it is
+    scale: float | None = Field(default=None, ge=0.2, le=5.0)  # on every length, depth and camera path alike; None: as it is
 
 
 class ProjectMembers(Shape):
@@ -101,6 +113,17 @@ class SampleRequest(Shape):
     width: int = Field(default=960, ge=160, le=1920)
     height: int = Field(default=720, ge=120, le=1440)
     name: Title | None = None
+
+
+class Trashed(Shape):
+    """A project in the trash."""
+
+    id: str
+    name: str
+    at: float  # when it was put there
+    who: str
+    size_bytes: int
+    counts: ProjectCounts
 
 
 class Deleted(Shape):

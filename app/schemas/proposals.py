@@ -36,3 +36,9 @@ class ProposalIds(Shape):
     """Which proposals are meant."""
 
     ids: list[Word] = Field(min_length=1, max_length=500)
+
+
+class ProposalsConfirmed(ProposalIds):
+    """Which proposals become objects."""
+
+    category: Word | None = None  # of all of them; None: as proposed

@@ -10,14 +10,22 @@ from app.schemas.text import Reference, Remark, Word
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.schema.overrides import (
     BATCHES_SAID,
+    BUILT_AS_SAID,
+    COLOUR_SAID,
     HINGE_SAID,
     JOINTS_SAID,
+    LEFT_OUT_SAID,
     MOST_BATCHES,
     MOST_JOINTS,
     POSE_SAID,
     SIZE_SAID,
+    STATES_SAID,
+    CategoryName,
+    Colour,
     Dimensions,
     Limits,
+    MarkedState,
+    Marks,
     Opening,
     Pose,
 )
@@ -41,6 +49,36 @@ class Candidate(Shape):
     verdict_by: str
     glb: str
     thumbnail: str
+
+
+class Difference(Shape):
+    """How far a candidate lies off another one, laid onto it by the side that was filmed."""
+
+    candidate: str
+    share: float  # of its surface that lies off
+    most: float  # of the other's longest side
+
+
+class Crop(Shape):
+    """A frame that candidates were made from, and where the object is in it."""
+
+    frame: int
+    width: int
+    height: int
+    box: list[float]  # left, top, right, bottom of its mask, as shares of the image
+
+
+class Differences(Shape):
+    """What tells candidates apart.
+
+    Turntables: /media/{project}/candidates/{object}/{candidate}/turns.png?against={candidate}, 24 pictures from left to right.
+    """
+
+    against: str
+    tolerance: float  # of the longest side: what lies further off than that differs
+    longest_m: float | None  # None before one of them was placed
+    candidates: list[Difference]
+    crops: list[Crop]
 
 
 class PoseSpread(Shape):
@@ -78,6 +116,7 @@ class CandidateGroup(Shape):
     name: str
     run_name: str  # what the last run called it, as do the scene's joints and the certificate
     category: str
+    assignee: str | None  # whose turn it is
     chosen: str
     chosen_by: str
     reason: str
@@ -112,8 +151,12 @@ class OverrideData(Shape):
     joint_lower: float | None = None
     joint_upper: float | None = None
     joints: dict[str, tuple[float | None, float | None]] = Field(default_factory=dict)  # [lower, upper] by name
+    states: dict[str, list[MarkedState]] = Field(default_factory=dict)  # by joint as above
     rejected: list[str] = Field(default_factory=list)
     regenerate: int = 0
+    built_as: str | None = None  # the category whose body and joints it takes
+    left_out: bool = False
+    colour: tuple[float, float, float] | None = None  # RGB 0..1
 
 
 class OverridePatch(Shape):
@@ -126,7 +169,11 @@ class OverridePatch(Shape):
     joint_lower: Opening | None = None
     joint_upper: Opening | None = None
     joints: dict[Reference, Limits] | None = Field(default=None, max_length=MOST_JOINTS, description=JOINTS_SAID)
+    states: dict[Reference, Marks] | None = Field(default=None, max_length=MOST_JOINTS, description=STATES_SAID)
     regenerate: int | None = Field(default=None, ge=0, le=MOST_BATCHES, description=BATCHES_SAID)
+    built_as: CategoryName | None = Field(default=None, description=BUILT_AS_SAID)
+    left_out: bool | None = Field(default=None, description=LEFT_OUT_SAID)
+    colour: Colour | None = Field(default=None, description=COLOUR_SAID)
     rerun: bool = True
     version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
 

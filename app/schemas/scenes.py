@@ -3,6 +3,7 @@
 from typing import Literal
 
 from app.schemas.base import Shape
+from app.schemas.reviews import OverrideData
 
 
 class SceneJoint(Shape):
@@ -20,8 +21,9 @@ class SceneJoint(Shape):
 class SceneItem(Shape):
     """One object of the finished scene."""
 
-    object: int | None
+    object: int | None  # None: made from the scan, nobody clicked it
     name: str
+    run_name: str  # what the last run called it, as do its joints and the certificate
     category: str
     fixture: str
     dimensions_m: list[float]
@@ -32,6 +34,15 @@ class SceneItem(Shape):
     placement_rms_m: float | None
     warp_residual_m: float | None
     warnings: list[str]
+    colour: list[float]  # RGB 0..1, of what no mesh dresses
+    override: OverrideData  # what people corrected, whether the last run knew it or not
+
+
+class LeftOut(Shape):
+    """What was made from the scan and a person wants none of."""
+
+    object: int
+    name: str
 
 
 class StageInfo(Shape):
@@ -46,6 +57,7 @@ class SceneSummary(Shape):
     """The finished scene as a table."""
 
     items: list[SceneItem]
+    left_out: list[LeftOut]
     failures: dict[str, str]  # object name -> why it is missing
     warnings: list[str]
     stages: list[StageInfo]

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from app.schemas.base import Shape
 from app.schemas.text import Prose, Remark
+from app.schemas.viewer import ViewerLook
 
 ReviewState = Literal["draft", "ready", "in review", "changes requested", "approved"]
 
@@ -46,6 +47,7 @@ class CommentPin(Shape):
     x: float | None = Field(default=None, allow_inf_nan=False)
     y: float | None = Field(default=None, allow_inf_nan=False)
     point_world: tuple[float, float, float] | None = None
+    view: ViewerLook | None = None  # how the 3D view was looked at
 
 
 class CommentIn(CommentPin):

@@ -39,7 +39,8 @@ class SystemInfo(Shape):
     version: str
     user: str
     role: Literal["annotator", "reviewer", "admin"]
-    account: bool  # signed in by a password: may sign out
+    account: bool  # has an account
+    sign_out: str | None  # the page that follows on signing out; None: who started the server, and where a proxy says who asks
     max_upload_bytes: int
     free_bytes: int
     import_roots: list[str]
@@ -49,6 +50,7 @@ class SystemInfo(Shape):
     segmenters: list[Backend]  # of each seam the first needs nothing and is the default
     generators: list[Backend]
     matchers: list[Backend]
+    arms: list[Backend]
     formats: list[BundleFormat]
 
 

@@ -21,23 +21,26 @@ class Access:
         self.look_again()
 
     def sees(self, person: Person, project_id: str | None) -> bool:
-        """Whether the project is there for the person; admins see all, and what is of no project is everybody's."""
+        """Whether the person sees the project; admins see all but the trash, and what is of no project is everybody's."""
+        if project_id in self._trashed:
+            return False
         names = self._closed.get(project_id or "")
         return names is None or person.may("admin") or (person.account and person.name in names)
 
     def sees_job(self, person: Person, job_id: int) -> bool:
         """The same for a job's project."""
-        if not self._closed or person.may("admin"):
+        if not self._trashed and (not self._closed or person.may("admin")):
             return True
         with reading(self._engine) as session:
             return self.sees(person, session.exec(select(Job.project_id).where(Job.id == job_id)).first())
 
     def hidden(self, person: Person) -> frozenset[str]:
         """The projects that the person may not see."""
-        return frozenset(project for project in self._closed if not self.sees(person, project))
+        return frozenset(project for project in self._trashed | set(self._closed) if not self.sees(person, project))
 
     def look_again(self) -> None:
-        """Members or accounts changed."""
+        """Members, accounts or what is in the trash changed."""
         with reading(self._engine) as session:
             closed = session.exec(select(Project).where(col(Project.members_only).is_(True))).all()
+            self._trashed = frozenset(session.exec(select(Project.id).where(col(Project.trashed).is_not(None))))
             self._closed = {project.id: frozenset(queries.who_sees(session, project)) for project in closed}

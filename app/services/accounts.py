@@ -5,31 +5,62 @@ import time
 from functools import cache
 from typing import Any
 
-from sqlalchemy import Engine
+from sqlalchemy import Engine, update
 from sqlmodel import Session, col, delete, select
 
 from app.db.engine import reading, writing
-from app.db.tables import Account, SignIn
+from app.db.tables import Account, SceneObject, SignIn
 from app.errors import Conflict, NotFound
 from app.security import ROLES, Person, Role
 from app.services import audit, passwords
 from r2c2r_core.errors import InputError
 
-_NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,39}")
+_NAME = re.compile(r"[a-z0-9][a-z0-9._@+-]{0,59}")
+NO_PASSWORD = ""  # of who is let in by others' word
 
 
 def add(engine: Engine, name: str, role: str, password: str, *, by: str = audit.COMMAND_LINE) -> None:
     """A new account; raises Conflict when the name is taken."""
-    name = name.lower()
-    if not _NAME.fullmatch(name):
-        raise InputError(f"{name!r} is no name for an account", hint="letters, digits, dot, dash, underscore; at most 40")
+    name = _checked(name)
     passwords.refuse_weak(name, password)
-    account = Account(name=name, role=_role(role), password=_hashed(password), created=time.time())
+    account = Account(name=name, role=known_role(role), password=_hashed(password), created=time.time())
     with writing(engine) as session:
         if session.exec(select(Account).where(Account.name == name)).first() is not None:
             raise Conflict(f"there is an account {name} already", hint="r2c2r user role, or r2c2r user password")
         session.add(account)
         audit.note(session, "added", account=name, who=by, detail=account.role)
+
+
+def seen(session: Session, name: str, role: str, *, by: str) -> Account:
+    """The account of that name; at first sight a new one that no password opens. Raises InputError."""
+    name = _checked(name)
+    found = session.exec(select(Account).where(Account.name == name)).first()
+    if found is not None:
+        return found
+    account = Account(name=name, role=known_role(role), password=NO_PASSWORD, created=time.time())
+    session.add(account)
+    session.flush()
+    audit.note(session, "added", account=name, who=by, detail=account.role)
+    return account
+
+
+def of_subject(session: Session, subject: str, name: str, role: str | None, default: str, *, by: str) -> Account:
+    """Whom an OpenID provider means, with the role it gives, if it gives any; at first sight a new account of that name.
+
+    Raises Conflict for a name that is somebody else's: who may choose names at the provider becomes nobody by it.
+    """
+    found = session.exec(select(Account).where(Account.subject == subject)).first()
+    if found is None:
+        if session.exec(select(Account).where(Account.name == name.lower())).first() is not None:
+            hint = f"an admin removes that one first, r2c2r user remove {name}: what it did stays under the name"
+            raise Conflict(f"there is an account {name} already, and it is not yours", hint=hint)
+        found = seen(session, name, role or default, by=by)
+        found.subject = subject
+    elif role is not None and role != found.role:
+        audit.note(session, "role", account=found.name, who=by, detail=f"{found.role} → {role}")
+        found.role = known_role(role)
+    session.add(found)
+    return found
 
 
 def everyone(engine: Engine) -> list[Person]:
@@ -43,6 +74,7 @@ def remove(engine: Engine, name: str, *, by: str = audit.COMMAND_LINE) -> None:
     with writing(engine) as session:
         account = row(session, name)
         _refuse_last_admin(session, account)
+        session.exec(update(SceneObject).where(col(SceneObject.assignee) == account.name).values(assignee=None))
         session.delete(account)
         audit.note(session, "removed", account=account.name, who=by, detail=account.role)
 
@@ -54,7 +86,7 @@ def change(
 
     Raises Conflict for the role of the last admin.
     """
-    wanted = _role(role) if role is not None else None
+    wanted = known_role(role) if role is not None else None
     if password is not None:
         passwords.refuse_weak(name, password)
     digest = _hashed(password) if password is not None else None
@@ -81,10 +113,11 @@ def verified(engine: Engine, name: str, password: str) -> Account | None:
     with reading(engine) as session:
         account = session.exec(select(Account).where(Account.name == name.lower())).first()
     try:
-        _hasher().verify(account.password if account else _nobodys_password(), password[: passwords.LONGEST])
+        stored = account.password if account else NO_PASSWORD
+        _hasher().verify(stored or _nobodys_password(), password[: passwords.LONGEST])
     except (VerificationError, InvalidHashError):
         return None
-    return account
+    return account if stored else None
 
 
 def person(account: Account) -> Person:
@@ -108,7 +141,15 @@ def _refuse_last_admin(session: Session, account: Account) -> None:
         raise Conflict(f"{account.name} is the only admin", hint="make somebody else admin first")
 
 
-def _role(role: str) -> Role:
+def _checked(name: str) -> str:
+    name = name.lower()
+    if not _NAME.fullmatch(name):
+        raise InputError(f"{name[:80]!r} is no name for an account", hint="letters, digits and . _ - @ +; at most 60")
+    return name
+
+
+def known_role(role: str) -> Role:
+    """The role of that name; raises InputError."""
     for known in ROLES:
         if role == known:
             return known

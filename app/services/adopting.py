@@ -11,18 +11,18 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import Engine
 from sqlmodel import Session, SQLModel, col, delete, select
 
-from app.db import history, keys
+from app.db import history, keys, queries
 from app.db.description import placed, read_description
 from app.db.engine import writing
 from app.db.keys import stored_entry
 from app.db.queries import clicks_of
-from app.db.tables import Account, Bundle, Comment, Event, Job, Point, Project, ProjectMember, SceneObject, Verdict
-from app.files import ProjectFiles, project_files
+from app.db.tables import Account, Bundle, Comment, Event, Job, Point, Project, ProjectMember, SceneObject, TrueLength, Verdict
+from app.files import ProjectFiles, delete_folder, project_files
 from app.jobs.outcomes import adopt_capture, bundle_row, drawn_in
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError, R2C2RError
@@ -35,10 +35,16 @@ CHOSEN = {
     "segmenter",
     "generator",
     "matcher",
+    "arm",
     "register_depth",
+    "scale",
     "members_only",
     "review_state",
+    "tags",
+    "checklist",
+    "archived",
 }  # what people chose about a project
+_Said = TypeVar("_Said", Comment, TrueLength)
 _ID = re.compile(r"[0-9a-f]{12}")
 
 
@@ -76,7 +82,9 @@ def adopt(session: Session, data_dir: Path, description: Description, who: str) 
     project.review_state = "draft"  # what was approved is closed to changes until all of it is back
     session.flush()
     items = _adopt_objects(session, project, files, description, who, deleted_too=not known)
-    _adopt_comments(session, project, description, items)
+    about = _still_known(session, project, description) | items
+    _adopt_said(session, project, Comment, description.comments, about)
+    _adopt_said(session, project, TrueLength, description.true_lengths or [], about)
     _adopt_bundles(session, project, files, description)
     _adopt_people(session, project, description)
     if not known:
@@ -114,12 +122,25 @@ def _adopt_objects(
                 session.add(item)
         items[entry.id] = item
     keys.note_project(session, project)
+    _renumber_masks(files, items)
     return items
+
+
+def _renumber_masks(files: ProjectFiles, items: dict[int | None, SceneObject]) -> None:
+    """Masks are kept by the number of their object: those of objects that got another one follow it."""
+    moved = {str(old): str(item.id) for old, item in items.items() if old is not None and item.id != old}
+    there = [old for old in moved if (files.masks / old).is_dir()]
+    for old in there:  # aside first: one's new number may be another's old one
+        (files.masks / old).rename(files.masks / f".{old}")
+    for old in there:
+        delete_folder(files.masks / moved[old])
+        (files.masks / f".{old}").rename(files.masks / moved[old])
 
 
 def _write_prompts(session: Session, item: SceneObject, entry: DescribedObject, _files: ProjectFiles) -> None:
     item.name, item.category, item.colour, item.deleted = entry.name, entry.category, entry.colour, False
     item.front, item.frames, item.crop, item.run_name = entry.front, entry.frames, entry.crop, entry.run_name
+    item.assignee = entry.assignee if entry.assignee and queries.has_account(session, entry.assignee) else None
     session.add(item)
     session.exec(delete(Point).where(col(Point.object_id) == item.id))
     session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in entry.points)
@@ -147,14 +168,26 @@ def _new_object(session: Session, project: Project, entry: DescribedObject) -> S
     return item
 
 
-def _adopt_comments(session: Session, project: Project, description: Description, items: dict[int | None, SceneObject]) -> None:
-    stored = {(row.who, row.at) for row in session.exec(select(Comment).where(Comment.project_id == project.id))}
-    for entry in description.comments:
+def _still_known(session: Session, project: Project, description: Description) -> dict[int | None, SceneObject]:
+    """The objects that have the number and name they had, deleted ones too: what is said of them stays theirs."""
+    stored = {row.id: row for row in session.exec(select(SceneObject).where(SceneObject.project_id == project.id))}
+    had = ((entry.id, entry.name) for entry in description.objects)
+    return {number: stored[number] for number, name in had if number in stored and stored[number].name == name}
+
+
+def _adopt_said(
+    session: Session,
+    project: Project,
+    table: type[_Said],
+    told: list[dict[str, Any]],
+    items: dict[int | None, SceneObject],
+) -> None:
+    """Rows for what somebody said at a time at which the database has nothing of theirs."""
+    stored = {(row.who, row.at) for row in session.exec(select(table).where(table.project_id == project.id))}
+    for entry in told:
         if (entry.get("who"), entry.get("at")) not in stored:
             item = items.get(entry.get("object_id"))
-            session.add(
-                Comment(**{**_fields(Comment, entry), "project_id": project.id, "object_id": item.id if item else None})
-            )
+            session.add(table(**{**_fields(table, entry), "project_id": project.id, "object_id": item.id if item else None}))
 
 
 def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, description: Description) -> None:
@@ -173,10 +206,12 @@ def _adopt_people(session: Session, project: Project, description: Description) 
     """Its owner and members as far as they have accounts here: whose name nobody has is not let in."""
     if description.members is None:
         return
-    told = {*description.members, *filter(None, [description.owner])}
+    told = {*description.members, *filter(None, [description.owner, description.assignee])}
     found = {account.name: account.id for account in session.exec(select(Account).where(col(Account.name).in_(told)))}
     if project.owner_id is None and description.owner in found:
         project.owner_id = found[description.owner]
+    if project.assignee_id is None and description.assignee in found:
+        project.assignee_id = found[description.assignee]
     session.exec(delete(ProjectMember).where(col(ProjectMember.project_id) == project.id))
     session.add_all(
         ProjectMember(project_id=project.id, account_id=found[name] or 0) for name in description.members if name in found

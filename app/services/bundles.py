@@ -17,6 +17,7 @@ from app.db import queries
 from app.db.engine import reading
 from app.db.tables import Bundle
 from app.errors import NotFound, NotReady
+from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services.bundle_changes import changes
 from app.services.context import Context
@@ -62,11 +63,17 @@ def part(context: Context, project_id: str, version: int, formats: frozenset[str
         raise InputError(f"a bundle has no format {sorted(unknown)[0][:60]!r}", hint=f"its formats: {', '.join(sorted(names))}")
     if formats == names:
         return whole
+    return kept_part(context, project_id, whole, version, "-".join(sorted(formats)), lambda: _with_formats(whole.path, formats))
+
+
+def kept_part(
+    context: Context, project_id: str, whole: BundleFile, version: int, key: str, made: Callable[[], bytes]
+) -> BundleFile:
+    """A part of a bundle as a zip of its own, made once."""
     with reading(context.engine) as session:
         files = context.files(queries.project_row(session, project_id))
-    key = "-".join(sorted(formats))
     target = files.previews / f"bundle-v{version}" / f"{key}.zip"
-    kept_file(files, target, lambda: _with_formats(whole.path, formats))
+    kept_file(files, target, made)
     return BundleFile(target, whole.file_name.replace(".zip", f"-{key}.zip"), f"{whole.sha256}-{key}")
 
 
@@ -92,7 +99,7 @@ def compare(context: Context, project_id: str, older: int, newer: int) -> list[s
 def certificate(context: Context, project_id: str) -> schemas.Certificate:
     """The newest bundle's certificate."""
     with reading(context.engine) as session:
-        queries.project_row(session, project_id)
+        inputs = queries.project_row(session, project_id).inputs
         row = queries.newest_bundle(session, project_id)
     if row is None or not row.certificate:
         raise NotReady("there is no certified bundle yet", hint="run the project first")
@@ -107,7 +114,7 @@ def certificate(context: Context, project_id: str) -> schemas.Certificate:
         "drift_m": 0.0,
         "realtime_factor": 0.0,
     }
-    return schemas.Certificate.model_validate({**empty, **known, "version": row.version})
+    return schemas.Certificate.model_validate({**empty, **known, "version": row.version, "current": row.inputs == inputs})
 
 
 def member(context: Context, project_id: str, name: str) -> Path:
@@ -118,10 +125,22 @@ def member(context: Context, project_id: str, name: str) -> Path:
         files = context.files(project)
     if row is None:
         raise NotReady("there is no bundle yet", hint="run the project first")
-    target = files.previews / f"bundle-v{row.version}" / name
+    return _taken_out(files, row.version, files.bundles / row.path, name)
+
+
+def picture(context: Context, project_id: str, version: int, name: str) -> Path:
+    """A picture of one version, taken out of the zip once."""
+    bundle = file(context, project_id, version)
+    with reading(context.engine) as session:
+        files = context.files(queries.project_row(session, project_id))
+    return _taken_out(files, version, bundle.path, name)
+
+
+def _taken_out(files: ProjectFiles, version: int, bundle: Path, name: str) -> Path:
+    target = files.previews / f"bundle-v{version}" / name
     if not target.is_file():
         try:
-            with zipfile.ZipFile(files.bundles / row.path) as archive:
+            with zipfile.ZipFile(bundle) as archive:
                 content = archive.read(_inside(archive, name))
         except (KeyError, FileNotFoundError) as error:
             raise NotFound(f"the bundle has no {name}") from error
@@ -153,6 +172,11 @@ def folder(context: Context, project_id: str) -> Path | None:
     return urdf.parent if urdf else None
 
 
+def root_of(archive: zipfile.ZipFile) -> str:
+    """What every path of the bundle begins with in its zip."""
+    return _inside(archive, "manifest.json").removesuffix("manifest.json")
+
+
 def _inside(archive: zipfile.ZipFile, name: str) -> str:
     """The member called `name`, wherever the bundle's root is in the zip."""
     for member_name in sorted(archive.namelist(), key=len):
@@ -163,15 +187,16 @@ def _inside(archive: zipfile.ZipFile, name: str) -> str:
 
 def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
     """The zip without the other formats' scenes; without their meshes too, where no chosen format has use for them."""
-    left_out = {entry.file for entry in known_formats() if entry.name not in formats}
+    others = [entry for entry in known_formats() if entry.name not in formats]
     meshes = any(entry.reads_meshes for entry in known_formats() if entry.name in formats)
     made = io.BytesIO()
 
     def stays(path: str) -> bool:
-        parts = path.split("/")
-        return parts[-1] not in left_out and (meshes or "meshes" not in parts)
+        inner = path.removeprefix(top)
+        return not any(entry.owns(inner) for entry in others) and (meshes or inner.split("/")[0] not in ("meshes", "assets"))
 
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
+        top = root_of(archive)
         for entry in filter(lambda entry: stays(entry.filename), archive.infolist()):
             content = archive.read(entry)
             if entry.filename.rsplit("/", 1)[-1] == "manifest.json":

@@ -1,6 +1,7 @@
 """Frames' cameras in the recording's own world, in which people draw, and what relates that world to the levelled one."""
 
-from typing import NamedTuple
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from app.errors import NotFound
 from app.files import ProjectFiles
 from app.services import views
 from app.services.context import Context
+from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Capture
 
@@ -29,16 +31,15 @@ def camera(context: Context, project_id: str, index: int) -> schemas.FrameCamera
     frame, level = views.frame_of(files, index), levelled(files)
     if frame is None or level is None:
         raise NotFound(f"the recording has no frame {index}", hint="its frames are listed under /frames")
-    seen = frame.rgb_camera
     return schemas.FrameCamera(
-        width=seen.width,
-        height=seen.height,
-        fx=seen.fx,
-        fy=seen.fy,
-        cx=seen.cx,
-        cy=seen.cy,
+        **pinhole(frame.rgb_camera),
         camera_from_capture=(frame.world_from_camera.inverse @ level.world_from_capture).matrix.tolist(),
     )
+
+
+def pinhole(camera: Intrinsics) -> dict[str, Any]:
+    """The fields of a frame's camera that do not depend on where it stood."""
+    return asdict(camera)
 
 
 def levelled(files: ProjectFiles) -> Levelled | None:

@@ -71,6 +71,7 @@ def _group(
         name=item.name,
         run_name=item.result_name,
         category=item.category,
+        assignee=item.assignee,
         chosen=chosen,
         chosen_by="person" if by_person else facts["chosen_by"],
         reason=f"chosen by {verdicts[accepted].who if accepted else 'a person'}" if by_person else facts["reason"],

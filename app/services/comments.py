@@ -21,7 +21,7 @@ def list_comments(context: Context, project_id: str) -> list[schemas.Comment]:
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
         rows = session.exec(select(Comment).where(Comment.project_id == project_id).order_by(col(Comment.id)))
-        return [_shape(row) for row in rows]
+        return [shape(row) for row in rows]
 
 
 def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.Comment:
@@ -40,9 +40,9 @@ def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.C
         session.add(row)
         session.flush()
         _note(context, session, row, "comment", f"commented: {body.text}", {"comment": row.id})
-        shape = _shape(row)
+        stored = shape(row)
     _tell(context, project_id)
-    return shape
+    return stored
 
 
 def change(context: Context, project_id: str, comment_id: int, body: schemas.CommentPatch) -> schemas.Comment:
@@ -54,14 +54,14 @@ def change(context: Context, project_id: str, comment_id: int, body: schemas.Com
             raise NotFound(f"no comment {comment_id} in this project")
         if body.resolved == (row.resolved_at is not None):
             state = "resolved" if body.resolved else "open"
-            raise Conflict(f"the comment is {state} already", current=_shape(row).model_dump())
+            raise Conflict(f"the comment is {state} already", current=shape(row).model_dump())
         row.resolved_by, row.resolved_at = (context.who, time.time()) if body.resolved else ("", None)
         session.add(row)
         what = "resolved" if body.resolved else "opened again"
         _note(context, session, row, "resolve" if body.resolved else "reopen", f"{what}: {row.text}", {"comment": row.id})
-        shape = _shape(row)
+        stored = shape(row)
     _tell(context, project_id)
-    return shape
+    return stored
 
 
 def _note(context: Context, session: Session, row: Comment, action: str, text: str, after: dict[str, Any]) -> None:
@@ -75,5 +75,6 @@ def _tell(context: Context, project_id: str) -> None:
     projects.tell(context, project_id)
 
 
-def _shape(row: Comment) -> schemas.Comment:
+def shape(row: Comment) -> schemas.Comment:
+    """A comment as it goes over the wire."""
     return schemas.Comment.model_validate({**row.model_dump(exclude={"project_id", "object_id"}), "object": row.object_id})

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sqlalchemy import Engine
 
+from app.db.channel import Channel
 from app.db.queries import DrawnIn
 from app.db.tables import Project
 from app.errors import Forbidden
@@ -13,13 +14,17 @@ from app.gates import Gates
 from app.hub import Hub
 from app.jobs.live import LiveSegmenters
 from app.jobs.runner import Runner
+from app.metrics import Metrics
 from app.process import Workers
 from app.security import Person, Role
 from app.services.access import Access
 from app.services.at_work import AtWork
 from app.services.descriptions import Descriptions
+from app.services.oidc import Provider
 from app.services.people import People
+from app.services.posting import Posting
 from app.settings import Settings
+from app.store.protocol import Store
 from app.viewer.client import Viewer
 
 
@@ -30,16 +35,21 @@ class Context:
     settings: Settings
     engine: Engine
     hub: Hub
+    channel: Channel | None  # to other servers, where the database is shared
+    store: Store
     people: People
     access: Access
     uploads: AtWork
     descriptions: Descriptions
+    posting: Posting
     person: Person  # who asks; outside a request, who started the server
     runner: Runner
     live: LiveSegmenters
     viewer: Viewer
     gates: Gates  # where requests wait for heavy work
     probes: Workers
+    metrics: Metrics
+    provider: Provider | None  # of people's identities
     static: Path
 
     @property

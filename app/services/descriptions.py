@@ -18,6 +18,7 @@ from app.db.engine import reading
 from app.db.tables import Project
 from app.errors import NotFound
 from app.files import ProjectFiles, free_name, project_files
+from app.schemas.description import Description
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
 
@@ -83,20 +84,23 @@ class Descriptions:
             return []
 
     def _catch_up(self, project_id: str) -> None:
-        """Write the file where it is older than the rows; a newer one tells of a restored database, and is set aside."""
+        """Write the file where it is older than the rows, or of an r2c2r that told less.
+
+        A newer one tells of a restored database, and is set aside.
+        """
         files = project_files(self._settings.data_dir, project_id)
         with reading(self._engine) as session:
             row = session.get(Project, project_id)
             now = changed(session, row) if row else 0.0
-        then = _described(files)
-        if then is not None and then > now:
+        said = _described(files)
+        if said is not None and said.changed > now:
             kept = free_name(self._settings.unknown, f"{project_id}-newer")
             kept.mkdir(parents=True)
             files.description.replace(kept / files.description.name)
             _log.warning(
                 "%s: its project.json is newer than the database; moved to %s, where an admin can adopt it", project_id, kept
             )
-        if then is None or then != now:
+        if said is None or said.changed != now or said.true_lengths is None:
             self._write(project_id)
 
     def _write(self, project_id: str) -> None:
@@ -111,9 +115,9 @@ class Descriptions:
             files.write(files.description, written(description))
 
 
-def _described(files: ProjectFiles) -> float | None:
-    """When what project.json says was last changed; None where it says nothing that can be read."""
+def _described(files: ProjectFiles) -> Description | None:
+    """What project.json says; None where it says nothing that can be read."""
     try:
-        return read_description(files.description).changed
+        return read_description(files.description)
     except (FileNotFoundError, InputError):
         return None

@@ -6,14 +6,15 @@ from pathlib import Path
 from sqlmodel import Session, select
 
 from app import archives, schemas
-from app.db.engine import writing
-from app.db.tables import Account, Job, Project, Upload
-from app.errors import NotFound
+from app.db import queries
+from app.db.engine import reading, writing
+from app.db.tables import Account, Event, Job, Project, Upload
+from app.errors import Conflict, NotFound
 from app.files import project_files, require_free, safe_name
-from app.services import projects, quotas
+from app.services import project_shapes, projects, quotas
 from app.services.context import Context
 from app.services.system import allowed_path
-from r2c2r_core.errors import CaptureError
+from r2c2r_core.errors import CaptureError, InputError
 
 
 def from_finished_upload(context: Context, upload: Upload, received: Path) -> schemas.Project:
@@ -25,11 +26,12 @@ def from_finished_upload(context: Context, upload: Upload, received: Path) -> sc
         target.parent.mkdir(parents=True, exist_ok=True)
         files.half_made_mark.touch()
         received.replace(target)
+    context.store.keep(upload.id)  # before a job can look for it
     with writing(context.engine) as session:
         quotas.check_project(context, session)
         name = _name(upload.name, upload.file_name)
         project = projects.new_project(
-            session, name, file_name, target, project_id=upload.id, began=upload.created, owner_id=_account(context, session)
+            session, name, file_name, target, project_id=upload.id, began=upload.created, owner_id=account_of(context, session)
         )
         session.delete(session.merge(upload))
         job = queue_job(context, session, project, "import", {})
@@ -37,8 +39,37 @@ def from_finished_upload(context: Context, upload: Upload, received: Path) -> sc
     return _started(context, project.id, job)
 
 
+def require_awaited(context: Context, project_id: str) -> None:
+    """Raise Conflict for a project that has its recording."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+    if not project_shapes.awaits_recording(project):
+        raise Conflict(f"{project.name} has its recording", hint="import another one as a project of its own")
+
+
+def into_project(context: Context, project_id: str, upload: Upload, received: Path) -> schemas.Project:
+    """The recording of a project that has none; it is read, and refused where its frames are others."""
+    name = safe_name(upload.file_name)
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        if not project_shapes.awaits_recording(project):
+            raise Conflict(f"{project.name} was given a recording meanwhile", hint="look at it again")
+        target = context.files(project).source / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        received.replace(target)
+        context.store.keep(project_id)  # before a job can look for it
+        now = time.time()
+        project.source_path, project.source_name, project.status, project.error = str(target), name, "importing", None
+        session.add(Event(project_id=project_id, scope="project", action="recording", text=name, who=context.who, at=now))
+        session.delete(session.merge(upload))
+        job = queue_job(context, session, project, "import", {})
+    return _started(context, project_id, job)
+
+
 def from_path(context: Context, body: schemas.ImportPath) -> schemas.Project:
     """A project from a recording on this machine; it is read where it is."""
+    if context.settings.store:
+        raise InputError("this server's jobs run on other machines, which have no such path", hint="upload the recording")
     source = allowed_path(context, body.path)
     if not source.exists():
         raise NotFound(f"{source}: no such file or folder", hint="check the path")
@@ -50,7 +81,7 @@ def from_path(context: Context, body: schemas.ImportPath) -> schemas.Project:
     _require_room(context)
     with writing(context.engine) as session:
         project = projects.new_project(
-            session, _name(body.name, source.name), source.name, source, owner_id=_account(context, session)
+            session, _name(body.name, source.name), source.name, source, owner_id=account_of(context, session)
         )
         job = queue_job(context, session, project, "import", {})
     return _started(context, project.id, job)
@@ -62,7 +93,7 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
     with writing(context.engine) as session:
         quotas.check_project(context, session, sample=True)
         project = projects.new_project(
-            session, body.name or "Sample kitchen", quotas.SAMPLE, None, owner_id=_account(context, session)
+            session, body.name or "Sample kitchen", quotas.SAMPLE, None, owner_id=account_of(context, session)
         )
         scan = project_files(context.settings.data_dir, project.id).source / "scan.r3d"
         project.source_path = str(scan)
@@ -81,7 +112,7 @@ def queue_job(context: Context, session: Session, project: Project, kind: str, p
     return job
 
 
-def _account(context: Context, session: Session) -> int | None:
+def account_of(context: Context, session: Session) -> int | None:
     """The account of who asks; None for whoever started the server."""
     mine = select(Account.id).where(Account.name == context.who)
     return session.exec(mine).first() if context.person.account else None

@@ -1,7 +1,5 @@
 """Heavy work: start, watch, cancel, read the log."""
 
-from pathlib import Path
-
 from sqlmodel import Session, col, select
 
 from app import schemas
@@ -86,8 +84,9 @@ def retry(context: Context, job_id: int) -> schemas.Job:
         else:
             if said := queries.no_retry(row.kind, project.source_path):
                 raise Conflict(said, hint="delete the project, and upload another one")
-            project.status, project.error = "importing", None
-            session.add(project)
+            if row.kind in queries.READS_RECORDING:
+                project.status, project.error = "importing", None
+                session.add(project)
             job = queue_job(context, session, project, row.kind, row.payload)
     context.runner.queued(job.id or 0)
     projects.tell(context, job.project_id)
@@ -107,12 +106,17 @@ def events(context: Context, job_id: int, after: int) -> list[schemas.JobEvent]:
 def log(context: Context, job_id: int, tail: int) -> str:
     """The end of the job's log."""
     with reading(context.engine) as session:
-        path = queries.job_row(session, job_id).log_path
-    if path is None or not Path(path).is_file():
+        row = queries.job_row(session, job_id)
+        if row.log_path is None:
+            return ""
+        path = context.files(queries.project_row(session, row.project_id)).here(row.log_path)
+    if row.owner != context.runner.rows.owner:
+        context.store.fetch_log(row.project_id, path)
+    if not path.is_file():
         return ""
     wanted = min(max(tail, 1), 2_000_000)
-    with Path(path).open("rb") as handle:
-        handle.seek(max(Path(path).stat().st_size - wanted, 0))
+    with path.open("rb") as handle:
+        handle.seek(max(path.stat().st_size - wanted, 0))
         text = handle.read(wanted).decode(errors="replace")
     return text if context.person.may("admin") else without_places(text, context.settings)
 

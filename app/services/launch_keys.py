@@ -15,12 +15,16 @@ from app.db.engine import writing
 from app.db.tables import LaunchKey
 
 
-def begin(engine: Engine, key: str | None) -> None:
-    """Forget earlier servers' keys; this one's first is `key`, None where the printed address signs nobody in."""
+def forget(engine: Engine) -> None:
+    """Drop earlier servers' keys; before the new one says where it is, for a key that is made from then on opens it."""
     with writing(engine) as session:
         session.exec(delete(LaunchKey))
-        if key is not None:
-            _store(session, key)
+
+
+def keep(engine: Engine, key: str) -> None:
+    """Store the first key of a server, which it prints."""
+    with writing(engine) as session:
+        _store(session, key)
 
 
 def new(engine: Engine) -> str:
@@ -40,7 +44,7 @@ def use(session: Session, key: str) -> bool:
 
 
 def _store(session: Session, key: str) -> None:
-    session.add(LaunchKey(digest=_digest(key), created=time.time()))
+    session.merge(LaunchKey(digest=_digest(key), created=time.time()))
 
 
 def _digest(key: str) -> str:

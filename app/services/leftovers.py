@@ -39,7 +39,7 @@ def tidy(context: Context) -> None:
         half_made = project_files(data, folder.name).half_made
         if folder.name in projects or (half_made and folder.name in uploads) or not _is_old(folder):
             continue
-        if half_made:
+        if half_made or context.store.was_deleted(folder.name):
             delete_folder(folder)
         else:
             set_aside(context.settings.unknown, folder)

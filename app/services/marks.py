@@ -13,6 +13,8 @@ from r2c2r_core.model.scene import SceneObject
 
 _REACH_M = 0.08  # an axis sticks out of its box by this much
 _AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
+_CHOSEN = (255, 225, 77)
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _LONGEST_TEXT = 44
 _LINE_M = 0.07  # between two findings of one object, so that neither hides the other
 
@@ -24,14 +26,18 @@ def marks(
     items = [item for item in _scene_objects(files) if name is None or item.name == name]
     bundle = queries.newest_bundle(session, project_id)
     findings = (bundle.certificate or {}).get("findings", []) if bundle else []
-    found = [mark for item in items for mark in _axes(item)] if name is not None else []
+    found = [mark for item in items for mark in (*_axes(item), _box(item))] if name is not None else []
     for finding in findings:
         item = next((i for i in items if finding["where"] == i.name or finding["where"].startswith(f"{i.name}_")), None)
         if item is not None and (name is not None or finding["severity"] == "error"):
             above = _LINE_M * sum(mark["colour"] == list(_FINDING) for mark in found)  # one object may have several
             found.append(_word(item.world_from_object.translation + np.array([0, 0, above]), finding["message"], _FINDING))
     said = select(Comment).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
-    found += [_word(np.asarray(c.point_world), f"{c.who}: {c.text}", _COMMENT) for c in session.exec(said) if c.point_world]
+    found += [
+        {**_word(np.asarray(c.point_world), f"{c.who}: {c.text}", _COMMENT), "pin": True}
+        for c in session.exec(said)
+        if c.point_world
+    ]
     return found, items[0].world_from_object.translation.tolist() if name is not None and items else None
 
 
@@ -46,8 +52,15 @@ def _axes(item: SceneObject) -> list[dict[str, Any]]:
             (origin - half * axis, origin + half * axis) if joint.type == "revolute" else (origin, origin + joint.upper * axis)
         )
         source = joint.sources.get("axis", "")
-        found.append({**_word(end, f"{joint.type}, axis {source}", _AXIS), "line": [start.tolist(), end.tolist()]})
+        found.append({**_word(end, f"{joint.type}, axis {source}", _AXIS), "lines": [[start.tolist(), end.tolist()]]})
     return found
+
+
+def _box(item: SceneObject) -> dict[str, Any]:
+    """The edges of the chosen object's box."""
+    corners = item.world_from_object.apply(_CORNERS * item.dimensions_m / 2)
+    ends = [(k, m) for k in range(8) for m in range(k + 1, 8) if np.abs(_CORNERS[k] - _CORNERS[m]).sum() == 2]
+    return {"lines": [[corners[k].tolist(), corners[m].tolist()] for k, m in ends], "colour": list(_CHOSEN)}
 
 
 def _word(at: np.ndarray, text: str, colour: tuple[int, int, int]) -> dict[str, Any]:

@@ -245,21 +245,6 @@ def front_of(context: Context, project: Project, item: SceneObject, places: Plac
     return run.front if run is not None else None
 
 
-def openings(context: Context, project_id: str) -> list[schemas.Opening]:
-    """How the objects' leaves were filmed to move, as far as their masks are done."""
-    with reading(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        items = queries.live_objects(session, project_id)
-    places = Places.of(context.files(project))
-    known = [(item.id or 0, found_of(context, project, item, places)) for item in items]
-    return [
-        schemas.Opening(object=number, **motion)
-        for number, found in known
-        if found is not None and found.state == "done"
-        for motion in found.masks.motions
-    ]
-
-
 def _outdated(found: Found | None) -> bool:
     return found is not None and found.masks.end == mask_store.OUTDATED
 

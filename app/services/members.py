@@ -9,7 +9,7 @@ from sqlmodel import Session, col, select
 from app import schemas
 from app.db.engine import reading
 from app.db.tables import Account, SignIn
-from app.services import accounts, audit
+from app.services import accounts, audit, crossing
 from app.services.context import Context
 
 
@@ -41,7 +41,7 @@ def remove(context: Context, name: str) -> None:
     """Delete the account: its sessions and open connections end; what the person did keeps the name."""
     accounts.remove(context.engine, name, by=context.who)
     context.people.look_again()
-    context.access.look_again()
+    crossing.sees_changed(context)
 
 
 def _one(context: Context, name: str) -> schemas.AccountInfo:

@@ -80,6 +80,7 @@ def _adopt(context: Context, project_id: str, object_id: int, received: Path, wi
     target.parent.mkdir(parents=True, exist_ok=True)
     received.replace(target)
     try:
+        context.store.keep(project_id)  # before a row names it
         job, text = reviews.store_override(context, project_id, object_id, wish)
     except BaseException:  # whatever it was: nothing names the file
         target.unlink(missing_ok=True)

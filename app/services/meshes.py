@@ -1,5 +1,6 @@
 """A candidate's mesh for a person's eyes: upright and facing the camera where its placement is known."""
 
+from collections.abc import Callable
 from itertools import permutations, product
 from typing import Any
 
@@ -9,14 +10,17 @@ from scipy.spatial import cKDTree  # here, not where it is used: two first reque
 
 from app.files import ProjectFiles
 from app.services import views
-from r2c2r_core.arrays import Matrix3
+from r2c2r_core.arrays import Mask, Matrix3, Points
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 
 SIZE = 320
+TURNS = 24  # pictures of a turntable, side by side from left to right
+TURN_SIZE = 240
 SAMPLES = 1500
+_MARK, _FADED = np.array([235.0, 95.0, 20.0]), 0.2  # RGB of what differs, and how much of its own colour shows through
 _AZIMUTH, _ELEVATION = np.deg2rad(-30.0), np.deg2rad(20.0)
 
 _BOX_TURNS = [  # the 24 ways to lay a box onto a box
@@ -78,15 +82,32 @@ def mesh_glb(mesh: TexturedMesh, rotation: Matrix3) -> bytes:
 
 def mesh_picture(mesh: TexturedMesh, rotation: Matrix3) -> bytes:
     """The mesh as a PNG with a transparent ground, every candidate from the same side and distance."""
-    vertices = _unit(mesh.vertices @ rotation.T)
-    camera = Intrinsics(fx=1.9 * SIZE, fy=1.9 * SIZE, cx=SIZE / 2, cy=SIZE / 2, width=SIZE, height=SIZE)
+    return cv2.imencode(".png", _drawn(mesh, mesh.vertices @ rotation.T, 0.0, SIZE))[1].tobytes()
+
+
+def turntable(mesh: TexturedMesh, rotation: Matrix3, marked: Callable[[Points], Mask] | None = None) -> bytes:
+    """The mesh from `TURNS` sides, turned about its upright axis; points (n, 3) that are `marked` are in another colour."""
+    upright_points = mesh.vertices @ rotation.T
+    sides = [_drawn(mesh, upright_points, 2 * np.pi * k / TURNS, TURN_SIZE, marked) for k in range(TURNS)]
+    return cv2.imencode(".png", np.hstack(sides))[1].tobytes()
+
+
+def _drawn(
+    mesh: TexturedMesh, points: Points, turn_rad: float, size: int, marked: Callable[[Points], Mask] | None = None
+) -> np.ndarray:
+    """BGRA (size, size, 4) of an upright mesh, turned."""
+    around = Rigid3(cv2.Rodrigues(np.array([0.0, 0.0, turn_rad]))[0])
+    vertices = around.apply(_unit(points))
+    camera = Intrinsics(fx=1.9 * size, fy=1.9 * size, cx=size / 2, cy=size / 2, width=size, height=size)
     attributes = np.column_stack([mesh.uv, np.ones(len(vertices))])
     drawn = rasterize(vertices, mesh.faces, attributes, camera, _camera_from_world())
     hit = drawn.depth_m > 0
-    colours = _textured(mesh.texture, drawn.attributes) * _shading(drawn.depth_m, camera)[..., None]
-    alpha = hit.astype(np.uint8) * 255
-    rgba = np.dstack([np.clip(colours, 0, 255).astype(np.uint8)[..., ::-1], alpha])
-    return cv2.imencode(".png", rgba)[1].tobytes()
+    colours = _textured(mesh.texture, drawn.attributes)
+    if marked is not None:
+        places = rasterize(vertices, mesh.faces, np.asarray(points), camera, _camera_from_world()).attributes[hit]
+        colours[hit] = np.where(marked(places)[:, None], _FADED * colours[hit] + (1 - _FADED) * _MARK, colours[hit])
+    shaded = np.clip(colours * _shading(drawn.depth_m, camera)[..., None], 0, 255).astype(np.uint8)
+    return np.dstack([shaded[..., ::-1], hit.astype(np.uint8) * 255])
 
 
 def _sampled(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray, Matrix3]:

@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 
 from app import schemas
-from app.db import queries
+from app.db import history, queries
 from app.db.engine import reading
 from app.errors import NotFound, NotReady
 from app.files import ProjectFiles
-from app.services import masks, media, views
+from app.services import masks, media, openings, views
+from app.services.cameras import pinhole
 from app.services.context import Context
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import Intrinsics, unproject
@@ -22,11 +23,15 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.ingest.store import depth_path
 from r2c2r_core.model.scene import Joint, SceneObject
+from r2c2r_core.synthesize.filmed import widest
+from r2c2r_core.synthesize.marked import part_of
+from r2c2r_core.workspace import content_key
 
 WIDTH = 640
 PHOTOS = 12
 _AT_BORDER = 0.01  # of the image: what reaches nearer to its edge may go on beyond
 FAR_M = 0.03  # a residual of this much has its full colour
+_FAINT = 0.25  # of its opacity, what something else covers: it is there, and not in front
 _OUTLINE = (77, 225, 255)  # BGR
 _EDGE = 0.004  # Laplacian of the inverse depth over its largest value: a step of about 1 cm at 2 m
 
@@ -47,26 +52,29 @@ def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectP
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
+        said = openings.states_said(history.override_data(session, item))
         files = context.files(project)
     found = masks.found_of(context, project, item)
-    fitted = _scene_object(files, "warp", item.result_name) or _scene_object(files, "synthesize", item.result_name)
+    stages = ("warp", "synthesize")
+    fitted = next((one for stage in stages if (one := openings.built(files, stage, item.result_name, said))), None)
     seen = found.masks.seen().tolist() if found else []
     best = sorted(seen, key=lambda seen: -seen[2] * seen[1])[: 6 * PHOTOS]
     spread = sorted(best)[:: max(len(best) // PHOTOS, 1)][:PHOTOS]
-    opened = _opened_frames(fitted) if fitted is not None else set()
-    chosen = spread + [one for one in seen if int(one[0]) in opened and one not in spread]
+    wanted = _opened_frames(fitted) | {frame for marks in said.values() for frame in marks} if fitted is not None else set()
+    chosen = spread + [one for one in seen if int(one[0]) in wanted and one not in spread]
     shown = [
         photo
         for frame, sure, _ in chosen
         if found is not None and (photo := _photo(files, int(frame), sure, found.masks.entry(int(frame)), fitted)) is not None
     ]
-    stages: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
+    made_by: dict[schemas.OverlayOf, str] = {"placed": "align", "primitive": "synthesize", "fitted": "warp"}
     return schemas.ObjectPhotos(
         photos=sorted(shown, key=lambda photo: (not photo.whole, -photo.confidence)),
-        version=_version(files, item.result_name),
-        of=[name for name, stage in stages.items() if _stored(files, stage, item.result_name)],
+        version=_version(files, item.result_name, said),
+        of=[name for name, stage in made_by.items() if _stored(files, stage, item.result_name)],
         world_from_object=fitted.world_from_object.matrix.tolist() if fitted else None,
         dimensions_m=fitted.dimensions_m.tolist() if fitted else None,
+        leaves=[_leaf(object_id, fitted, joint) for joint in fitted.joints] if fitted else [],
     )
 
 
@@ -76,23 +84,25 @@ def overlay(
     """The object drawn for one frame: a PNG with a transparent ground, kept until the object is placed or fitted anew."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        name = queries.object_row(session, project_id, object_id, deleted=True).result_name
+        item = queries.object_row(session, project_id, object_id, deleted=True)
+        name, said = item.result_name, openings.states_said(history.override_data(session, item))
         files = context.files(project)
-    target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name)}.png"
-    return media.kept_file(files, target, lambda: _drawn(files, name, index, of, look))
+    target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name, said)}.png"
+    return media.kept_file(files, target, lambda: _drawn(files, index, look, parts_of(files, name, of, index, said)))
 
 
 def point_under(context: Context, project_id: str, object_id: int, index: int, x: float, y: float) -> list[float] | None:
     """The point of the object's mesh, in the world, under a pixel of the stored frame; None where the mesh is not there."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
-        name = queries.object_row(session, project_id, object_id).result_name
+        item = queries.object_row(session, project_id, object_id)
+        name, said = item.result_name, openings.states_said(history.override_data(session, item))
         files = context.files(project)
     frame = views.frame_of(files, index)
     if frame is None:
         return None
     try:
-        parts = parts_of(files, name, "fitted", index) or parts_of(files, name, "placed", index)
+        parts = parts_of(files, name, "fitted", index, said) or parts_of(files, name, "placed", index, said)
     except NotReady:
         return None
     camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
@@ -106,8 +116,8 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
     return [float(value) for value in frame.world_from_camera.apply(point)[0]]
 
 
-def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int) -> list[Part]:
-    """The object's meshes in the world as they stood in a frame; NotReady while that stage has not made them."""
+def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int, said: openings.States) -> list[Part]:
+    """The object's meshes in the world as they stood in a frame, filmed or marked; NotReady before that stage made them."""
     if of == "placed":
         placement, made = (views.latest(files, stage, name) for stage in ("align", "generate"))
         asset = (
@@ -124,7 +134,7 @@ def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int) 
                 texture=mesh.texture,
             )
         ]
-    found = _scene_object(files, "warp" if of == "fitted" else "synthesize", name)
+    found = openings.built(files, "warp" if of == "fitted" else "synthesize", name, said)
     if found is None:
         raise NotReady(f"{name} is not {'fitted' if of == 'fitted' else 'built'} yet", hint="run the project first")
     return _scene_parts(found, index)
@@ -177,11 +187,11 @@ def _opened_frames(item: SceneObject) -> set[int]:
     return chosen
 
 
-def _drawn(files: ProjectFiles, name: str, index: int, of: schemas.OverlayOf, look: schemas.OverlayLook) -> bytes:
+def _drawn(files: ProjectFiles, index: int, look: schemas.OverlayLook, parts: list[Part]) -> bytes:
     frame = views.frame_of(files, index)
     if frame is None:
         raise NotFound(f"the recording has no frame {index}")
-    parts, camera_from_world = parts_of(files, name, of, index), frame.world_from_camera.inverse
+    camera_from_world = frame.world_from_camera.inverse
     if look == "residual":
         image = _residual(files, index, parts, frame.depth_camera, camera_from_world)
         image = cv2.resize(image, (WIDTH, round(WIDTH * image.shape[0] / image.shape[1])), interpolation=cv2.INTER_NEAREST)
@@ -189,7 +199,23 @@ def _drawn(files: ProjectFiles, name: str, index: int, of: schemas.OverlayOf, lo
         camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
         colours, depth = _render(parts, camera, camera_from_world)
         image = _outline(depth) if look == "outline" else np.dstack([colours, (depth > 0).astype(np.uint8) * 255])
+        image[..., 3] = np.where(_covered(files, index, depth), _FAINT * image[..., 3], image[..., 3]).astype(np.uint8)
     return cv2.imencode(".png", image)[1].tobytes()
+
+
+def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
+    """Where something that was measured stands before the drawn surface; nowhere in a frame without a depth image.
+
+    An outline's rim lies a pixel beside the surface too: what covers the nearest part of it covers the rim.
+    """
+    raw = cv2.imread(str(depth_path(views.frames_folder(files), index)), cv2.IMREAD_UNCHANGED)
+    if raw is None:
+        return np.zeros(depth.shape, bool)
+    measured = cv2.resize(decode_depth(raw), depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    spread = cv2.dilate(depth, np.ones((5, 5), np.uint8))
+    drawn = np.where(depth > 0, depth, spread)
+    covered: np.ndarray = (measured > 0) & (drawn > measured + FAR_M)
+    return covered
 
 
 def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> tuple[np.ndarray, np.ndarray]:
@@ -248,18 +274,13 @@ def _photo(
     frame = views.frame_of(files, index)
     if frame is None or entry is None:
         return None
-    camera, bits = frame.rgb_camera, entry["mask"]
+    bits = entry["mask"]
     x, y = bits["left"] / bits["width"], bits["top"] / bits["height"]
     right, bottom = x + bits["box_width"] / bits["width"], y + bits["box_height"] / bits["height"]
     joints = item.joints if item is not None else ()
     return schemas.Photo(
         frame=frame.index,
-        width=camera.width,
-        height=camera.height,
-        fx=camera.fx,
-        fy=camera.fy,
-        cx=camera.cx,
-        cy=camera.cy,
+        **pinhole(frame.rgb_camera),
         camera_from_world=frame.world_from_camera.inverse.matrix.tolist(),
         confidence=confidence,
         box=[x, y, right, bottom],
@@ -272,9 +293,24 @@ def _photo(
     )
 
 
-def _scene_object(files: ProjectFiles, stage: str, name: str) -> SceneObject | None:
-    scene = views.latest(files, stage, "scene")
-    return next((item for item in scene.objects if item.name == name), None) if scene is not None else None
+def _leaf(object_id: int, item: SceneObject, joint: Joint) -> schemas.Leaf:
+    """What it moves, closed: about its front boards, or about all of it where it has none."""
+    link = next(link for link in item.links if link.name == joint.child)
+    boxes = link.of_role("front") or link.boxes
+    corners = [box.link_from_box.apply(box_mesh(-box.size_m / 2, box.size_m / 2)[0]) for box in boxes]
+    points = link.object_from_link.apply(np.vstack(corners))
+    low, high = points.min(axis=0), points.max(axis=0)
+    return schemas.Leaf(
+        joint=joint.name,
+        part=part_of(joint, item.name),
+        type=joint.type,
+        most=widest(joint.axis_object, joint.type, item.dimensions_m),
+        pose=(item.world_from_object @ Rigid3(np.eye(3), (low + high) / 2)).matrix.tolist(),
+        size_m=(high - low).tolist(),
+        axis=item.world_from_object.turn(joint.axis_object[None])[0].tolist(),
+        pivot=item.world_from_object.apply(joint.origin_object[None])[0].tolist(),
+        opening=openings.opening_of(object_id, item, joint),
+    )
 
 
 def _stored(files: ProjectFiles, stage: str, name: str) -> bool:
@@ -285,9 +321,9 @@ def _path(files: ProjectFiles, stage: str, name: str) -> Path:
     return files.work / "nouns" / stage / f"{name if stage == 'align' else 'scene'}.noun"
 
 
-def _version(files: ProjectFiles, name: str) -> str:
-    """Changes whenever one of the stages made the object anew."""
+def _version(files: ProjectFiles, name: str, said: openings.States) -> str:
+    """Changes whenever one of the stages made the object anew, or somebody marked how far it stands open."""
     times = [
         path.stat().st_mtime_ns for stage in ("align", "synthesize", "warp") if (path := _path(files, stage, name)).is_file()
     ]
-    return f"{max(times, default=0):x}"
+    return f"{max(times, default=0):x}" + (f"-{content_key(said)[:12]}" if said else "")

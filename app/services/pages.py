@@ -9,6 +9,7 @@ from functools import lru_cache
 from html import escape
 from pathlib import Path
 from posixpath import join, normpath
+from urllib.parse import urlsplit
 
 from app.db import queries
 from app.db.engine import reading
@@ -17,7 +18,7 @@ from app.security import Person
 from app.services import projects
 from app.services.context import Context
 
-OF_A_PROJECT = ("annotate", "elevation", "run", "review", "download")
+OF_A_PROJECT = ("annotate", "elevation", "run", "review", "download", "agreement")
 SHOWN_WIDTH = 960  # of a frame, as static/js/annotate/frames.js asks for it
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
 
@@ -32,11 +33,20 @@ def html(context: Context, path: str, frame: str = "", person: Person | None = N
     return text.replace("</head>", "".join(f"  {line}\n  " for line in head) + "</head>", 1)
 
 
+def sign_in(context: Context, refused: str = "") -> str:
+    """The page on which people sign in: at the identity provider, where there is one, and why that was refused."""
+    text = (context.static / "login.html").read_text(encoding="utf-8")
+    if context.provider is not None:
+        host = escape(urlsplit(context.provider.issuer).netloc)
+        text = text.replace('href="/login/provider" hidden', 'href="/login/provider"').replace("PROVIDER", host)
+    return text.replace('id="refused">', f'id="refused">{escape(refused)}')
+
+
 def shown_at(path: str) -> tuple[str, str]:
     """Which page a path shows and of which project ("" for none), as static/js/router.js says."""
     first, project, page = [*(part for part in path.split("/") if part), "", "", ""][:3]
-    if first == "people":
-        return "people", ""
+    if first in ("inbox", "people", "templates", "webhooks"):
+        return first, ""
     if first != "p" or not project:
         return "projects", ""
     return page if page in OF_A_PROJECT else "overview", project

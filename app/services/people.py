@@ -5,6 +5,7 @@ import contextlib
 import hashlib
 import logging
 import secrets
+import threading
 import time
 from collections.abc import Callable
 
@@ -16,17 +17,20 @@ from app.db.engine import reading, writing
 from app.db.tables import Account, SignIn
 from app.errors import Conflict, Forbidden, Unauthorised
 from app.gates import Gate
-from app.security import Person
-from app.services import accounts, audit, launch_keys
+from app.security import TOKEN_PREFIX, Person
+from app.services import accounts, audit, launch_keys, tokens
 from app.services.attempts import Attempts
+from app.services.oidc import Named
 from app.settings import Settings
 from r2c2r_core.errors import R2C2RError
 
 _log = logging.getLogger(__name__)
 
 KEPT_S = 30 * 24 * 3600.0  # since it was last used
+PROVIDED_S = 24 * 3600.0  # the identity provider is asked again after a day: who left the lab is out by then
 REMEMBERED_S = 2.0  # a person is looked up again after this: `r2c2r user` changes the file from another process
 KEY_REFUSAL_S = 10.0  # a wrong key is noted at most this often: it costs its sender nothing
+BY_PROXY = "a trusted proxy"
 LOOK_UPS = 4  # at a time, in threads of their own: slow requests take those of requests
 
 
@@ -42,7 +46,10 @@ class People:
         self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
         self._ended: dict[str, tuple[str, str]] = {}  # digests of sessions that ended and may still be stored: who, from where
         self._key_refused = -KEY_REFUSAL_S
-        launch_keys.begin(engine, None if settings.accounts_only else settings.launch_token)
+        self._proxied: dict[str, str] = {}  # sessions of those whom a trusted proxy names
+        self._proxied_lock = threading.Lock()
+        if not settings.accounts_only:
+            launch_keys.keep(engine, settings.launch_token)
 
     async def of(self, session_id: str) -> Person | None:
         """Whose session it is; None when nobody's. Nobody else waits for the database meanwhile."""
@@ -50,6 +57,13 @@ class People:
         if found is not None and time.monotonic() < found[0]:
             return found[1]
         return await anyio.to_thread.run_sync(self.look_up, session_id, limiter=self._threads)
+
+    async def named_by_proxy(self, name: str, client: str) -> str:
+        """The session of whom a trusted proxy names: at first sight they are given an account. Raises InputError."""
+        found = self._proxied.get(name)
+        if found is None or await self.of(found) is None:
+            found = await anyio.to_thread.run_sync(self._enter_by_proxy, name, client, limiter=self._threads)
+        return found
 
     async def until_other(self, session_id: str, person: Person) -> Person | None:
         """Wait until the session is not that person's any more: then whose it is, such as the same one's with another role.
@@ -96,6 +110,19 @@ class People:
             raise Conflict("who started the server has no password", hint="make an account: r2c2r user add NAME --role admin")
         return await self._guess(person.name, client, self._changed_password, person.name, old, new, client)
 
+    def enter_by_provider(self, named: Named, issuer: str, client: str) -> str:
+        """A new session of whom the identity provider names; raises Conflict, InputError."""
+        with writing(self._engine) as session:
+            given = (named.subject, named.name, named.role, self._settings.default_role)
+            account = accounts.of_subject(session, *given, by=issuer)
+            entered = self._begin(session, account.id, account.name, client, f"by {issuer}")
+        self.look_again()
+        return entered
+
+    def note_refusal(self, client: str, said: str) -> None:
+        """The identity provider let somebody go on who is not let in here."""
+        audit.note_refusal(self._engine, "", client, said[:300])
+
     def sign_out(self, session_id: str, who: str, client: str) -> None:
         """The session is nobody's from now on, also where a full disk keeps it stored."""
         self._ended[_digest(session_id)] = (who, client)
@@ -134,6 +161,16 @@ class People:
         with writing(self._engine) as session:
             return self._begin(session, account.id, account.name, client, "by password")
 
+    def _enter_by_proxy(self, name: str, client: str) -> str:
+        with self._proxied_lock:  # a page's first requests come together
+            found = self._proxied.get(name)
+            if found is None or self.look_up(found) is None:
+                with writing(self._engine) as session:
+                    account = accounts.seen(session, name, self._settings.default_role, by=BY_PROXY)
+                    found = self._begin(session, account.id, account.name, client, f"by {BY_PROXY}")
+                self._proxied[name] = found
+            return found
+
     def _changed_password(self, name: str, old: str, new: str, client: str) -> str:
         account = accounts.verified(self._engine, name, old)
         if account is None:
@@ -162,6 +199,8 @@ class People:
         return person
 
     def _stored(self, session_id: str) -> Person | None:
+        if session_id.startswith(TOKEN_PREFIX):
+            return tokens.person_of(self._engine, self._settings, session_id)
         now = time.time()
         with reading(self._engine) as session:
             query = select(SignIn, Account).join(Account, isouter=True).where(SignIn.digest == _digest(session_id))
@@ -170,6 +209,8 @@ class People:
             return None
         sign_in, account = found
         if account is None and self._settings.accounts_only:
+            return None
+        if account is not None and account.subject is not None and sign_in.created < now - PROVIDED_S:
             return None
         if now - sign_in.used > 3600.0:
             with contextlib.suppress(R2C2RError), writing(self._engine) as session:  # a full disk keeps nobody out

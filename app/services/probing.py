@@ -5,6 +5,7 @@ import queue
 from pathlib import Path
 from typing import Literal
 
+from app import archives
 from app.errors import Unavailable, told_body
 from app.services.context import Context
 from r2c2r_core.errors import CaptureError, InputError, OverrideError
@@ -12,6 +13,18 @@ from r2c2r_core.errors import CaptureError, InputError, OverrideError
 Kind = Literal["recording", "mesh"]
 PROBE_S: dict[Kind, float] = {"recording": 120.0, "mesh": 300.0}
 _REFUSAL: dict[Kind, type[InputError]] = {"recording": CaptureError, "mesh": OverrideError}
+
+
+def check_recording(context: Context, path: Path, name: str) -> None:
+    """Raise CaptureError, in one line, for what the import could not read. It waits for a process, as `look_at` does."""
+    check_whole(context, path, name)
+    look_at(context, "recording", path, name)
+
+
+def check_whole(context: Context, path: Path, name: str) -> None:
+    """Raise CaptureError unless all of a zip is there, and is what may be unpacked."""
+    settings = context.settings
+    archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
 
 
 def look_at(context: Context, kind: Kind, path: Path, name: str) -> None:

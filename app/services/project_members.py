@@ -9,7 +9,7 @@ from app.db import queries
 from app.db.engine import reading, writing
 from app.db.tables import Account, Event, Project, ProjectMember
 from app.errors import Forbidden
-from app.services import projects
+from app.services import crossing, projects
 from app.services.context import Context
 from r2c2r_core.errors import InputError
 
@@ -46,16 +46,10 @@ def set_members(context: Context, project_id: str, body: schemas.MembersIn) -> s
         event = Event(project_id=project_id, scope="project", action="members", text=text, who=context.who, at=time.time())
         row.members_only, row.updated = body.members_only, event.at
         session.add_all([row, event])
-    context.access.look_again()
-    context.viewer.close(project_id, lambda session: not _sees(context, session, project_id))
-    context.hub.show_out(project_id)
+    crossing.sees_changed(context)
+    crossing.show_out(context, project_id, "is kept to its members now")
     projects.tell(context, project_id)
     return members(context, project_id)
-
-
-def _sees(context: Context, session_id: str, project_id: str) -> bool:
-    person = context.people.look_up(session_id)
-    return person is not None and context.access.sees(person, project_id)
 
 
 def _may_change(context: Context, session: Session, row: Project) -> bool:

@@ -9,7 +9,7 @@ from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import queries
-from app.db.tables import Bundle, Comment, Job, Point, Project, SceneObject, Verdict
+from app.db.tables import Account, Bundle, Comment, Job, Point, Project, SceneObject, Verdict
 
 _LEFT_OUT = (defer(Project.capture), defer(Project.notices))  # type: ignore[arg-type]  # columns, to SQLAlchemy
 
@@ -21,6 +21,7 @@ class _About(NamedTuple):
     counts: dict[str, schemas.ProjectCounts]
     jobs: dict[str, schemas.Job]
     bundles: dict[str, tuple[Bundle, bool | None]]  # and whether it passed
+    assignees: dict[str, str]
 
 
 def listed(session: Session, hidden: Collection[str]) -> list[schemas.ProjectSummary]:
@@ -36,8 +37,19 @@ def whole(session: Session, row: Project) -> schemas.Project:
     known = schemas.CaptureFacts.model_fields
     facts = schemas.CaptureFacts(**{name: row.capture[name] for name in known if name in row.capture}) if row.capture else None
     return schemas.Project(
-        **_summary(row, _about(session, row.id)), capture=facts, notices=row.notices, register_depth=row.register_depth
+        **_summary(row, _about(session, row.id)),
+        capture=facts,
+        notices=row.notices,
+        register_depth=row.register_depth,
+        scale=row.scale,
+        checklist=[schemas.ListedObject(**entry) for entry in row.checklist],
+        awaits_recording=awaits_recording(row),
     )
+
+
+def awaits_recording(row: Project) -> bool:
+    """Whether a recording may be given to the project: it has none, and none is being read."""
+    return row.status == "failed" and row.source_path is None
 
 
 def _about(session: Session, project_id: str | None) -> _About:
@@ -47,13 +59,15 @@ def _about(session: Session, project_id: str | None) -> _About:
         return col(column) == project_id if project_id is not None else col(column).is_not(None)
 
     jobs = queries.job_shapes(session, session.exec(_shown_jobs(mine(Job.project_id))).all())
-    frames = select(Project.id, func.json_extract(Project.capture, "$.frame_count")).where(mine(Project.id))
+    frames = select(Project.id, col(Project.capture)["frame_count"].as_integer()).where(mine(Project.id))
+    assignees = select(Project.id, Account.name).join(Account, col(Account.id) == Project.assignee_id).where(mine(Project.id))
     newest = select(func.max(Bundle.id)).where(mine(Bundle.project_id)).group_by(col(Bundle.project_id))
     return _About(
         frames={number: count or 0 for number, count in session.exec(frames)},
         counts=_counts(session, mine),
         jobs={job.project: job for job in jobs},
         bundles={row.project_id: (row, passed) for row, passed in queries.bundles(session, col(Bundle.id).in_(newest))},
+        assignees=dict(session.exec(assignees).all()),
     )
 
 
@@ -63,6 +77,11 @@ def _shown_jobs(mine: Any) -> Any:
     place = func.row_number().over(partition_by=col(Job.project_id), order_by=(active.desc(), col(Job.id).desc()))
     ranked = select(Job.id, place.label("place")).where(mine).subquery()
     return select(Job).join(ranked, ranked.c.id == Job.id).where(ranked.c.place == 1)
+
+
+def counts_of(session: Session, project_id: str) -> schemas.ProjectCounts:
+    """What is in one project."""
+    return _counts(session, lambda column: col(column) == project_id).get(project_id, schemas.ProjectCounts())
 
 
 def _counts(session: Session, mine: Any) -> dict[str, schemas.ProjectCounts]:
@@ -107,5 +126,9 @@ def _summary(row: Project, about: _About) -> dict[str, Any]:
         "segmenter": row.segmenter,
         "generator": row.generator,
         "matcher": row.matcher,
+        "arm": row.arm,
         "review_state": row.review_state,
+        "tags": row.tags,
+        "archived": row.archived,
+        "assignee": about.assignees.get(row.id),
     }

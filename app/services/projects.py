@@ -1,4 +1,4 @@
-"""Projects: list, rename, delete, frames, history."""
+"""Projects: list, rename, tag, archive, frames, history."""
 
 import json
 import secrets
@@ -11,24 +11,26 @@ from sqlmodel import Session, col, select
 
 from app import schemas
 from app.db import history as events
-from app.db import keys, once, queries
+from app.db import keys, queries
 from app.db.engine import reading, writing
-from app.db.tables import Event, Job, Project
-from app.errors import Conflict, NotReady
+from app.db.tables import Event, Project
+from app.errors import NotReady
 from app.file_cache import FileCache
-from app.files import ProjectFiles, delete_folder
-from app.services import masks, project_shapes
+from app.files import ProjectFiles
+from app.services import crossing, masks, project_shapes
 from app.services.context import Context
 from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.errors import BackendUnavailable
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Registry
+from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
 
 SEAMS: dict[str, Registry[Any]] = {  # what a person may choose for a project
     "segmenter": SEGMENTERS,
     "generator": GENERATORS,
     "matcher": MATCHERS,
+    "arm": ARMS,
 }
 
 
@@ -70,7 +72,7 @@ def new_project(
 
 
 def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> schemas.Project:
-    """A new name, or other backends. A new segmenter starts on every object; what the other drew is kept for its return."""
+    """What a person says of it, or other backends. A new segmenter starts on every object; what the other drew is kept."""
     for seam, registry in SEAMS.items():
         if (wanted := getattr(body, seam)) is not None:
             registry.require(wanted)
@@ -82,6 +84,11 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
         name = body.name or row.name
         if name != row.name:
             _note(context, session, row, "rename", f"renamed to {name}", {"name": name})
+        if body.tags is not None and (tags := sorted(set(body.tags), key=str.casefold)) != row.tags:
+            _note(context, session, row, "tags", f"tags: {', '.join(tags) or 'none'}", {"tags": tags})
+        if body.archived is not None and body.archived != row.archived:
+            text = "archived" if body.archived else "taken out of the archive"
+            _note(context, session, row, "archive", text, {"archived": body.archived})
         changed = [seam for seam in SEAMS if getattr(body, seam) not in (None, getattr(row, seam))]
         for seam in changed:
             events.require_open(row)
@@ -93,43 +100,20 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
             keys.note_project(session, row)
         objects = [item.id or 0 for item in queries.live_objects(session, project_id)] if body.segmenter else []
     if "segmenter" in changed:  # once that is stored: to end a process that hangs takes seconds, and nobody could write
-        context.live.close(project_id)
+        crossing.stop_segmenting(context, project_id)
     for number in objects:
         masks.follow(context, project_id, number, tells=number == objects[-1])
     tell(context, project_id)
     return get_project(context, project_id)
 
 
-def _note(context: Context, session: Session, row: Project, action: str, text: str, after: dict[str, str]) -> None:
+def _note(context: Context, session: Session, row: Project, action: str, text: str, after: dict[str, Any]) -> None:
     """Change fields of a project, with an event beside it."""
     now = time.time()
     event = Event(project_id=row.id, scope="project", action=action, text=text, who=context.who, at=now)
     event.before, event.after = {key: getattr(row, key) for key in after}, dict(after)
     row.sqlmodel_update({**after, "updated": now})
     session.add_all([row, event])
-
-
-def delete(context: Context, project_id: str) -> schemas.Deleted:
-    """Stop what works for the project, then delete its rows and files."""
-    with reading(context.engine) as session:
-        row = queries.project_row(session, project_id)
-        files = context.files(row)
-        jobs = session.exec(select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(queries.ACTIVE))).all()
-    for job in jobs:
-        context.runner.cancel(job or 0)
-    if not context.runner.wait_until_idle(project_id, context.settings.kill_grace_s + 5.0):
-        raise Conflict("a job of this project does not stop", hint="try again in a moment")
-    context.live.close(project_id)
-    context.viewer.close(project_id)
-    with writing(context.engine) as session:
-        session.delete(queries.project_row(session, project_id))
-        once.forget(session, project_id=project_id)
-    freed = delete_folder(files.root)
-    if files.work.is_relative_to(context.settings.data_dir):  # a workspace elsewhere is not ours to delete
-        freed += delete_folder(files.work)
-    context.hub.publish("gone", project_id, why="was deleted")
-    context.hub.publish("projects", None)
-    return schemas.Deleted(freed_bytes=freed)
 
 
 def frames(context: Context, project_id: str) -> list[schemas.FrameInfo]:
@@ -159,10 +143,10 @@ def history(
         if before is not None:
             query = query.where(col(Event.id) < before)
         query = query.order_by(col(Event.id).desc()).limit(min(max(limit, 1), 1000))
-        return [_entry(row) for row in session.exec(query.options(*_UNSHOWN))]
+        return [history_entry(row) for row in session.exec(query.options(*UNSHOWN))]
 
 
-_UNSHOWN = (defer(Event.before), defer(Event.after))  # type: ignore[arg-type]  # columns, to SQLAlchemy
+UNSHOWN = (defer(Event.before), defer(Event.after))  # type: ignore[arg-type]  # columns, to SQLAlchemy
 
 
 def tell(context: Context, project_id: str) -> None:
@@ -171,7 +155,8 @@ def tell(context: Context, project_id: str) -> None:
     context.hub.publish("projects", None)
 
 
-def _entry(row: Event) -> schemas.HistoryEntry:
+def history_entry(row: Event) -> schemas.HistoryEntry:
+    """A line of the history as it goes over the wire."""
     return schemas.HistoryEntry(
         id=row.id or 0,
         object=row.object_id,

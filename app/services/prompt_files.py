@@ -6,7 +6,8 @@ from app.db.documents import prompt_entry, prompts_version
 from app.db.engine import reading, writing
 from app.jobs.outcomes import adopt_prompts
 from app.services.context import Context
-from app.services.prompts import after_changes, change_of, check_point, check_said
+from app.services.in_frames import check_file, table_of
+from app.services.prompts import after_changes, change_of
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
@@ -22,11 +23,7 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
     """Add the objects of a prompts file."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        for entry in body.objects:
-            for point in entry.points:
-                check_point(context, project, point.frame, point.x, point.y)
-            for said in entry.frames:
-                check_said(context, project, entry.name, said.frame, said.mask)
+        check_file(table_of(context, project), body)
         items = adopt_prompts(session, project, body, context.who)
         changes = [change_of(context, session, project, item, infer=False) for item in items]
     return after_changes(context, changes)

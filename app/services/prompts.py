@@ -13,12 +13,10 @@ from app.db.engine import reading, writing
 from app.db.tables import Point, Project, SceneObject
 from app.errors import Conflict, NotFound
 from app.files import ProjectFiles
-from app.services import masks
+from app.services import assigning, masks
 from app.services.context import Context
-from app.services.projects import frame_table
+from app.services.in_frames import check_point, check_said, table_of
 from r2c2r_core.errors import PromptError
-from r2c2r_core.schema.prompts import PromptsFileMask
-from r2c2r_core.segment.prompts import check_mask_size
 from r2c2r_core.workspace import noun_path
 
 
@@ -54,7 +52,7 @@ def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: boo
     """A new object, with its first clicks if there are any."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = _create(context, session, project, body, "added")
+        item = create_in(context, session, project, body, "added")
         change = answered_change(context, session, project, item, infer and _gives_masks(body))
     return after_change(context, change)
 
@@ -65,7 +63,7 @@ def create_all(
     """New objects, all or none; `what` was done, as the history says it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        items = [_create(context, session, project, body, what) for body in bodies]
+        items = [create_in(context, session, project, body, what) for body in bodies]
         made = [
             change_of(context, session, project, item, infer and _gives_masks(body))
             for item, body in zip(items, bodies, strict=True)
@@ -79,15 +77,18 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         refuse_overtaken(context, session, project, item, body)
-        wanted = _wanted(session, item, body)
+        wanted = _wanted(context, session, item, body)
         text = ", ".join(_said_of(item, key, value) for key, value in wanted.items()) or "nothing"
-        with history.change(session, item, "prompts", "edit", text, who=context.who):
+        action = "assign" if wanted.keys() == {"assignee"} else "edit"
+        with history.change(session, item, "prompts", action, text, who=context.who):
             if "name" in wanted and not item.run_name and _has_results(context.files(project), item.name, str(wanted["name"])):
                 item.run_name = item.name
             for key, value in wanted.items():
                 setattr(item, key, value)
             session.add(item)
         change = answered_change(context, session, project, item, infer=bool(wanted.keys() & {"category", "front", "crop"}))
+    if "assignee" in wanted:
+        context.hub.publish("projects", None)  # inboxes are counted anew
     return after_change(context, change)
 
 
@@ -118,7 +119,7 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        check_point(context, project, body.frame, body.x, body.y)
+        check_point(table_of(context, project), body.frame, body.x, body.y)
         text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
         with history.change(session, item, "prompts", "add point", text, who=context.who, frame=body.frame):
             session.add(Point(object_id=item.id or 0, **body.model_dump()))
@@ -131,8 +132,9 @@ def add_points(context: Context, project_id: str, object_id: int, body: schemas.
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
+        table = table_of(context, project)
         for point in body.points:
-            check_point(context, project, point.frame, point.x, point.y)
+            check_point(table, point.frame, point.x, point.y)
         frame = body.points[0].frame
         text = f"{len(body.points)} points on {item.name}, frame {frame}"
         with history.change(session, item, "prompts", "add points", text, who=context.who, frame=frame):
@@ -150,7 +152,7 @@ def move_point(
         item = queries.object_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         changes = body.model_dump(exclude_none=True)
-        check_point(context, project, point.frame, changes.get("x", point.x), changes.get("y", point.y))
+        check_point(table_of(context, project), point.frame, changes.get("x", point.x), changes.get("y", point.y))
         text = f"moved a point of {item.name}, frame {point.frame}"
         with history.change(session, item, "prompts", "move point", text, who=context.who, frame=point.frame):
             point.sqlmodel_update(changes)
@@ -180,7 +182,7 @@ def say_of_frame(
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         if body is not None:  # whatever is said of a frame that is not there can be taken back
-            check_said(context, project, item.name, frame, body.mask)
+            check_said(table_of(context, project), item.name, frame, body.mask)
         others = {number: said for number, said in item.frames.items() if number != str(frame)}
         said = {} if body is None else {str(frame): body.mask.model_dump() if body.mask is not None else None}
         what = "as found" if body is None else "painted" if body.mask is not None else "not visible"
@@ -214,9 +216,9 @@ def cancel_segment(context: Context, project_id: str, object_id: int) -> schemas
     return tell_object(context, project_id, object_id)
 
 
-def _create(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
+def create_in(context: Context, session: Session, project: Project, body: schemas.ObjectIn, what: str) -> SceneObject:
     for point in body.points:
-        check_point(context, project, point.frame, point.x, point.y)
+        check_point(table_of(context, project), point.frame, point.x, point.y)
     category = body.category
     name = _free_name(session, project.id, category) if not body.name else _name(session, project.id, body.name, None)
     count = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
@@ -232,6 +234,13 @@ def _create(context: Context, session: Session, project: Project, body: schemas.
     return item
 
 
+def require_usable(name: str) -> None:
+    """Raise PromptError for a name that simulators do not accept."""
+    if not _NAME.fullmatch(name):
+        hint = "use letters, digits and underscores: simulators accept no more"
+        raise PromptError(f"the name '{name}' is not usable", hint=hint)
+
+
 def object_shape(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """One object as it goes over the wire, also a deleted one."""
     with reading(context.engine) as session:
@@ -242,7 +251,8 @@ def object_shape(context: Context, project_id: str, object_id: int) -> schemas.S
 
 def tell_object(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
     """Show the object's state to every tab."""
-    return _tell(context, object_shape(context, project_id, object_id))
+    with context.live.held():
+        return _tell(context, object_shape(context, project_id, object_id))
 
 
 def change_of(context: Context, session: Session, project: Project, item: SceneObject, infer: bool) -> Change:
@@ -271,8 +281,9 @@ def after_change(context: Context, change: Change, *, tells: bool = True) -> sch
         masks.follow(context, change.project.id, change.shape.id, tells=tells)
     elif tells and context.live.runs(change.project.id):
         masks.tell_objects(context, change.project)
-    now = masks.state_of(context, change.project, change.item)
-    return _tell(context, _with_masks(change.shape, change.project, now))
+    with context.live.held():
+        now = masks.state_of(context, change.project, change.item)
+        return _tell(context, _with_masks(change.shape, change.project, now))
 
 
 def _tell(context: Context, shape: schemas.SceneObject) -> schemas.SceneObject:
@@ -303,6 +314,7 @@ def _shape(
         version=item.version,
         deleted=item.deleted,
         points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
+        assignee=item.assignee,
         can_undo=steps.undo,
         can_redo=steps.redo,
         front=schemas.PromptsFileFront.model_validate(readable_front(item.front)) if item.front is not None else None,
@@ -328,7 +340,7 @@ def _with_masks(shape: schemas.SceneObject, project: Project, now: masks.MasksSt
     return shape.model_copy(update=told | {"notices": [*now.notices, *_category_notice(shape.category)]})
 
 
-def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:
+def _wanted(context: Context, session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:
     """What the patch changes, checked."""
     wanted: dict[str, object] = {}
     if body.name is not None and body.name != item.name:
@@ -341,6 +353,9 @@ def _wanted(session: Session, item: SceneObject, body: schemas.ObjectPatch) -> d
         value = drawn.model_dump() if drawn is not None else None
         if key in body.model_fields_set and value != getattr(item, key):
             wanted[key] = value
+    if "assignee" in body.model_fields_set:
+        name = assigning.require_name(context, session, item.project_id, body.assignee) if body.assignee else None
+        wanted |= {"assignee": name} if name != item.assignee else {}
     return wanted
 
 
@@ -351,6 +366,8 @@ def _has_results(files: ProjectFiles, *names: str) -> bool:
 
 def _said_of(item: SceneObject, key: str, value: object) -> str:
     """A field's change in words."""
+    if key == "assignee":
+        return f"{item.name} assigned to {value or 'nobody'}"
     if key == "crop":
         return f"crop box of {item.name} {'set' if value is not None else 'taken away'}"
     if key != "front":
@@ -369,37 +386,9 @@ def _point(session: Session, item: SceneObject, point_id: int) -> Point:
     return found
 
 
-def check_frame(context: Context, project: Project, frame: int) -> dict[int, dict[str, Any]]:
-    """The table of frames by their numbers; raises PromptError for a number that is none of them."""
-    table = {entry["index"]: entry for entry in frame_table(context.files(project))}
-    if frame not in table:
-        raise PromptError(f"the recording has no frame {frame}", hint=f"its {len(table)} frames are listed under /frames")
-    return table
-
-
-def check_said(context: Context, project: Project, name: str, frame: int, mask: PromptsFileMask | None) -> None:
-    """Raise PromptError for a frame that the recording lacks, and for a mask that does not fit it."""
-    entry = check_frame(context, project, frame)[frame]
-    if mask is not None:
-        check_mask_size(f"{name}: frame {frame}", mask, (entry["width"], entry["height"]))
-
-
-def check_point(context: Context, project: Project, frame: int, x: float, y: float) -> None:
-    """Raise PromptError for a click that is on no frame or outside its image."""
-    table = check_frame(context, project, frame)
-    width, height = table[frame]["width"], table[frame]["height"]
-    if not (0 <= x < width and 0 <= y < height):
-        raise PromptError(
-            f"the click at ({x:g}, {y:g}) is outside the image of {width}x{height}", hint="click inside the image"
-        )
-
-
 def _name(session: Session, project_id: str, name: str, mine: int | None) -> str:
     """The name, when simulators accept it and no other object has it."""
-    if not _NAME.fullmatch(name):
-        raise PromptError(
-            f"the name '{name}' is not usable", hint="use letters, digits and underscores: simulators accept no more"
-        )
+    require_usable(name)
     if name.casefold() in _names(session, project_id, mine):
         raise PromptError(f"two objects named '{name}'", hint="names are unique: choose another one")
     return name

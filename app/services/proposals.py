@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sqlmodel import Session, col, select
+from sqlmodel import Session, col, func, select
 
 from app import schemas
 from app.db import queries
@@ -32,11 +32,13 @@ def current(context: Context, project_id: str) -> schemas.Proposals:
     )
 
 
-def confirm(context: Context, project_id: str, ids: list[str]) -> list[schemas.SceneObject]:
-    """Make objects of proposals: each its click, under its category."""
+def confirm(context: Context, project_id: str, ids: list[str], category: str | None = None) -> list[schemas.SceneObject]:
+    """Make objects of proposals: each its click, under its category or the one that is given for all."""
     wanted = _wanted(context, project_id, ids)
     bodies = [
-        schemas.ObjectIn(category=item.category, points=[schemas.PointIn(frame=item.frame, x=item.x, y=item.y, label=1)])
+        schemas.ObjectIn(
+            category=category or item.category, points=[schemas.PointIn(frame=item.frame, x=item.x, y=item.y, label=1)]
+        )
         for item in wanted
     ]
     made = prompts.create_all(context, project_id, bodies, infer=True, what="confirmed proposal")
@@ -107,14 +109,11 @@ def _event(context: Context, project_id: str, action: str, text: str, frame: int
 
 
 def _dismissed(session: Session, project_id: str) -> set[str]:
-    query = select(Event).where(Event.project_id == project_id, Event.scope == _SCOPE).order_by(col(Event.id))
-    gone: set[str] = set()
-    for event in session.exec(query):
-        if event.action == "restore":
-            gone.clear()
-        else:
-            gone.add(str((event.after or {})["proposal"]))
-    return gone
+    """Those dismissed since all were restored last."""
+    mine = (Event.project_id == project_id, Event.scope == _SCOPE)
+    restored = select(func.coalesce(func.max(Event.id), 0)).where(*mine, Event.action == "restore").scalar_subquery()
+    proposal = col(Event.after)["proposal"].as_string()
+    return set(session.exec(select(proposal).where(*mine, Event.action != "restore", col(Event.id) > restored)))
 
 
 def _without_covered(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -31,7 +31,7 @@ def check_upload(context: Context, session: Session, size: int) -> None:
     if _free(context):
         return
     mine = select(func.count(), func.coalesce(func.sum(Upload.size), 0)).where(Upload.who == context.who)
-    found, announced = session.exec(mine).one()
+    found, announced = map(int, session.exec(mine).one())  # Postgres sums in decimals
     stop = "finish or cancel one of your uploads"
     if found >= quotas.uploads:
         raise TooMany(
@@ -47,7 +47,8 @@ def check_project(context: Context, session: Session, *, sample: bool = False) -
     quotas = context.settings.quotas
     if _free(context):
         return
-    mine = select(func.count()).where(col(Project.owner_id).in_(select(Account.id).where(Account.name == context.who)))
+    owned = col(Project.owner_id).in_(select(Account.id).where(Account.name == context.who))
+    mine = select(func.count()).where(owned, col(Project.trashed).is_(None))
     _refuse_beyond("projects", quotas.projects, session.exec(mine).one())
     if sample:
         _refuse_beyond("samples", quotas.samples, session.exec(mine.where(Project.source_name == SAMPLE)).one())

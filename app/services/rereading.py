@@ -10,7 +10,7 @@ from app.db import keys, queries
 from app.db.engine import writing
 from app.db.tables import Event, Job
 from app.errors import Conflict, NotFound
-from app.services import imports, projects
+from app.services import crossing, imports, projects
 from app.services.context import Context
 
 
@@ -18,7 +18,9 @@ def read_again(context: Context, project_id: str, body: schemas.ReadingIn) -> sc
     """Read the recording so; clicks stay, masks and results made from the other reading are stale."""
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
-        if row.register_depth == body.register_depth:
+        before = {"register_depth": row.register_depth, "scale": row.scale}
+        wanted = {name: value for name, value in body.model_dump(exclude_none=True).items() if value != before[name]}
+        if not wanted:
             return projects.get_project(context, project_id)
         events.require_open(row)
         if row.source_path is None:
@@ -26,16 +28,23 @@ def read_again(context: Context, project_id: str, body: schemas.ReadingIn) -> sc
         busy = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(queries.ACTIVE))
         if session.exec(busy).first() is not None:
             raise Conflict("a job of this project is under way", hint="wait for it, or cancel it")
-        before, now = {"register_depth": row.register_depth}, time.time()
-        row.register_depth, row.status, row.updated = body.register_depth, "importing", now
-        said = "depth registered to the colour images" if body.register_depth else "depth read as it was recorded"
+        now = time.time()
+        for name, value in wanted.items():
+            setattr(row, name, value)
+        row.status, row.updated = "importing", now
+        said = " and ".join(_in_words(name, value) for name, value in wanted.items())
         event = Event(project_id=row.id, scope="project", action="reading", text=said, who=context.who, at=now)
-        event.before, event.after = before, {"register_depth": body.register_depth}
+        event.before, event.after = {name: before[name] for name in wanted}, wanted
         session.add_all([row, event])
         keys.note_project(session, row)
         job = imports.queue_job(context, session, row, "import", {}).id or 0
-    context.live.close(project_id)
-    context.viewer.close(project_id)
+    crossing.shut(context, project_id)
     context.runner.queued(job)
     projects.tell(context, project_id)
     return projects.get_project(context, project_id)
+
+
+def _in_words(name: str, value: float | bool) -> str:
+    if name == "scale":
+        return f"every length multiplied by {value:.4f}" if value != 1.0 else "lengths read as they were recorded"
+    return "depth registered to the colour images" if value else "depth read as it was recorded"

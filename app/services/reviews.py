@@ -14,11 +14,13 @@ from app.db.keys import overrides_entry
 from app.db.tables import Project, SceneObject, Verdict
 from app.errors import Conflict, NotFound, NotReady
 from app.files import inside
-from app.services import jobs
+from app.services import jobs, prompts
 from app.services.candidates import facts_of, groups_of, override_shape
 from app.services.context import Context
 from app.services.prompts import tell_object
+from app.services.scenes import fitted
 from r2c2r_core.errors import OverrideError, PromptError
+from r2c2r_core.kitchen.names import named
 from r2c2r_core.schema.overrides import MOST_BATCHES
 
 
@@ -75,20 +77,49 @@ def set_override(context: Context, project_id: str, object_id: int, body: schema
 
 def store_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> tuple[int | None, str]:
     """Store the correction; the job that follows from it, and what was done in words."""
-    wanted = {key: value for key, value in body.model_dump(exclude_unset=True).items() if key not in ("rerun", "version")}
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        refuse_overtaken(context, session, project, item, body)
-        before = history.override_data(session, item)
-        merged = {key: value for key, value in {**before, **wanted}.items() if value is not None}
-        _check_override(context, project, item, merged)
-        said = ", ".join(_in_words(key, value) for key, value in wanted.items())
-        text = f"{item.name}: {said or 'nothing'}"
-        with history.change(session, item, "review", "correct", text, who=context.who):
-            history.set_override(session, item, merged)
-        job = _rerun(context, session, project) if body.rerun and merged != before else None
-    return job, text
+        return _store_override(context, session, project, item, body)
+
+
+def _store_override(
+    context: Context, session: Session, project: Project, item: SceneObject, body: schemas.OverridePatch
+) -> tuple[int | None, str]:
+    wanted = {key: value for key, value in body.model_dump(exclude_unset=True).items() if key not in ("rerun", "version")}
+    refuse_overtaken(context, session, project, item, body)
+    before = history.override_data(session, item)
+    merged = {key: value for key, value in {**before, **wanted}.items() if value is not None}
+    _check_override(context, project, item, merged)
+    said = ", ".join(_in_words(key, value) for key, value in wanted.items())
+    text = f"{item.name}: {said or 'nothing'}"
+    with history.change(session, item, "review", "correct", text, who=context.who):
+        history.set_override(session, item, merged)
+    return _rerun(context, session, project) if body.rerun and merged != before else None, text
+
+
+def correct_made(context: Context, project_id: str, name: str, body: schemas.OverridePatch) -> schemas.Reviewed:
+    """Correct what the last run made from the scan and nobody clicked; from then on it is an object of its own."""
+    with writing(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        known = {item.result_name: item.id for item in queries.live_objects(session, project_id)}
+        if name in known:
+            item = queries.object_row(session, project_id, known[name] or 0)
+        else:
+            category = _category_made(context, project, name)
+            item = prompts.create_in(context, session, project, schemas.ObjectIn(name=name, category=category), "added")
+        object_id = item.id or 0
+        job, text = _store_override(context, session, project, item, body)
+    return reviewed_shape(context, project_id, object_id, job, text)
+
+
+def _category_made(context: Context, project: Project, name: str) -> str:
+    """What the last run made under a name; NotFound where it made nothing of it."""
+    scene = fitted(context.files(project)) or {"objects": []}
+    category: str | None = next((item["category"] for item in scene["objects"] if item["name"] == name), None)
+    if category is None:
+        raise NotFound(f"the scene has no {name[:60]}", hint="it may be called otherwise since the last run")
+    return category
 
 
 def refuse_overtaken(
@@ -155,6 +186,8 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
     files = context.files(project)
     document = {"version": 1, "objects": {item.name: overrides_entry(merged)}}
     overrides_from(json.loads(json.dumps(document)), files.work / "overrides.json")
+    if (template := merged.get("built_as")) is not None and (notice := named(template).notice) is not None:
+        raise OverrideError(notice, hint="give a category of the table")
     wanted = merged.get("candidate")
     if wanted is None or (Path(wanted).is_relative_to(files.uploads) and inside(files.uploads, wanted).is_file()):
         return
@@ -170,9 +203,22 @@ def _rerun(context: Context, session: Session, project: Project) -> int | None:
         return None
 
 
+_WORDS = {
+    "pose": "place",
+    "dimensions_m": "size",
+    "joint_lower": "opens from",
+    "joint_upper": "opens to",
+    "left_out": "left out",
+    "built_as": "built as",
+    "states": "openings marked",
+}
+
+
 def _in_words(key: str, value: Any) -> str:
     """One correction, for the history and for who made it."""
-    name = {"pose": "place", "dimensions_m": "size", "joint_lower": "opens from", "joint_upper": "opens to"}.get(key, key)
+    name = _WORDS.get(key, key)
+    if key == "left_out":
+        return name if value else "brought back"
     if value is None:
         return f"{name} computed again"
     if key == "candidate":
@@ -181,6 +227,9 @@ def _in_words(key: str, value: Any) -> str:
         return f"{name} ({', '.join(f'{row[3]:.3f}' for row in value[:3])}) m"
     if key == "dimensions_m":
         return f"{name} {' × '.join(f'{100 * side:.1f}' for side in value)} cm"
+    if key == "states":
+        frames = sum(len(marks) for marks in value.values())
+        return f"{name} in {frames} frame{'' if frames == 1 else 's'}"
     if key.startswith("joint_"):
         return f"{name} {value:.3f}"  # radians or metres
     return f"{name} {value}"

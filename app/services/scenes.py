@@ -17,6 +17,7 @@ from app.file_cache import FileCache
 from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services import views
+from app.services.candidates import override_shape
 from app.services.context import Context
 from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.model.track import MaskTrack
@@ -34,6 +35,7 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
         mine = select(SceneObject).where(SceneObject.project_id == project_id)
         mine_by_name = {item.result_name: item for item in session.exec(mine) if not item.deleted}
         bundle = queries.newest_bundle(session, project_id)
+        said = queries.overrides_by_object(session, project_id)
     scene = fitted(files)
     if scene is None:
         raise NotReady("there is no finished scene yet", hint="run the project first")
@@ -41,7 +43,12 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
     described = manifest(files.bundles / bundle.path) if bundle else {}
     failures = described.get("failures") if isinstance(described.get("failures"), dict) else {}
     return schemas.SceneSummary(
-        items=[_item(entry, mine_by_name.get(entry["name"]), files) for entry in scene["objects"]],
+        items=[_item(entry, item := mine_by_name.get(entry["name"]), files, _said(item, said)) for entry in scene["objects"]],
+        left_out=[
+            schemas.LeftOut(object=item.id or 0, name=item.name)
+            for item in mine_by_name.values()
+            if said.get(item.id or 0, {}).get("left_out")
+        ],
         failures={str(name): str(line) for name, line in (failures or {}).items()},
         warnings=scene["warnings"],
         stages=[_stage(entry, taken) for entry in described.get("stages", [])],
@@ -72,6 +79,8 @@ def _scene_facts(scene: ArticulatedScene) -> dict[str, Any]:
         "joints",
     )
     objects = [{key: plain(getattr(item, key)) for key in kept} for item in scene.objects]
+    for told, item in zip(objects, scene.objects, strict=True):
+        told["colour"] = list(item.links[0].colour)
     return {"objects": objects, "warnings": plain(scene.warnings)}
 
 
@@ -79,11 +88,16 @@ def _mask_count(track: MaskTrack) -> int:
     return len(track.masks)
 
 
-def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles) -> schemas.SceneItem:
+def _said(item: SceneObject | None, said: Mapping[int, dict[str, Any]]) -> dict[str, Any]:
+    return said.get(item.id or 0, {}) if item is not None else {}
+
+
+def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles, override: dict[str, Any]) -> schemas.SceneItem:
     placement = views.facts(files, "align", entry["name"], plain)
     return schemas.SceneItem(
         object=item.id if item else None,
         name=item.name if item else entry["name"],
+        run_name=entry["name"],
         category=entry["category"],
         fixture=entry["fixture"],
         dimensions_m=entry["dimensions_m"],
@@ -94,6 +108,8 @@ def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles) 
         placement_rms_m=placement["rms_m"] if placement else None,
         warp_residual_m=entry["warp_residual_m"],
         warnings=entry["warnings"],
+        colour=entry["colour"],
+        override=override_shape(override),
     )
 
 

@@ -5,7 +5,6 @@ from sqlmodel import col, select
 from app.db import queries
 from app.db.engine import reading, writing
 from app.db.tables import Project
-from app.files import folder_bytes
 from app.services.context import Context
 
 
@@ -14,6 +13,6 @@ def measure(context: Context) -> None:
     with reading(context.engine) as session:
         changed = session.exec(select(Project).where(col(Project.updated) > col(Project.sized))).all()
     for project in changed:
-        size = folder_bytes(context.files(project).root)
+        size = context.store.size(project.id)
         with writing(context.engine) as session:
             queries.note_size(session, project.id, size)

@@ -12,6 +12,7 @@ from r2c2r_core.align.protocol import MATCHERS
 from r2c2r_core.export.writers.table import formats
 from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Backend, Registry
+from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
 
 PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
@@ -28,6 +29,7 @@ def describe(context: Context) -> schemas.SystemInfo:
         user=context.who,
         role=context.person.role,
         account=context.person.account,
+        sign_out=_after_signing_out(context),
         max_upload_bytes=settings.max_upload_bytes,
         free_bytes=free_bytes(settings.data_dir),
         import_roots=[str(root) for root in settings.roots] if context.person.may("admin") else [],
@@ -37,8 +39,15 @@ def describe(context: Context) -> schemas.SystemInfo:
         segmenters=_backends(SEGMENTERS),
         generators=_backends(GENERATORS),
         matchers=_backends(MATCHERS),
+        arms=_backends(ARMS),
         formats=[schemas.BundleFormat(name=f.name, file=f.file, opened_by=f.opened_by) for f in formats()],
     )
+
+
+def _after_signing_out(context: Context) -> str | None:
+    if not context.person.account or context.settings.identity_header:
+        return None
+    return "/login/provider/out" if context.provider else "/login"
 
 
 def browse(context: Context, path: str | None) -> schemas.FolderListing:
@@ -123,18 +132,10 @@ def _categories() -> list[schemas.Category]:
     from r2c2r_core.kitchen.categories import every_category
 
     return [
-        schemas.Category(name=name, label=category.label, joint=_JOINTS[category.opens], sideways=category.opens == "sideways")
+        schemas.Category(name=name, label=category.label, joint=_JOINTS[category.motion], sideways=category.opens == "sideways")
         for category in every_category()
         for name in category.names
     ]
 
 
-_JOINTS = {
-    "drawer": "prismatic",
-    "side": "revolute",
-    "pair": "revolute",
-    "bottom": "revolute",
-    "sideways": "prismatic",
-    "fixed": "none",
-    "rigid": "none",
-}
+_JOINTS = {"hinge": "revolute", "out": "prismatic", "along": "prismatic", "none": "none"}

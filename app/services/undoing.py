@@ -39,6 +39,8 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
         change = prompts.change_of(context, session, project, item, infer=body.scope == "prompts")
         undone = schemas.Undone(object=change.shape, text=event.text, frame=event.frame, version=version)
         once.keep_answer(session, undone.model_dump_json())
+    if "assignee" in (event.before or {}):
+        context.hub.publish("projects", None)  # inboxes are counted anew
     shape = prompts.after_change(context, change)
     if body.scope == "review":
         context.hub.publish("review", project_id, object=number)

@@ -10,9 +10,9 @@ from app import schemas
 from app.db.engine import reading, writing
 from app.db.tables import Project, Upload
 from app.errors import Conflict, NotFound
-from app.files import ProjectFiles, delete_folder, folder_bytes, project_files
+from app.files import ProjectFiles, delete_folder, folder_bytes, project_files, safe_name
 from app.schemas.description import Description
-from app.services import adopting, imports, projects, uploads
+from app.services import adopting, crossing, imports, probing, projects
 from app.services.context import Context
 from r2c2r_core.errors import InputError
 
@@ -45,7 +45,7 @@ def adopt(context: Context, entry: str) -> schemas.Project:
         shutil.move(folder, files.root)
     try:
         with writing(context.engine) as session:
-            adopting.adopt(session, context.settings.data_dir, description, context.who)
+            adopting.adopt(session, context.settings.data_dir, description, context.who).trashed = None  # it is wanted
     except BaseException:
         if not only_said:
             shutil.move(files.root, folder)
@@ -53,7 +53,7 @@ def adopt(context: Context, entry: str) -> schemas.Project:
     if only_said:
         delete_folder(folder)  # all it said is in the database
     (files.root / LEFT).unlink(missing_ok=True)
-    context.access.look_again()
+    crossing.sees_changed(context)
     project = projects.get_project(context, description.id)
     if project.job is not None:  # its recording is read again
         context.runner.queued(project.job.id)
@@ -80,7 +80,7 @@ def discard(context: Context, entry: str) -> None:
 
 def _adopt_upload(context: Context, path: Path) -> schemas.Project:
     """A new project from a recording of which every byte arrived."""
-    uploads.check(context, path, path.name)
+    probing.check_recording(context, path, safe_name(path.name))
     row = Upload(id=secrets.token_hex(6), file_name=_RECORDING, size=path.stat().st_size, who=context.who, created=time.time())
     with writing(context.engine) as session:
         session.add(row)
@@ -107,7 +107,7 @@ def _shape(context: Context, path: Path) -> schemas.UnknownFolder:
             description = adopting.described(path)
             why_not = _why_not(context, path, description)
         else:
-            uploads.check_whole(context, path, "it")
+            probing.check_whole(context, path, "it")
     except InputError as error:
         why_not = str(error)
     live = [entry for entry in description.objects if not entry.deleted] if description else []

@@ -14,14 +14,14 @@ import anyio
 from sqlmodel import Session, col, select
 from starlette.requests import ClientDisconnect
 
-from app import archives, schemas
+from app import schemas
 from app.db.engine import reading, writing
 from app.db.tables import Project, Upload
 from app.errors import Conflict, NotFound, TooLarge, Unavailable
 from app.files import delete_folder, project_files, require_free, safe_name
-from app.services import imports, probing, projects, quotas
+from app.services import imports, probing, project_import, projects, quotas
 from app.services.context import Context
-from r2c2r_core.errors import CaptureError
+from r2c2r_core.errors import CaptureError, InputError
 
 SPARE = 2.5  # a recording needs its own size again when it is read, and some more
 
@@ -75,17 +75,33 @@ def finish(context: Context, upload_id: str) -> schemas.Project:
         if session.get(Project, upload_id) is not None:  # asked twice
             return projects.get_project(context, upload_id)
     with context.uploads.on(upload_id, "finished"):
-        with reading(context.engine) as session:
-            row = _row(context, session, upload_id)
-        found = _shape(context, row)
-        if found.offset != row.size:
-            raise Conflict(f"{found.offset} of {row.size} bytes are here", hint="send the rest first", current=found.offset)
+        row, received = _complete(context, upload_id)
+        name = safe_name(row.file_name)
         try:
-            check(context, _present(context, row), row.file_name)
-        except CaptureError:
+            probing.check_whole(context, received, name)
+            if project_import.is_project(received):
+                return project_import.take_in(context, row, received)
+            probing.look_at(context, "recording", received, name)
+        except InputError:
             _delete(context, upload_id)
             raise
         return imports.from_finished_upload(context, row, _path(context, upload_id))
+
+
+def give(context: Context, project_id: str, body: schemas.RecordingIn) -> schemas.Project:
+    """The recording of a project that has none, from an upload that is complete; what cannot be read is refused and goes.
+
+    It waits for a process: call it behind the gate of looks.
+    """
+    imports.require_awaited(context, project_id)
+    with context.uploads.on(body.upload, "finished"):
+        row, received = _complete(context, body.upload)
+        try:
+            probing.check_recording(context, received, safe_name(row.file_name))
+        except InputError:
+            _delete(context, body.upload)
+            raise
+        return imports.into_project(context, project_id, row, received)
 
 
 def forget(context: Context, upload_id: str) -> None:
@@ -145,17 +161,14 @@ async def _store(context: Context, upload_id: str, at: int, size: int, stream: A
     return at
 
 
-def check(context: Context, path: Path, file_name: str) -> None:
-    """Raise CaptureError, in one line, for what the import could not read. It waits for a process, as `finish` does."""
-    name = safe_name(file_name)
-    check_whole(context, path, name)
-    probing.look_at(context, "recording", path, name)
-
-
-def check_whole(context: Context, path: Path, name: str) -> None:
-    """Raise CaptureError unless all of a zip is there, and is what may be unpacked."""
-    settings = context.settings
-    archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
+def _complete(context: Context, upload_id: str) -> tuple[Upload, Path]:
+    """An upload and where its bytes are; raises Conflict unless all are here."""
+    with reading(context.engine) as session:
+        row = _row(context, session, upload_id)
+    found = _shape(context, row)
+    if found.offset != row.size:
+        raise Conflict(f"{found.offset} of {row.size} bytes are here", hint="send the rest first", current=found.offset)
+    return row, _present(context, row)
 
 
 def _delete(context: Context, upload_id: str) -> None:

@@ -7,12 +7,17 @@ from urllib.parse import quote
 
 from fastapi import WebSocket
 from fastapi.responses import Response
+from sqlmodel import Session
 
 from app import schemas
 from app.db import queries
 from app.db.engine import reading
+from app.db.keys import overrides_entry
 from app.errors import Forbidden, NotReady, TooMany, Unavailable
-from app.services import bundles, marks
+from app.files import ProjectFiles
+from app.jobs.plain import plain
+from app.services import marks, views
+from app.services.candidates import facts_of
 from app.services.context import Context
 from app.viewer import proxy
 
@@ -57,10 +62,42 @@ def show(context: Context, project_id: str, session_id: str, body: schemas.Viewe
         wish["rotation"] = upright(files, item.result_name, wish["candidate"]).tolist()
     if body.mode == "scene":
         with reading(context.engine) as session:
-            wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.result_name if item else None)
-        folder: Path | None = bundles.folder(context, project_id)
-        wish["bundle"] = str(folder) if folder else None
+            wish["marks"], wish["focus"] = marks.marks(session, files, project_id, item.result_name if item else body.made)
+            wish |= _corrections(session, files, project_id)
     return schemas.ViewerShown.model_validate(context.viewer.show(project_id, files.work, session_id, wish))
+
+
+def _corrections(session: Session, files: ProjectFiles, project_id: str) -> dict[str, Any]:
+    """What people said that the newest scene may not show yet: corrections by object, and whose mesh they took away."""
+    stored = queries.overrides_by_object(session, project_id)
+    said = {item.result_name: stored[item.id or 0] for item in queries.live_objects(session, project_id) if item.id in stored}
+    entries = {name: overrides_entry({k: v for k, v in data.items() if k != "candidate"}) for name, data in said.items()}
+    placed = {name: (views.facts(files, "align", name, plain) or {}).get("candidate_id") for name in said}
+    gone = [
+        name
+        for name, data in said.items()
+        if placed[name] in data.get("rejected", []) or data.get("candidate") in _made(files, name) - {placed[name]}
+    ]
+    return {"corrections": {name: entry for name, entry in entries.items() if entry}, "undressed": gone}
+
+
+def _made(files: ProjectFiles, name: str) -> set[str]:
+    facts = facts_of(files, name)
+    return {candidate["candidate_id"] for candidate in facts["candidates"]} if facts else set()
+
+
+def picked(context: Context, project_id: str, session_id: str) -> schemas.ViewerPicked:
+    """What the last click in the 3D view was on."""
+    with reading(context.engine) as session:
+        project = queries.project_row(session, project_id)
+        numbers = {item.result_name: item.id for item in queries.live_objects(session, project_id)}
+    found = context.viewer.picked(project_id, context.files(project).work, session_id)
+    return schemas.ViewerPicked(object=numbers.get(found["name"]), **found)
+
+
+def camera(context: Context, project_id: str, session_id: str) -> schemas.ViewerCamera:
+    """Where the camera of the 3D view stands."""
+    return schemas.ViewerCamera.model_validate(context.viewer.camera(project_id, _workdir(context, project_id), session_id))
 
 
 def set_joints(context: Context, project_id: str, session_id: str, values: dict[str, float]) -> schemas.ViewerShown:

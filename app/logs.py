@@ -1,0 +1,37 @@
+"""The server's log: one JSON object a line where `R2C2R_LOG=json`, with the request and the job that each line is about."""
+
+import json
+import logging
+import sys
+import time
+from contextvars import ContextVar
+
+from r2c2r_core.errors import InputError
+
+REQUEST: ContextVar[str] = ContextVar("r2c2r_request", default="")  # the id that the answer's X-Request-ID says
+JOB: ContextVar[int | None] = ContextVar("r2c2r_job", default=None)
+_OWN = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime"}
+
+
+class JsonLines(logging.Formatter):
+    """A record as one line of JSON; what was given as `extra` stands beside the message."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line."""
+        at = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created)) + f".{int(record.msecs):03d}Z"
+        said = {"at": at, "level": record.levelname.lower(), "logger": record.name, "message": record.getMessage()}
+        known = {"request": REQUEST.get() or None, "job": JOB.get()}
+        extra = {name: value for name, value in vars(record).items() if name not in _OWN}
+        if record.exc_info:
+            extra["traceback"] = self.formatException(record.exc_info)
+        found = {**said, **{name: value for name, value in known.items() if value is not None}, **extra}
+        return json.dumps(found, default=str, separators=(",", ":"))
+
+
+def log_as(kind: str) -> None:
+    """Every logger of this process to stderr, from `info` on, as R2C2R_LOG says; raises InputError for no kind of log."""
+    if kind != "json":
+        raise InputError(f"R2C2R_LOG {kind[:40]!r}: not json", hint="leave it out for warnings in words")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(JsonLines())
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)

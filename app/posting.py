@@ -1,0 +1,73 @@
+"""One POST to an address that somebody else chose: bounded in time and size, not followed elsewhere, to public addresses alone.
+
+The host's addresses are looked up once, each is judged, and one of those is connected to: a name that changes its mind
+between the look and the connection gains nothing.
+"""
+
+import hashlib
+import hmac
+import http.client
+import ipaddress
+import socket
+import ssl
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from urllib.parse import urlsplit
+
+from app.errors import Forbidden
+from r2c2r_core.errors import InputError
+
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+TOTAL_S = 10.0  # from connecting to the answer's last header
+PORTS = {"http": 80, "https": 443}
+ALLOW = "who runs this server can allow a network: R2C2R_WEBHOOKS_TO=10.1.0.0/16"
+
+
+def networks(text: str) -> tuple[Network, ...]:
+    """Networks, separated by commas; raises InputError."""
+    try:
+        return tuple(ipaddress.ip_network(part.strip()) for part in text.split(",") if part.strip())
+    except ValueError as error:
+        raise InputError(f"R2C2R_WEBHOOKS_TO: {error}", hint="networks such as 10.1.0.0/16, separated by commas") from error
+
+
+def signature(secret: str, timestamp: str, content: bytes) -> str:
+    """HMAC-SHA256 of `timestamp.content`, in hexadecimal: an old message cannot be sent anew under another time."""
+    return hmac.new(secret.encode(), timestamp.encode() + b"." + content, hashlib.sha256).hexdigest()
+
+
+def post(url: str, content: bytes, headers: Mapping[str, str], allowed: Sequence[Network] = ()) -> int:
+    """The status of the answer, whose body is not read. Raises OSError or HTTPException, Forbidden for an address inside."""
+    parts = urlsplit(url)
+    host, port = parts.hostname or "", parts.port or PORTS[parts.scheme]
+    plain = socket.create_connection((_address_of(host, port, allowed), port), timeout=TOTAL_S)
+    ending = threading.Timer(TOTAL_S, _end, (plain,))  # who answers a byte at a time has no more time than others
+    ending.start()
+    try:
+        made = ssl.create_default_context().wrap_socket(plain, server_hostname=host) if parts.scheme == "https" else plain
+        with made:
+            connection = http.client.HTTPConnection(host, port)
+            connection.sock = made
+            at = f"{parts.path or '/'}{'?' + parts.query if parts.query else ''}"
+            named = parts.netloc if port != PORTS[parts.scheme] else parts.netloc.removesuffix(f":{port}")
+            connection.request("POST", at, content, {"Host": named, "Content-Type": "application/json", **headers})
+            return connection.getresponse().status
+    finally:
+        ending.cancel()
+        plain.close()
+
+
+def _address_of(host: str, port: int, allowed: Sequence[Network]) -> str:
+    found = [entry[4][0] for entry in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)]
+    for text in found:
+        address = ipaddress.ip_address(str(text).partition("%")[0])
+        address = getattr(address, "ipv4_mapped", None) or address
+        if not (address.is_global and not address.is_multicast) and not any(address in network for network in allowed):
+            raise Forbidden(f"{host} is {address}, which is not a public address", hint=ALLOW)
+    return str(found[0])
+
+
+def _end(connection: socket.socket) -> None:
+    with suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,39 @@
+"""Work of several: whose turn a project is, what waits for a person, what the others did."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.services import assigning, inbox, news
+
+router = APIRouter(prefix="/api", tags=["people"])
+
+
+@router.get("/inbox", operation_id="getInbox")
+def get_inbox(context: Ctx) -> schemas.Inbox:
+    """What waits for you: projects sent back, projects assigned, open comments that name you."""
+    return inbox.inbox(context)
+
+
+@router.get("/projects/{project}/people", operation_id="listNames")
+def list_names(context: Ctx, project: str) -> list[str]:
+    """Everybody with an account who sees the project: whom a comment can name, and whose turn it can be."""
+    return assigning.names(context, project)
+
+
+@router.put("/projects/{project}/assignee", operation_id="assignProject")
+def assign_project(context: Ctx, project: str, body: schemas.AssigneeIn) -> schemas.Project:
+    """Make it somebody's turn, or nobody's."""
+    return assigning.assign(context, project, body)
+
+
+@router.get("/projects/{project}/news", operation_id="getNews")
+def get_news(context: Ctx, project: str) -> schemas.News:
+    """What others did since you last were here."""
+    return news.news(context, project)
+
+
+@router.put("/projects/{project}/news", operation_id="markSeen")
+def mark_seen(context: Ctx, project: str, body: schemas.SeenIn) -> schemas.News:
+    """Say up to which event you have read them."""
+    return news.mark_seen(context, project, body)

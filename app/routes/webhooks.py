@@ -1,0 +1,40 @@
+"""Addresses that are told when a run ends or a project's review state changes."""
+
+from fastapi import APIRouter
+
+from app import schemas
+from app.deps import Ctx
+from app.routes.numbers import RowId
+from app.services import webhooks
+
+router = APIRouter(prefix="/api/webhooks", tags=["people"])
+
+
+@router.get("", operation_id="listWebhooks")
+def list_webhooks(context: Ctx) -> list[schemas.Webhook]:
+    """Yours; an admin sees everybody's."""
+    return webhooks.listed(context)
+
+
+@router.post("", operation_id="addWebhook", status_code=201)
+def add_webhook(context: Ctx, body: schemas.WebhookIn) -> schemas.NewWebhook:
+    """POST to it from now on; X-R2C2R-Signature is `sha256=` and the HMAC of `timestamp.body` by the secret told here once."""
+    return webhooks.add(context, body)
+
+
+@router.delete("/{webhook}", operation_id="removeWebhook", status_code=204)
+def remove_webhook(context: Ctx, webhook: RowId) -> None:
+    """It hears of nothing any more."""
+    webhooks.remove(context, webhook)
+
+
+@router.post("/{webhook}/test", operation_id="testWebhook", status_code=201)
+def test_webhook(context: Ctx, webhook: RowId) -> schemas.Delivery:
+    """Post {"event": "test"} to it, once; the answer stands in its deliveries within seconds."""
+    return webhooks.test(context, webhook)
+
+
+@router.get("/{webhook}/deliveries", operation_id="listDeliveries")
+def list_deliveries(context: Ctx, webhook: RowId) -> list[schemas.Delivery]:
+    """What was and will be posted, newest first, with what was answered."""
+    return webhooks.deliveries(context, webhook)

@@ -1,0 +1,54 @@
+"""Lengths that were measured in the room: what the scan is held against."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, FiniteFloat, model_validator
+
+from app.schemas.base import Shape
+from app.schemas.text import Remark
+
+Side = Literal["width", "depth", "height"]
+PointWorld = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class TrueLengthIn(Shape):
+    """A length as a tape says it: of an object's side in the finished scene, or between two points of the world."""
+
+    metres: float = Field(gt=0.005, le=100.0)
+    object: int | None = Field(default=None, ge=0, lt=2**63)
+    side: Side | None = None
+    points_world: Annotated[list[PointWorld], Field(min_length=2, max_length=2)] | None = None
+    text: Remark = ""  # what it is of; empty: the object's side, or that it was between two points
+
+    @model_validator(mode="after")
+    def _of_one_thing(self) -> Self:
+        """A side has an object; else there are two points."""
+        of_side = self.object is not None and self.side is not None
+        if of_side == (self.points_world is not None) or (self.object is None) != (self.side is None):
+            raise ValueError("a true length is of an object's side (object, side) or between two points (points_world)")
+        return self
+
+
+class TrueLength(Shape):
+    """A length that was measured in the room, beside what the scan says."""
+
+    id: int
+    text: str
+    object: int | None
+    side: Side | None
+    points_world: list[list[float]] | None  # as they lie in the recording as it is read now
+    metres: float
+    measured_m: float | None  # in the finished scene, or between the points; None: there is none now
+    error_m: float | None  # measured less true
+    who: str
+    at: float
+
+
+class TrueLengths(Shape):
+    """All of a project's, and what follows from them."""
+
+    lengths: list[TrueLength]
+    scale: float  # of the recording as it is read now
+    scale_wanted: float | None  # with which they fit best; None without any that can be compared
+    mean_error: float | None  # relative, of those that can be compared: |measured - true| / true
+    mean_error_scaled: float | None  # with `scale_wanted`

@@ -1,0 +1,38 @@
+"""Templates: names and categories of objects that are to be clicked."""
+
+from pydantic import Field
+
+from app.schemas.base import Shape
+from app.schemas.text import Title, Word
+from r2c2r_core.schema.prompts import MOST_OBJECTS
+
+
+class ListedObject(Shape):
+    """An object that is to be clicked."""
+
+    name: Word
+    category: Word
+
+
+class TemplateIn(Shape):
+    """What a template holds; names are unique, as in a project."""
+
+    name: Title
+    objects: list[ListedObject] = Field(min_length=1, max_length=MOST_OBJECTS)
+
+
+class Template(Shape):
+    """A stored one."""
+
+    id: int
+    name: str
+    objects: list[ListedObject]
+    who: str  # changed it last
+    changed: float
+    may_change: bool  # whether you may
+
+
+class ChecklistIn(Shape):
+    """Which template's objects a project is to click from now on; None: none."""
+
+    template: int | None = Field(ge=0, lt=2**63)

@@ -1,0 +1,66 @@
+"""Addresses that are told of what happens."""
+
+from typing import Annotated, Literal
+from urllib.parse import urlsplit
+
+from pydantic import AfterValidator, BeforeValidator, StringConstraints
+
+from app.schemas.base import Shape
+from app.schemas.live import ProjectId
+from app.schemas.text import readable
+
+WebhookEvent = Literal["run.finished", "state.changed", "test"]
+
+
+def _address(text: str) -> str:
+    """The text itself; ValueError where nothing can be posted to it."""
+    parts = urlsplit(text)
+    if parts.scheme not in ("http", "https") or not parts.hostname or parts.username is not None or parts.port == 0:
+        raise ValueError("no address to post to, such as https://lab.example/r2c2r; without a name and password in it")
+    if not text.isascii() or " " in text:
+        raise ValueError("an address is ASCII without spaces; write it percent-encoded")
+    return text
+
+
+WebAddress = Annotated[
+    str, BeforeValidator(readable), StringConstraints(min_length=1, max_length=500), AfterValidator(_address)
+]
+
+
+class WebhookIn(Shape):
+    """A new one: of a project of yours, or, an admin's, of every project."""
+
+    url: WebAddress
+    project: ProjectId | None = None
+
+
+class Webhook(Shape):
+    """Where it posts and for what, and how the last attempt went."""
+
+    id: int
+    url: str
+    project: str | None
+    project_name: str
+    owner: str  # empty: whoever started the server
+    created: float
+    answer: str  # to the last attempt; empty before the first
+    delivered: float | None  # when something was last delivered
+
+
+class NewWebhook(Webhook):
+    """One that was just made: the secret that signs what it posts is told this once."""
+
+    secret: str
+
+
+class Delivery(Shape):
+    """One message to a webhook."""
+
+    id: int
+    event: WebhookEvent
+    body: str
+    created: float
+    attempts: int
+    due: float | None  # when it is tried next; null once it is delivered or given up
+    delivered: float | None
+    answer: str

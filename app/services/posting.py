@@ -1,0 +1,127 @@
+"""Sends what webhooks are to hear of, in a thread of its own; what fails is tried again, less and less often, for two days.
+
+A delivery is taken by moving its next try ahead, in a transaction: of servers that share a database one sends it, and a server
+that dies meanwhile loses nothing. Whoever listens may hear of something twice, and tells by its number.
+"""
+
+import http.client
+import logging
+import threading
+import time
+from typing import Any
+
+from sqlalchemy import Engine
+from sqlmodel import Session, col, delete, select
+
+from app.db.engine import reading, writing
+from app.db.tables import Delivery, Webhook
+from app.posting import networks, post, signature
+from app.settings import Settings
+from r2c2r_core.errors import R2C2RError
+
+_log = logging.getLogger(__name__)
+
+LOOK_S = 30.0  # at the latest: tries that are due, and what another server stored
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 10.0, 6 * 3600.0  # before the second try, then three times as long each time
+TRIES = 14  # two days
+KEPT_S = 30 * 24 * 3600.0
+
+
+class Posting:
+    """The sender. `wake` may be called from any thread and does not wait."""
+
+    def __init__(self, engine: Engine, settings: Settings) -> None:
+        self._engine, self._allowed = engine, networks(settings.webhooks_to)
+        self._woken, self._stopping = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name="posting", daemon=True)
+        engine.update_execution_options(announced=self.wake)
+
+    def start(self) -> None:
+        """Send what waits, then what comes."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """There is something to send."""
+        self._woken.set()
+
+    def stop(self) -> None:
+        """End, after the POST that is under way; what waits is sent by the next server."""
+        self._stopping.set()
+        self.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            self._woken.clear()
+            try:
+                while not self._stopping.is_set() and (number := self._take()) is not None:
+                    self._send(number)
+            except R2C2RError as error:  # the database is away, or full: there is nothing else to do than to try again
+                _log.warning("webhooks: %s", error)
+            except Exception:  # the edge of the thread: whatever it was, other messages are still sent
+                _log.exception("webhooks")
+            self._woken.wait(LOOK_S)
+
+    def _take(self) -> int | None:
+        """The delivery that is due longest, which nobody else takes for a while."""
+        with reading(self._engine) as session:
+            if session.exec(_due(time.time())).first() is None:
+                return None
+        with writing(self._engine) as session:
+            now = time.time()
+            row: Delivery | None = session.exec(_due(now)).first()
+            if row is None:
+                return None
+            session.exec(delete(Delivery).where(col(Delivery.created) < now - KEPT_S, col(Delivery.due).is_(None)))
+            row.attempts += 1
+            row.due = now + pause_s(row.attempts)
+            session.add(row)
+            return row.id
+
+    def _send(self, number: int) -> None:
+        with reading(self._engine) as session:
+            row = session.get(Delivery, number)
+            hook = session.get(Webhook, row.webhook_id) if row is not None else None
+        if row is None or hook is None:
+            return
+        arrived, answer = self._post(row, hook)
+        with writing(self._engine) as session:
+            _note(session, number, arrived, answer)
+
+    def _post(self, row: Delivery, hook: Webhook) -> tuple[bool, str]:
+        """Whether it arrived, and what was said to it."""
+        content, timestamp = row.body.encode(), str(int(time.time()))
+        headers = {
+            "User-Agent": "r2c2r",
+            "X-R2C2R-Event": row.event,
+            "X-R2C2R-Delivery": str(row.id),
+            "X-R2C2R-Timestamp": timestamp,
+            "X-R2C2R-Signature": f"sha256={signature(hook.secret, timestamp, content)}",
+        }
+        try:
+            status = post(hook.url, content, headers, self._allowed)
+        except (OSError, ValueError, http.client.HTTPException, R2C2RError) as error:
+            return False, " ".join(str(error).split())[:200] or type(error).__name__
+        return 200 <= status < 300, str(status)
+
+
+def pause_s(attempts: int) -> float:
+    """How long after that many attempts the next one comes."""
+    return float(min(FIRST_PAUSE_S * 3 ** (attempts - 1), LONGEST_PAUSE_S))
+
+
+def _due(now: float) -> Any:
+    return select(Delivery).where(col(Delivery.due) <= now).order_by(col(Delivery.due), col(Delivery.id)).limit(1)
+
+
+def _note(session: Session, number: int, arrived: bool, answer: str) -> None:
+    row = session.get(Delivery, number)
+    if row is None:  # its webhook was removed meanwhile
+        return
+    row.answer = answer
+    if arrived:
+        row.delivered, row.due = time.time(), None
+    elif row.attempts >= TRIES or row.event == "test":  # who sends one looks at its answer
+        row.due = None
+    session.add(row)

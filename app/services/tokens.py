@@ -1,0 +1,126 @@
+"""Tokens with which programs come in: made once, kept as a hash, narrower than the person whose they are, revocable.
+
+A token acts for its account, with the account's role of the moment or the token's where that reaches less far, and is in the
+history under the account's name.
+"""
+
+import contextlib
+import hashlib
+import secrets
+import time
+
+from sqlalchemy import Engine
+from sqlmodel import Session, col, select
+
+from app import schemas
+from app.db.engine import reading, writing
+from app.db.tables import Account, ApiToken
+from app.errors import Forbidden, NotFound
+from app.security import ROLES, TOKEN_PREFIX, Person, Role, TokenScope
+from app.services import accounts, audit
+from app.settings import Settings
+from r2c2r_core.errors import InputError, R2C2RError
+
+SCOPES: tuple[TokenScope, ...] = ("metrics", "read", *ROLES)
+USED_S = 60.0  # when it was last used is noted this often
+MOST = 50  # of one account
+
+
+def add(
+    engine: Engine, owner: str | None, name: str, scope: str, *, by: str = audit.COMMAND_LINE
+) -> tuple[str, schemas.ApiToken]:
+    """A new token of an account, or, without one, of whoever starts the server; what is secret of it is returned only now.
+
+    Raises InputError for an unknown scope or one too many, Forbidden for a scope beyond the account's role.
+    """
+    secret = TOKEN_PREFIX + secrets.token_urlsafe(32)
+    with writing(engine) as session:
+        account = accounts.row(session, owner) if owner is not None else None
+        _check_scope(scope, account)
+        account_id = account.id if account else None
+        if len(session.exec(select(ApiToken.id).where(ApiToken.account_id == account_id)).all()) >= MOST:
+            raise InputError(f"{MOST} tokens are there already", hint="revoke those that nothing uses")
+        row = ApiToken(digest=_digest(secret), account_id=account_id, name=name, scope=scope, created=time.time())
+        session.add(row)
+        session.flush()
+        audit.note(session, "token made", account=account.name if account else "", who=by, detail=f"{name}: {scope}")
+        return secret, _shape(row, account)
+
+
+def everyone(engine: Engine, *, of: str | None = None) -> list[schemas.ApiToken]:
+    """The tokens of an account, or of all; the newest last."""
+    with reading(engine) as session:
+        query = select(ApiToken, Account).join(Account, isouter=True).order_by(col(ApiToken.id))
+        if of is not None:
+            query = query.where(Account.name == of)
+        return [_shape(row, account) for row, account in session.exec(query)]
+
+
+def revoke(engine: Engine, number: int, *, of: str | None = None, by: str = audit.COMMAND_LINE) -> None:
+    """It opens nothing from now on; raises NotFound for one that is not there, or, with `of`, is another account's."""
+    with writing(engine) as session:
+        row = session.get(ApiToken, number)
+        account = session.get(Account, row.account_id) if row is not None and row.account_id is not None else None
+        if row is None or (of is not None and (account is None or account.name != of)):
+            raise NotFound(f"no token {number}", hint="r2c2r token list")
+        session.delete(row)
+        audit.note(session, "token revoked", account=account.name if account else "", who=by, detail=f"{row.name}: {row.scope}")
+
+
+def person_of(engine: Engine, settings: Settings, secret: str) -> Person | None:
+    """Whom the token acts for, and how far; None for one that is none any more."""
+    with reading(engine) as session:
+        query = select(ApiToken, Account).join(Account, isouter=True).where(ApiToken.digest == _digest(secret))
+        found = session.exec(query).first()
+    if found is None:
+        return None
+    token, account = found
+    if account is None and settings.accounts_only:
+        return None
+    if time.time() - (token.used or 0.0) > USED_S:
+        with contextlib.suppress(R2C2RError), writing(engine) as session:  # a full disk keeps nobody out
+            _note_used(session, token.id or 0)
+    whole = accounts.person(account) if account else Person(settings.user, "admin")
+    return _narrowed(whole, token.scope)
+
+
+def _narrowed(person: Person, scope: str) -> Person:
+    """The person as far as the token reaches."""
+    known, reach = _known(scope), _role_of(scope) or ROLES[0]
+    return Person(person.name, min(person.role, reach, key=ROLES.index), account=person.account, scope=known)
+
+
+def _check_scope(scope: str, account: Account | None) -> None:
+    role, reach = accounts.person(account).role if account else ROLES[-1], _role_of(_known(scope))
+    if reach is not None and ROLES.index(reach) > ROLES.index(role):
+        raise Forbidden(f"the scope {scope} reaches further than the role {role}", hint=f"at most {role}")
+    if scope == "metrics" and role != "admin":
+        raise Forbidden("metrics are an admin's", hint="ask an admin of this server")
+
+
+def _known(scope: str) -> TokenScope:
+    for known in SCOPES:
+        if scope == known:
+            return known
+    raise InputError(f"{scope!r} is no scope", hint=f"one of {', '.join(SCOPES)}")
+
+
+def _role_of(scope: str) -> Role | None:
+    """The role that is the scope's; None for one that is none."""
+    return next((role for role in ROLES if role == scope), None)
+
+
+def _note_used(session: Session, number: int) -> None:
+    row = session.get(ApiToken, number)
+    if row is not None:
+        row.used = time.time()
+        session.add(row)
+
+
+def _shape(row: ApiToken, account: Account | None) -> schemas.ApiToken:
+    facts = row.model_dump(include={"id", "name", "scope", "created", "used"})
+    return schemas.ApiToken(**facts, owner=account.name if account else "")
+
+
+def _digest(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()
