@@ -22,11 +22,63 @@ export interface AccountPatch {
   password?: string | null;
 }
 
+/** An object that both have, or one of them: then the other is None, and so is what is said of the two. */
+export interface Agreed {
+  first: AgreedObject | null;
+  second: AgreedObject | null;
+  iou: number | null;
+  frames: number;
+  same_category: boolean | null;
+}
+
+/** An object in one of two projects. */
+export interface AgreedObject {
+  object: number;
+  name: string;
+  category: string;
+  frames: number;
+}
+
+/** How far two projects agree; what disagrees most comes first. */
+export interface Agreement {
+  first: Opinion;
+  second: Opinion;
+  frames: number;
+  both: number;
+  only_first: number;
+  only_second: number;
+  mean_iou: number | null;
+  same_category: number;
+  objects: Agreed[];
+  unmasked: AgreedObject[];
+}
+
+/** A token, without its secret. */
+export interface ApiToken {
+  id: number;
+  name: string;
+  scope: "metrics" | "read" | "annotator" | "reviewer" | "admin";
+  owner: string;
+  created: number;
+  used: number | null;
+}
+
+/** A new token: what it is for, and how far it reaches. `read` changes nothing, `metrics` opens /metrics alone. */
+export interface ApiTokenIn {
+  name: string;
+  scope?: "metrics" | "read" | "annotator" | "reviewer" | "admin";
+}
+
+/** Whose turn it is from now on; None: nobody's. */
+export interface AssigneeIn {
+  name: string | null;
+}
+
 /** One line of the record of sign-ins and accounts. */
 export interface AuditEntry {
   id: number;
   at: number;
-  action: "signed in" | "signed out" | "refused" | "added" | "removed" | "role" | "password";
+  action: "signed in" | "signed out" | "refused" | "added" | "removed" | "role" | "password" | "token made" | "token revoked" | "webhook made" | "webhook removed" | "honeypot";
   account: string;
   who: string;
   client: string;
@@ -88,6 +140,14 @@ export interface BundleFormat {
   opened_by: string;
 }
 
+/** What a bundle holds for robots. */
+export interface BundleInside {
+  version: number;
+  assets: ObjectAsset[];
+  robots: RobotTrial[];
+  simulators: SimulatorLines[];
+}
+
 /** One candidate mesh with its evidence. */
 export interface Candidate {
   id: string;
@@ -113,6 +173,7 @@ export interface CandidateGroup {
   name: string;
   run_name: string;
   category: string;
+  assignee: string | null;
   chosen: string;
   chosen_by: string;
   reason: string;
@@ -180,6 +241,7 @@ export interface Category {
 /** The proof in the newest bundle. */
 export interface Certificate {
   version: number;
+  current: boolean;
   passed: boolean;
   findings: Finding[];
   loaders: LoaderVerdict[];
@@ -191,6 +253,11 @@ export interface Certificate {
   together_penetration_m: number | null;
 }
 
+/** Which template's objects a project is to click from now on; None: none. */
+export interface ChecklistIn {
+  template: number | null;
+}
+
 /** What somebody said, where, and whether it is settled. */
 export interface Comment {
   object: number | null;
@@ -198,6 +265,7 @@ export interface Comment {
   x: number | null;
   y: number | null;
   point_world: [number, number, number] | null;
+  view: ViewerLookOutput | null;
   id: number;
   text: string;
   who: string;
@@ -213,6 +281,7 @@ export interface CommentIn {
   x?: number | null;
   y?: number | null;
   point_world?: [number, number, number] | null;
+  view?: ViewerLookInput | null;
   text: string;
 }
 
@@ -227,9 +296,45 @@ export interface Credentials {
   password: string;
 }
 
+/** A frame that candidates were made from, and where the object is in it. */
+export interface Crop {
+  frame: number;
+  width: number;
+  height: number;
+  box: number[];
+}
+
 /** What deleting freed. */
 export interface Deleted {
   freed_bytes: number;
+}
+
+/** One message to a webhook. */
+export interface Delivery {
+  id: number;
+  event: "run.finished" | "state.changed" | "test";
+  body: string;
+  created: number;
+  attempts: number;
+  due: number | null;
+  delivered: number | null;
+  answer: string;
+}
+
+/** How far a candidate lies off another one, laid onto it by the side that was filmed. */
+export interface Difference {
+  candidate: string;
+  share: number;
+  most: number;
+}
+
+/** What tells candidates apart. Turntables: /media/{project}/candidates/{object}/{candidate}/turns.png?against={candidate}, 24 pictures from left to right. */
+export interface Differences {
+  against: string;
+  tolerance: number;
+  longest_m: number | null;
+  candidates: Difference[];
+  crops: Crop[];
 }
 
 /** A plane to scale. Cells are counted from its top left corner, to the right and down; axes are unit vectors. */
@@ -313,7 +418,7 @@ export interface FoundFront {
   edges: number[];
 }
 
-/** The pinhole camera of a frame: pixels of the stored frame, OpenCV axes, in the recording's own world. */
+/** The camera of a frame in the recording's own world. */
 export interface FrameCamera {
   width: number;
   height: number;
@@ -367,10 +472,70 @@ export interface HistoryEntry {
   undone: boolean;
 }
 
+/** One that was. */
+export interface Honeypot {
+  project: string;
+  name: string;
+  person: string | null;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  made: number;
+}
+
+/** Whose queue it is slipped into, and what it is called there. */
+export interface HoneypotIn {
+  person: string;
+  name: string;
+}
+
+/** What the person made of it. */
+export interface HoneypotScore {
+  found: number;
+  extra: number;
+  mean_iou: number | null;
+  same_category: number;
+  objects: TrueObject[];
+}
+
 /** A recording on this machine. */
 export interface ImportPath {
   path: string;
   name?: string | null;
+}
+
+/** What waits for who asks; each project is in one of the first two lists. */
+export interface Inbox {
+  returned: InboxProject[];
+  assigned: InboxProject[];
+  objects: InboxObject[];
+  mentions: InboxMention[];
+}
+
+/** An open comment that names you. */
+export interface InboxMention {
+  project: string;
+  project_name: string;
+  comment: Comment;
+}
+
+/** An object that waits for you. */
+export interface InboxObject {
+  project: string;
+  project_name: string;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  object: number;
+  name: string;
+  category: string;
+  at: number;
+}
+
+/** A project that waits for you, and who brought it to its state, when and why. */
+export interface InboxProject {
+  id: string;
+  name: string;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  who: string;
+  at: number;
+  reason: string;
 }
 
 /** One piece of heavy work. */
@@ -378,7 +543,7 @@ export interface Job {
   id: number;
   project: string;
   project_name: string;
-  kind: "import" | "sample" | "run";
+  kind: "import" | "sample" | "run" | "vary";
   state: "queued" | "running" | "cancelling" | "cancelled" | "failed" | "done";
   stage: string;
   stage_fraction: number;
@@ -431,6 +596,31 @@ export interface Lane {
   confidences: number[];
 }
 
+/** What a joint of the object moves: its front as a box, closed, and the line it turns about or goes along. */
+export interface Leaf {
+  joint: string;
+  part: string;
+  type: "revolute" | "prismatic";
+  most: number;
+  pose: number[][];
+  size_m: number[];
+  axis: number[];
+  pivot: number[];
+  opening: Opening | null;
+}
+
+/** What was made from the scan and a person wants none of. */
+export interface LeftOut {
+  object: number;
+  name: string;
+}
+
+/** An object that is to be clicked. */
+export interface ListedObject {
+  name: string;
+  category: string;
+}
+
 /** The project's live segmenter. */
 export interface LiveStatus {
   state: "off" | "starting" | "preparing" | "ready" | "failed";
@@ -444,6 +634,13 @@ export interface LoaderVerdict {
   loader: string;
   state: string;
   detail: string;
+  steps_per_s: number[][];
+}
+
+/** How far a joint stands open in one frame. */
+export interface MarkedState {
+  frame: number;
+  state: number;
 }
 
 /** A mask at preview size: base64 of zlib of the bits of its box, row by row without padding, high bit first. */
@@ -463,6 +660,46 @@ export interface MembersIn {
   members?: string[];
 }
 
+/** A token that was just made: its secret is told this once. */
+export interface NewApiToken {
+  id: number;
+  name: string;
+  scope: "metrics" | "read" | "annotator" | "reviewer" | "admin";
+  owner: string;
+  created: number;
+  used: number | null;
+  secret: string;
+}
+
+/** One that was just made: the secret that signs what it posts is told this once. */
+export interface NewWebhook {
+  id: number;
+  url: string;
+  project: string | null;
+  project_name: string;
+  owner: string;
+  created: number;
+  answer: string;
+  delivered: number | null;
+  secret: string;
+}
+
+/** What others did to a project since you last were there, newest first. */
+export interface News {
+  since: number | null;
+  last: number;
+  people: PersonsChanges[];
+  entries: HistoryEntry[];
+}
+
+/** One object of a bundle, to be downloaded by itself. */
+export interface ObjectAsset {
+  name: string;
+  category: string;
+  formats: string[];
+  url: string;
+}
+
 /** A new object; without a name it gets its category's and the next number. */
 export interface ObjectIn {
   name?: string | null;
@@ -471,13 +708,14 @@ export interface ObjectIn {
   front?: PromptsFileFrontInput | null;
 }
 
-/** What changes, a drawn front and a crop box also to none; with `version`, only if nobody changed it meanwhile. */
+/** What changes, a drawn front, a crop box and whose turn it is also to none. With `version`, only if nobody changed it meanwhile. */
 export interface ObjectPatch {
   name?: string | null;
   category?: string | null;
   colour?: number | null;
   front?: PromptsFileFrontInput | null;
   crop?: PromptsFileCrop | null;
+  assignee?: string | null;
   version?: number | null;
 }
 
@@ -488,6 +726,7 @@ export interface ObjectPhotos {
   of: ("placed" | "primitive" | "fitted")[];
   world_from_object: number[][] | null;
   dimensions_m: number[] | null;
+  leaves: Leaf[];
 }
 
 /** What the masks and the depth say of an object's shape: points around their centre, +Z up. */
@@ -519,6 +758,21 @@ export interface Opening {
   states: OpenState[];
 }
 
+/** A project of the recording. */
+export interface Opinion {
+  project: string;
+  name: string;
+  assignee: string | null;
+  review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  objects: number;
+  updated: number;
+}
+
+/** Who is to work on a copy of the recording; None: nobody yet. */
+export interface OpinionIn {
+  name: string | null;
+}
+
 /** What a person corrected about one object; None is computed. */
 export interface OverrideData {
   candidate: string | null;
@@ -528,8 +782,12 @@ export interface OverrideData {
   joint_lower: number | null;
   joint_upper: number | null;
   joints: Record<string, [number | null, number | null]>;
+  states: Record<string, MarkedState[]>;
   rejected: string[];
   regenerate: number;
+  built_as: string | null;
+  left_out: boolean;
+  colour: [number, number, number] | null;
 }
 
 /** The fields that are present are set; null clears. */
@@ -541,7 +799,11 @@ export interface OverridePatch {
   joint_lower?: number | null;
   joint_upper?: number | null;
   joints?: Record<string, [number | null, number | null]> | null;
+  states?: Record<string, MarkedState[]> | null;
   regenerate?: number | null;
+  built_as?: string | null;
+  left_out?: boolean | null;
+  colour?: [number, number, number] | null;
   rerun?: boolean;
   version?: number | null;
 }
@@ -552,15 +814,21 @@ export interface PasswordChange {
   new: string;
 }
 
-/** A frame that shows the object well, with its pinhole camera (pixels of the stored frame, OpenCV axes). */
+/** How much somebody did. */
+export interface PersonsChanges {
+  who: string;
+  changes: number;
+}
+
+/** A frame that shows the object well, with its camera. */
 export interface Photo {
-  frame: number;
   width: number;
   height: number;
   fx: number;
   fy: number;
   cx: number;
   cy: number;
+  frame: number;
   camera_from_world: number[][];
   confidence: number;
   box: number[];
@@ -651,10 +919,17 @@ export interface Project {
   segmenter: string;
   generator: string;
   matcher: string;
+  arm: string;
   review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  tags: string[];
+  archived: boolean;
+  assignee: string | null;
   capture: CaptureFacts | null;
   notices: string[];
   register_depth: boolean;
+  scale: number;
+  checklist: ListedObject[];
+  awaits_recording: boolean;
 }
 
 /** What is in a project. */
@@ -666,6 +941,12 @@ export interface ProjectCounts {
   open_comments: number;
 }
 
+/** What the file of a project would hold. */
+export interface ProjectFileOffer {
+  size_bytes: number;
+  recording_bytes: number | null;
+}
+
 /** Who may see a project: everybody, or its owner, its members and admins. */
 export interface ProjectMembers {
   members_only: boolean;
@@ -675,12 +956,15 @@ export interface ProjectMembers {
   accounts: string[];
 }
 
-/** What changes: its name, or which backends do its stages. */
+/** What changes: its name, tags, whether it is archived, or which backends do its stages. */
 export interface ProjectPatch {
   name?: string | null;
+  tags?: string[] | null;
+  archived?: boolean | null;
   segmenter?: string | null;
   generator?: string | null;
   matcher?: string | null;
+  arm?: string | null;
 }
 
 /** One recording and what became of it, as the list of all shows it. */
@@ -703,7 +987,11 @@ export interface ProjectSummary {
   segmenter: string;
   generator: string;
   matcher: string;
+  arm: string;
   review_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
+  tags: string[];
+  archived: boolean;
+  assignee: string | null;
 }
 
 /** prompts.json. */
@@ -814,9 +1102,21 @@ export interface Proposals {
   dismissed: number;
 }
 
+/** Which proposals become objects. */
+export interface ProposalsConfirmed {
+  ids: string[];
+  category?: string | null;
+}
+
 /** How the recording is to be read. */
 export interface ReadingIn {
-  register_depth: boolean;
+  register_depth?: boolean | null;
+  scale?: number | null;
+}
+
+/** The recording of a project that has none: an upload that is complete. */
+export interface RecordingIn {
+  upload: string;
 }
 
 /** One legal step from here; with something unmet it needs a written reason, which the history keeps. */
@@ -851,11 +1151,34 @@ export interface Reviewed {
   text: string;
 }
 
+/** How a gripper or an arm did at one joint or thing. */
+export interface RobotGrip {
+  kind: string;
+  name: string;
+  method: string | null;
+  passed: boolean;
+  grip_n: number | null;
+  opened: number | null;
+  why: string;
+  picture: string | null;
+}
+
+/** What one robot did in a bundle. */
+export interface RobotTrial {
+  name: string;
+  joints: number;
+  joints_opened: number;
+  grips: RobotGrip[];
+  places: StandingPlace[];
+  map: string | null;
+}
+
 /** Which backends, where not the defaults. */
 export interface RunRequest {
   segmenter?: string | null;
   generator?: string | null;
   matcher?: string | null;
+  arm?: string | null;
   seed?: number;
 }
 
@@ -872,6 +1195,7 @@ export interface SampleRequest {
 export interface SceneItem {
   object: number | null;
   name: string;
+  run_name: string;
   category: string;
   fixture: string;
   dimensions_m: number[];
@@ -882,6 +1206,8 @@ export interface SceneItem {
   placement_rms_m: number | null;
   warp_residual_m: number | null;
   warnings: string[];
+  colour: number[];
+  override: OverrideData;
 }
 
 /** One joint; 0 is closed, positive opens. Angles in radians, lengths in metres. */
@@ -908,6 +1234,7 @@ export interface SceneObject {
   front: PromptsFileFrontOutput | null;
   frames: FrameSaid[];
   crop: PromptsFileCrop | null;
+  assignee: string | null;
   can_undo: boolean;
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";
@@ -921,11 +1248,64 @@ export interface SceneObject {
 /** The finished scene as a table. */
 export interface SceneSummary {
   items: SceneItem[];
+  left_out: LeftOut[];
   failures: Record<string, string>;
   warnings: string[];
   stages: StageInfo[];
   glb: string | null;
   preview: string | null;
+}
+
+/** One process that takes jobs, while it lives. */
+export interface Seat {
+  id: number;
+  host: string;
+  process: number;
+  here: boolean;
+  version: string;
+  jobs_at_a_time: number;
+  began: number;
+  silent_s: number;
+  draining: boolean;
+  jobs: SeatJob[];
+}
+
+/** What is to become of a seat. */
+export interface SeatIn {
+  draining: boolean;
+}
+
+/** A job that runs at a seat. */
+export interface SeatJob {
+  id: number;
+  project_id: string;
+  project_name: string;
+  kind: string;
+  stage: string;
+  progress: number;
+  objects: string[];
+}
+
+/** All of them, and what waits for one. */
+export interface Seats {
+  waiting: number;
+  shared: boolean;
+  seats: Seat[];
+}
+
+/** Up to which event the news were read. */
+export interface SeenIn {
+  event: number;
+}
+
+/** How a bundle is taken into one simulator. */
+export interface SimulatorLines {
+  simulator: string;
+  install: string;
+  language: string;
+  code: string;
+  note: string;
+  loader: string | null;
 }
 
 /** How one stage was run. */
@@ -941,12 +1321,21 @@ export interface StageState {
   state: "waiting" | "running" | "done" | "failed" | "cancelled";
 }
 
+/** Where an arm stands, and for which joints. */
+export interface StandingPlace {
+  x_m: number;
+  y_m: number;
+  lift_m: number;
+  joints: string[];
+}
+
 /** What the app can do here; limits are shown before a file is chosen. */
 export interface SystemInfo {
   version: string;
   user: string;
   role: "annotator" | "reviewer" | "admin";
   account: boolean;
+  sign_out: string | null;
   max_upload_bytes: number;
   free_bytes: number;
   import_roots: string[];
@@ -956,7 +1345,24 @@ export interface SystemInfo {
   segmenters: Backend[];
   generators: Backend[];
   matchers: Backend[];
+  arms: Backend[];
   formats: BundleFormat[];
+}
+
+/** A stored one. */
+export interface Template {
+  id: number;
+  name: string;
+  objects: ListedObject[];
+  who: string;
+  changed: number;
+  may_change: boolean;
+}
+
+/** What a template holds; names are unique, as in a project. */
+export interface TemplateIn {
+  name: string;
+  objects: ListedObject[];
 }
 
 /** One free-standing thing, left alone. */
@@ -964,6 +1370,57 @@ export interface ThingVerdict {
   name: string;
   drift_m: number | null;
   opening_free: number | null;
+}
+
+/** A project in the trash. */
+export interface Trashed {
+  id: string;
+  name: string;
+  at: number;
+  who: string;
+  size_bytes: number;
+  counts: ProjectCounts;
+}
+
+/** A length that was measured in the room, beside what the scan says. */
+export interface TrueLength {
+  id: number;
+  text: string;
+  object: number | null;
+  side: "width" | "depth" | "height" | null;
+  points_world: number[][] | null;
+  metres: number;
+  measured_m: number | null;
+  error_m: number | null;
+  who: string;
+  at: number;
+}
+
+/** A length as a tape says it: of an object's side in the finished scene, or between two points of the world. */
+export interface TrueLengthIn {
+  metres: number;
+  object?: number | null;
+  side?: "width" | "depth" | "height" | null;
+  points_world?: number[][] | null;
+  text?: string;
+}
+
+/** All of a project's, and what follows from them. */
+export interface TrueLengths {
+  lengths: TrueLength[];
+  scale: number;
+  scale_wanted: number | null;
+  mean_error: number | null;
+  mean_error_scaled: number | null;
+}
+
+/** An object that is really there, and the person's that was found to be it. */
+export interface TrueObject {
+  name: string;
+  category: string;
+  object: number | null;
+  iou: number | null;
+  same_category: boolean | null;
 }
 
 /** What to undo or redo: the last change of this object, or of any object when None. */
@@ -1015,6 +1472,47 @@ export interface UploadIn {
   modified?: number | null;
 }
 
+/** Variants that were made together. */
+export interface VariantSet {
+  name: string;
+  version: number;
+  count: number;
+  seed: number;
+  url: string;
+  file_name: string;
+  wall: string;
+  sha256: string;
+  size: number;
+  created: number;
+  rejected: Record<string, number>;
+  checked: number;
+  failed: string[];
+}
+
+/** All that were made of a project's bundles, and what more would take. */
+export interface Variants {
+  offer: VariantsOffer | null;
+  sets: VariantSet[];
+}
+
+/** What is wished for. */
+export interface VariantsIn {
+  version: number;
+  count: number;
+  seed?: number;
+}
+
+/** What variants of the newest bundle would take. */
+export interface VariantsOffer {
+  version: number;
+  most: number;
+  zip_bytes: number;
+  each_zip_bytes: number;
+  disk_bytes: number;
+  each_disk_bytes: number;
+  free_bytes: number;
+}
+
 /** What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew. */
 export interface VerdictIn {
   candidate: string;
@@ -1030,12 +1528,56 @@ export interface ViewerBox {
   size: [number, number, number];
 }
 
+/** Where a camera of the 3D view stands in the world, and what it looks at. */
+export interface ViewerCamera {
+  position: [number, number, number];
+  target: [number, number, number];
+}
+
+/** A box outside which nothing is shown, as shares of the scene's width, depth (from its fronts) and height. */
+export interface ViewerClip {
+  low: [number, number, number];
+  high: [number, number, number];
+}
+
 /** One joint of the scene the 3D view shows. */
 export interface ViewerJoint {
   name: string;
   lower: number;
   upper: number;
   value: number;
+}
+
+/** How the 3D view is looked at: what a comment keeps. */
+export interface ViewerLookInput {
+  mode: "cloud" | "candidate" | "aligned" | "scene";
+  draw?: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
+  cloud?: boolean;
+  opacity?: number;
+  hidden?: string[];
+  parallel?: boolean;
+  clip?: ViewerClip | null;
+  camera?: ViewerCamera | null;
+}
+
+/** How the 3D view is looked at: what a comment keeps. */
+export interface ViewerLookOutput {
+  mode: "cloud" | "candidate" | "aligned" | "scene";
+  draw: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
+  cloud: boolean;
+  opacity: number;
+  hidden: string[];
+  parallel: boolean;
+  clip: ViewerClip | null;
+  camera: ViewerCamera | null;
+}
+
+/** What the last click in the 3D view was on. */
+export interface ViewerPicked {
+  number: number;
+  name: string;
+  object: number | null;
+  point: number[] | null;
 }
 
 /** Where to put the object that is moved by hand, world_from_object; null leaves it where it is. */
@@ -1060,14 +1602,21 @@ export interface ViewerSession {
 /** What the 3D view shows. */
 export interface ViewerShow {
   mode: "cloud" | "candidate" | "aligned" | "scene";
-  object?: number | null;
-  candidate?: string | null;
+  draw?: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
   cloud?: boolean;
   opacity?: number;
-  collision?: boolean;
+  hidden?: string[];
+  parallel?: boolean;
+  clip?: ViewerClip | null;
+  camera?: ViewerCamera | null;
+  object?: number | null;
+  made?: string | null;
+  candidate?: string | null;
+  tape?: number[][];
   box?: ViewerBox | null;
   full?: boolean;
-  look?: "object" | "scene" | null;
+  look?: "object" | "scene" | "front" | "back" | "left" | "right" | "top" | "bottom" | "run" | "photo" | null;
+  frame?: number | null;
 }
 
 /** What the 3D view shows now. */
@@ -1076,6 +1625,27 @@ export interface ViewerShown {
   text: string;
   reduced: boolean;
   joints: ViewerJoint[];
+  preview: string[];
+  span_m: [number, number, number] | null;
+  part: ViewerClip | null;
+}
+
+/** Where it posts and for what, and how the last attempt went. */
+export interface Webhook {
+  id: number;
+  url: string;
+  project: string | null;
+  project_name: string;
+  owner: string;
+  created: number;
+  answer: string;
+  delivered: number | null;
+}
+
+/** A new one: of a project of yours, or, an admin's, of every project. */
+export interface WebhookIn {
+  url: string;
+  project?: string | null;
 }
 
 /** Every endpoint by its name. */
@@ -1096,6 +1666,10 @@ export interface Operations {
   browse: { parameters: { path?: string | null }; body: undefined; answer: FolderListing };
   /** GET /api/health */
   health: { parameters: Record<string, never>; body: undefined; answer: Record<string, string> };
+  /** GET /api/honeypots */
+  listHoneypots: { parameters: Record<string, never>; body: undefined; answer: Honeypot[] };
+  /** GET /api/inbox */
+  getInbox: { parameters: Record<string, never>; body: undefined; answer: Inbox };
   /** GET /api/jobs */
   listJobs: { parameters: { project?: string | null; limit?: number }; body: undefined; answer: Job[] };
   /** GET /api/jobs/{job} */
@@ -1121,41 +1695,63 @@ export interface Operations {
   /** POST /api/projects/upload */
   uploadProject: { parameters: { filename: string; name?: string | null }; body: undefined; answer: Project };
   /** DELETE /api/projects/{project} */
-  deleteProject: { parameters: { project: string }; body: undefined; answer: Deleted };
+  deleteProject: { parameters: { project: string }; body: undefined; answer: Trashed };
   /** GET /api/projects/{project} */
   getProject: { parameters: { project: string }; body: undefined; answer: Project };
   /** PATCH /api/projects/{project} */
   changeProject: { parameters: { project: string }; body: ProjectPatch; answer: Project };
+  /** PUT /api/projects/{project}/assignee */
+  assignProject: { parameters: { project: string }; body: AssigneeIn; answer: Project };
   /** GET /api/projects/{project}/bundles */
   listBundles: { parameters: { project: string }; body: undefined; answer: Bundle[] };
   /** GET /api/projects/{project}/bundles/{version}/changes */
   compareBundles: { parameters: { project: string; version: number; since: number }; body: undefined; answer: BundleChange[] };
   /** GET /api/projects/{project}/bundles/{version}/check */
   checkBundle: { parameters: { project: string; version: number }; body: undefined; answer: BundleCheck };
+  /** GET /api/projects/{project}/bundles/{version}/inside */
+  bundleInside: { parameters: { project: string; version: number }; body: undefined; answer: BundleInside };
   /** GET /api/projects/{project}/candidates */
   listCandidates: { parameters: { project: string }; body: undefined; answer: CandidateGroup[] };
   /** GET /api/projects/{project}/certificate */
   getCertificate: { parameters: { project: string }; body: undefined; answer: Certificate };
+  /** PUT /api/projects/{project}/checklist */
+  setChecklist: { parameters: { project: string }; body: ChecklistIn; answer: Project };
   /** GET /api/projects/{project}/comments */
   listComments: { parameters: { project: string }; body: undefined; answer: Comment[] };
   /** POST /api/projects/{project}/comments */
   addComment: { parameters: { project: string }; body: CommentIn; answer: Comment };
   /** PATCH /api/projects/{project}/comments/{comment} */
   changeComment: { parameters: { project: string; comment: number }; body: CommentPatch; answer: Comment };
+  /** POST /api/projects/{project}/duplicate */
+  duplicateProject: { parameters: { project: string }; body: undefined; answer: Project };
+  /** GET /api/projects/{project}/effort.csv */
+  getEffort: { parameters: { project: string }; body: undefined; answer: unknown };
   /** GET /api/projects/{project}/elevations */
   getElevations: { parameters: { project: string }; body: undefined; answer: Elevations };
   /** GET /api/projects/{project}/elevations/fronts */
   getFoundFronts: { parameters: { project: string }; body: undefined; answer: FoundFront[] };
   /** GET /api/projects/{project}/figures */
   getFigures: { parameters: { project: string }; body: undefined; answer: Figures };
+  /** GET /api/projects/{project}/file */
+  offerProjectFile: { parameters: { project: string }; body: undefined; answer: ProjectFileOffer };
   /** GET /api/projects/{project}/frames */
   listFrames: { parameters: { project: string }; body: undefined; answer: FrameInfo[] };
   /** GET /api/projects/{project}/frames/{frame}/camera */
   getCamera: { parameters: { project: string; frame: number }; body: undefined; answer: FrameCamera };
   /** GET /api/projects/{project}/history */
   getHistory: { parameters: { project: string; object?: number | null; before?: number | null; limit?: number }; body: undefined; answer: HistoryEntry[] };
+  /** GET /api/projects/{project}/honeypot */
+  scoreHoneypot: { parameters: { project: string }; body: undefined; answer: HoneypotScore };
+  /** POST /api/projects/{project}/honeypot */
+  slipHoneypot: { parameters: { project: string }; body: HoneypotIn; answer: Honeypot };
   /** GET /api/projects/{project}/lanes */
   getLanes: { parameters: { project: string }; body: undefined; answer: Lane[] };
+  /** GET /api/projects/{project}/lengths */
+  listLengths: { parameters: { project: string }; body: undefined; answer: TrueLengths };
+  /** POST /api/projects/{project}/lengths */
+  addLength: { parameters: { project: string }; body: TrueLengthIn; answer: TrueLengths };
+  /** DELETE /api/projects/{project}/lengths/{length} */
+  removeLength: { parameters: { project: string; length: number }; body: undefined; answer: TrueLengths };
   /** GET /api/projects/{project}/live */
   getLive: { parameters: { project: string }; body: undefined; answer: LiveStatus };
   /** POST /api/projects/{project}/live/open */
@@ -1166,6 +1762,10 @@ export interface Operations {
   getMembers: { parameters: { project: string }; body: undefined; answer: ProjectMembers };
   /** PUT /api/projects/{project}/members */
   setMembers: { parameters: { project: string }; body: MembersIn; answer: ProjectMembers };
+  /** GET /api/projects/{project}/news */
+  getNews: { parameters: { project: string }; body: undefined; answer: News };
+  /** PUT /api/projects/{project}/news */
+  markSeen: { parameters: { project: string }; body: SeenIn; answer: News };
   /** GET /api/projects/{project}/objects */
   listObjects: { parameters: { project: string; deleted?: boolean }; body: undefined; answer: SceneObject[] };
   /** POST /api/projects/{project}/objects */
@@ -1182,6 +1782,8 @@ export interface Operations {
   addPoints: { parameters: { project: string; object: number; infer?: boolean }; body: PointsIn; answer: SceneObject };
   /** GET /api/projects/{project}/objects/{object}/cloud */
   getObjectPoints: { parameters: { project: string; object: number }; body: undefined; answer: ObjectPoints };
+  /** GET /api/projects/{project}/objects/{object}/differences */
+  getDifferences: { parameters: { project: string; object: number; against: string }; body: undefined; answer: Differences };
   /** DELETE /api/projects/{project}/objects/{object}/frames/{frame} */
   leaveFrame: { parameters: { project: string; object: number; frame: number }; body: undefined; answer: SceneObject };
   /** PUT /api/projects/{project}/objects/{object}/frames/{frame} */
@@ -1206,6 +1808,16 @@ export interface Operations {
   giveVerdict: { parameters: { project: string; object: number }; body: VerdictIn; answer: Reviewed };
   /** GET /api/projects/{project}/openings */
   getOpenings: { parameters: { project: string }; body: undefined; answer: Opening[] };
+  /** GET /api/projects/{project}/opinions */
+  listOpinions: { parameters: { project: string }; body: undefined; answer: Opinion[] };
+  /** POST /api/projects/{project}/opinions */
+  askOpinion: { parameters: { project: string }; body: OpinionIn; answer: Project };
+  /** GET /api/projects/{project}/opinions/{other} */
+  getAgreement: { parameters: { project: string; other: string }; body: undefined; answer: Agreement };
+  /** GET /api/projects/{project}/opinions/{other}/agreement.csv */
+  getAgreementTable: { parameters: { project: string; other: string }; body: undefined; answer: unknown };
+  /** GET /api/projects/{project}/people */
+  listNames: { parameters: { project: string }; body: undefined; answer: string[] };
   /** GET /api/projects/{project}/prompts.json */
   exportPrompts: { parameters: { project: string }; body: undefined; answer: PromptsFileOutput };
   /** POST /api/projects/{project}/prompts.json */
@@ -1213,13 +1825,15 @@ export interface Operations {
   /** GET /api/projects/{project}/proposals */
   getProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
   /** POST /api/projects/{project}/proposals/confirm */
-  confirmProposals: { parameters: { project: string }; body: ProposalIds; answer: SceneObject[] };
+  confirmProposals: { parameters: { project: string }; body: ProposalsConfirmed; answer: SceneObject[] };
   /** POST /api/projects/{project}/proposals/dismiss */
   dismissProposals: { parameters: { project: string }; body: ProposalIds; answer: Proposals };
   /** POST /api/projects/{project}/proposals/restore */
   restoreProposals: { parameters: { project: string }; body: undefined; answer: Proposals };
   /** PUT /api/projects/{project}/reading */
   readAgain: { parameters: { project: string }; body: ReadingIn; answer: Project };
+  /** PUT /api/projects/{project}/recording */
+  giveRecording: { parameters: { project: string }; body: RecordingIn; answer: Project };
   /** POST /api/projects/{project}/redo */
   redo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
   /** GET /api/projects/{project}/review */
@@ -1230,18 +1844,54 @@ export interface Operations {
   runProject: { parameters: { project: string }; body: RunRequest; answer: Job };
   /** GET /api/projects/{project}/scene */
   getScene: { parameters: { project: string }; body: undefined; answer: SceneSummary };
+  /** PATCH /api/projects/{project}/scene/{name}/override */
+  correctMade: { parameters: { project: string; name: string }; body: OverridePatch; answer: Reviewed };
   /** POST /api/projects/{project}/undo */
   undo: { parameters: { project: string }; body: UndoRequest; answer: Undone };
+  /** GET /api/projects/{project}/variants */
+  listVariants: { parameters: { project: string }; body: undefined; answer: Variants };
+  /** POST /api/projects/{project}/variants */
+  makeVariants: { parameters: { project: string }; body: VariantsIn; answer: Job };
+  /** DELETE /api/projects/{project}/variants/{variants_name} */
+  deleteVariants: { parameters: { project: string; variants_name: string }; body: undefined; answer: Variants };
   /** POST /api/projects/{project}/viewer */
   openViewer: { parameters: { project: string }; body: undefined; answer: ViewerSession };
+  /** GET /api/projects/{project}/viewer/camera */
+  getViewerCamera: { parameters: { project: string }; body: undefined; answer: ViewerCamera };
   /** POST /api/projects/{project}/viewer/joints */
   setJoints: { parameters: { project: string }; body: JointValues; answer: ViewerShown };
+  /** GET /api/projects/{project}/viewer/picked */
+  getPicked: { parameters: { project: string }; body: undefined; answer: ViewerPicked };
   /** POST /api/projects/{project}/viewer/place */
   placeInViewer: { parameters: { project: string }; body: ViewerPlace; answer: ViewerPlaced };
   /** POST /api/projects/{project}/viewer/show */
   showInViewer: { parameters: { project: string }; body: ViewerShow; answer: ViewerShown };
+  /** GET /api/seats */
+  listSeats: { parameters: Record<string, never>; body: undefined; answer: Seats };
+  /** PATCH /api/seats/{seat} */
+  drainSeat: { parameters: { seat: number }; body: SeatIn; answer: Seats };
   /** GET /api/system */
   getSystem: { parameters: Record<string, never>; body: undefined; answer: SystemInfo };
+  /** GET /api/templates */
+  listTemplates: { parameters: Record<string, never>; body: undefined; answer: Template[] };
+  /** POST /api/templates */
+  addTemplate: { parameters: Record<string, never>; body: TemplateIn; answer: Template };
+  /** DELETE /api/templates/{template} */
+  removeTemplate: { parameters: { template: number }; body: undefined; answer: unknown };
+  /** PUT /api/templates/{template} */
+  changeTemplate: { parameters: { template: number }; body: TemplateIn; answer: Template };
+  /** GET /api/tokens */
+  listTokens: { parameters: Record<string, never>; body: undefined; answer: ApiToken[] };
+  /** POST /api/tokens */
+  addToken: { parameters: Record<string, never>; body: ApiTokenIn; answer: NewApiToken };
+  /** DELETE /api/tokens/{token} */
+  revokeToken: { parameters: { token: number }; body: undefined; answer: unknown };
+  /** GET /api/trash */
+  listTrash: { parameters: Record<string, never>; body: undefined; answer: Trashed[] };
+  /** DELETE /api/trash/{entry} */
+  deleteForGood: { parameters: { entry: string }; body: undefined; answer: Deleted };
+  /** POST /api/trash/{entry}/restore */
+  restoreProject: { parameters: { entry: string }; body: undefined; answer: Project };
   /** GET /api/unknown */
   listUnknown: { parameters: Record<string, never>; body: undefined; answer: UnknownFolder[] };
   /** POST /api/unknown/{entry}/adopt */
@@ -1262,12 +1912,30 @@ export interface Operations {
   continueUpload: { parameters: { upload: string }; body: undefined; answer: unknown };
   /** POST /api/uploads/{upload}/finish */
   finishUpload: { parameters: { upload: string }; body: undefined; answer: Project };
+  /** GET /api/webhooks */
+  listWebhooks: { parameters: Record<string, never>; body: undefined; answer: Webhook[] };
+  /** POST /api/webhooks */
+  addWebhook: { parameters: Record<string, never>; body: WebhookIn; answer: NewWebhook };
+  /** DELETE /api/webhooks/{webhook} */
+  removeWebhook: { parameters: { webhook: number }; body: undefined; answer: unknown };
+  /** GET /api/webhooks/{webhook}/deliveries */
+  listDeliveries: { parameters: { webhook: number }; body: undefined; answer: Delivery[] };
+  /** POST /api/webhooks/{webhook}/test */
+  testWebhook: { parameters: { webhook: number }; body: undefined; answer: Delivery };
+  /** GET /media/{project}/README.txt */
+  sceneReadme: { parameters: { project: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/bundles/{version}.zip */
   downloadBundle: { parameters: { project: string; version: number; formats?: string[] }; body: undefined; answer: unknown };
+  /** GET /media/{project}/bundles/{version}/objects/{object_name}.zip */
+  downloadObject: { parameters: { project: string; version: number; object_name: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/bundles/{version}/pictures/{folder}/{picture} */
+  bundlePicture: { parameters: { project: string; version: number; folder: "gripper" | "arm"; picture: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.glb */
   candidateMesh: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/candidates/{object}/{candidate}.png */
   candidatePicture: { parameters: { project: string; object: number; candidate: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/candidates/{object}/{candidate}/turns.png */
+  candidateTurns: { parameters: { project: string; object: number; candidate: string; against?: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/depth/{frame}.png */
   depthImage: { parameters: { project: string; frame: number; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/elevations/{elevation}.png */
@@ -1278,6 +1946,8 @@ export interface Operations {
   overlayPicture: { parameters: { project: string; object: number; frame: number; of?: "placed" | "primitive" | "fitted"; look?: "ghost" | "outline" | "residual"; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/preview.png */
   scenePicture: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/project.zip */
+  downloadProject: { parameters: { project: string; recording?: boolean }; body: undefined; answer: unknown };
   /** GET /media/{project}/report.html */
   sceneReport: { parameters: { project: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/review.html */
@@ -1288,4 +1958,10 @@ export interface Operations {
   sceneMesh: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/thumbnail.jpg */
   thumbnail: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/variants/{variants_name}.jpg */
+  variantsWall: { parameters: { project: string; variants_name: string; v?: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/variants/{variants_name}.zip */
+  downloadVariants: { parameters: { project: string; variants_name: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/{folder}/{picture} */
+  reportPicture: { parameters: { project: string; folder: "pictures" | "gripper" | "arm"; picture: string }; body: undefined; answer: unknown };
 }

@@ -2,10 +2,11 @@
 
 /** @import {
  *   SystemInfo, FolderListing, FrameCamera, Opening, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
- *   CandidateGroup, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
- *   Figures, ObjectPhotos, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, RunRequest,
- *   HistoryEntry, Deleted, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
- *   UnknownFolder, ProjectMembers, MembersIn, ReadingIn
+ *   CandidateGroup, Differences, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
+ *   Figures, ObjectPhotos, ViewerPicked, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, BundleInside, RunRequest,
+ *   HistoryEntry, Inbox, News, Deleted, Trashed, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
+ *   TrueLengthIn, TrueLengths, UnknownFolder, ProjectMembers, MembersIn, ReadingIn, Seats,
+ *   ProjectFileOffer, Agreement, Variants, VariantsIn, Honeypot, HoneypotIn, HoneypotScore, Opinion, Template, TemplateIn, Webhook, WebhookIn, NewWebhook, Delivery
  * } from "./api-types" */
 
 import { patiently } from "./lib/patience.js";
@@ -150,16 +151,76 @@ export const getProject = (id, signal) => get(of(id), signal);
 export const importPath = (path) => send("POST", "/api/projects/import", { path });
 /** @param {Partial<SampleRequest>} request @returns {Promise<Project>} */
 export const makeSample = (request) => send("POST", "/api/projects/sample", request);
-/** @param {string} id @param {{ name?: string, segmenter?: string }} patch @returns {Promise<Project>} */
+/** @param {string} id @param {{ name?: string, segmenter?: string, tags?: string[], archived?: boolean }} patch @returns {Promise<Project>} */
 export const changeProject = (id, patch) => send("PATCH", of(id), patch);
 /** @param {string} id @param {ReadingIn} how @returns {Promise<Project>} */
 export const readAgain = (id, how) => send("PUT", `${of(id)}/reading`, how);
-/** @param {string} id @returns {Promise<Deleted>} */
+/** Into the trash. @param {string} id @returns {Promise<Trashed>} */
 export const deleteProject = (id) => send("DELETE", of(id));
+/** @param {string} id @returns {Promise<Project>} */
+export const duplicateProject = (id) => send("POST", `${of(id)}/duplicate`);
+/** @param {string} id @returns {Promise<ProjectFileOffer>} */
+export const offerProjectFile = (id) => get(`${of(id)}/file`);
+/** @param {AbortSignal} [signal] @returns {Promise<Trashed[]>} */
+export const listTrash = (signal) => get("/api/trash", signal);
+/** @param {string} id @returns {Promise<Project>} */
+export const restoreProject = (id) => send("POST", `/api/trash/${encodeURIComponent(id)}/restore`);
+/** @param {string} id @returns {Promise<Deleted>} */
+export const deleteForGood = (id) => send("DELETE", `/api/trash/${encodeURIComponent(id)}`);
+/** @param {AbortSignal} [signal] @returns {Promise<Seats>} */
+export const listSeats = (signal) => get("/api/seats", signal);
+/** @param {number} id @param {boolean} draining @returns {Promise<Seats>} */
+export const drainSeat = (id, draining) => send("PATCH", `/api/seats/${id}`, { draining });
+/** @param {AbortSignal} [signal] @returns {Promise<Webhook[]>} */
+export const listWebhooks = (signal) => get("/api/webhooks", signal);
+/** @param {WebhookIn} webhook @returns {Promise<NewWebhook>} */
+export const addWebhook = (webhook) => send("POST", "/api/webhooks", webhook);
+/** @param {number} id @returns {Promise<void>} */
+export const removeWebhook = (id) => send("DELETE", `/api/webhooks/${id}`);
+/** @param {number} id @returns {Promise<Delivery>} */
+export const testWebhook = (id) => send("POST", `/api/webhooks/${id}/test`);
+/** @param {number} id @param {AbortSignal} [signal] @returns {Promise<Delivery[]>} */
+export const listDeliveries = (id, signal) => get(`/api/webhooks/${id}/deliveries`, signal);
+/** @param {AbortSignal} [signal] @returns {Promise<Honeypot[]>} */
+export const listHoneypots = (signal) => get("/api/honeypots", signal);
+/** @param {string} id of a sample kitchen @param {HoneypotIn} how @returns {Promise<Honeypot>} */
+export const slipHoneypot = (id, how) => takenOn(() => send("POST", `${of(id)}/honeypot`, how));
+/** @param {string} id @returns {Promise<HoneypotScore>} */
+export const scoreHoneypot = (id) => takenOn(() => get(`${of(id)}/honeypot`));
+/** @param {string} id @param {AbortSignal} [signal] @returns {Promise<Opinion[]>} */
+export const listOpinions = (id, signal) => get(`${of(id)}/opinions`, signal);
+/** @param {string} id @param {string | null} name @returns {Promise<Project>} */
+export const askOpinion = (id, name) => takenOn(() => send("POST", `${of(id)}/opinions`, { name }));
+/** @param {string} id @param {string} other @returns {Promise<Agreement>} */
+export const getAgreement = (id, other) => takenOn(() => get(`${of(id)}/opinions/${encodeURIComponent(other)}`));
+/** Where it is downloaded. @param {string} id @param {string} other */
+export const agreementTable = (id, other) => `${of(id)}/opinions/${encodeURIComponent(other)}/agreement.csv`;
+/** @param {AbortSignal} [signal] @returns {Promise<Template[]>} */
+export const listTemplates = (signal) => get("/api/templates", signal);
+/** @param {TemplateIn} template @returns {Promise<Template>} */
+export const addTemplate = (template) => send("POST", "/api/templates", template);
+/** @param {number} id @param {TemplateIn} template @returns {Promise<Template>} */
+export const changeTemplate = (id, template) => send("PUT", `/api/templates/${id}`, template);
+/** @param {number} id */
+export const removeTemplate = (id) => call(`/api/templates/${id}`, { method: "DELETE" });
+/** @param {string} id @param {number | null} template whose objects are to be clicked @returns {Promise<Project>} */
+export const setChecklist = (id, template) => send("PUT", `${of(id)}/checklist`, { template });
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<ProjectMembers>} */
 export const getMembers = (id, signal) => get(`${of(id)}/members`, signal);
 /** @param {string} id @param {MembersIn} members @returns {Promise<ProjectMembers>} */
 export const setMembers = (id, members) => send("PUT", `${of(id)}/members`, members);
+/** @param {AbortSignal} [signal] @returns {Promise<Inbox>} */
+export const getInbox = (signal) => get("/api/inbox", signal);
+/** Who can be named in a project. @param {string} id @returns {Promise<string[]>} */
+export const listNames = (id) => get(`${of(id)}/people`);
+/** @param {string} id @param {string | null} name @returns {Promise<Project>} */
+export const assignProject = (id, name) => send("PUT", `${of(id)}/assignee`, { name });
+/** @param {string} id @param {number} object @param {string | null} name @returns {Promise<SceneObject>} */
+export const assignObject = (id, object, name) => send("PATCH", `${of(id)}/objects/${object}`, { assignee: name });
+/** @param {string} id @param {AbortSignal} [signal] @returns {Promise<News>} */
+export const getNews = (id, signal) => get(`${of(id)}/news`, signal);
+/** @param {string} id @param {number} event up to which they were read @returns {Promise<News>} */
+export const markSeen = (id, event) => send("PUT", `${of(id)}/news`, { event });
 /** @param {string} id @returns {Promise<FrameInfo[]>} */
 export const listFrames = (id) => get(`${of(id)}/frames`);
 /** @param {string} id @returns {Promise<HistoryEntry[]>} */
@@ -184,9 +245,10 @@ export const cancelUpload = (id) => call(`/api/uploads/${id}`, { method: "DELETE
  * @param {File} file
  * @param {(fraction: number, waiting: boolean) => void} onProgress
  * @param {AbortSignal} signal ends it; what arrived stays, to go on with
+ * @param {string} [project] that has no recording, and is given this one
  * @returns {Promise<Project>}
  */
-export async function uploadRecording(file, onProgress, signal) {
+export async function uploadRecording(file, onProgress, signal, project) {
   const wish = { file_name: file.name, size: file.size, modified: file.lastModified / 1000 };
   const upload = stoppedUpload(file, await listUploads()) ?? (await send("POST", "/api/uploads", wish));
   const path = `/api/uploads/${upload.id}`;
@@ -203,7 +265,9 @@ export async function uploadRecording(file, onProgress, signal) {
     onProgress: (sent, waiting) => onProgress(sent / file.size, waiting),
     wait,
   });
-  return takenOn(() => send("POST", `${path}/finish`));
+  return takenOn(() =>
+    project ? send("PUT", `${of(project)}/recording`, { upload: upload.id }) : send("POST", `${path}/finish`),
+  );
 }
 
 /** @param {string} id @returns {Promise<SceneObject[]>} */
@@ -255,6 +319,10 @@ export const uploadCandidate = async (id, seen, file) => {
   return (await takenOn(() => call(path, { method: "POST", body: file }))).json();
 };
 
+/** @param {string} id @param {number} object @param {string} against a candidate @returns {Promise<Differences>} */
+export const getDifferences = (id, object, against) =>
+  takenOn(() => get(`${of(id)}/objects/${object}/differences?${new URLSearchParams({ against })}`));
+
 /** @param {string} id @returns {Promise<ReviewStatus>} */
 export const getReview = (id) => get(`${of(id)}/review`);
 /** @param {string} id @param {ReviewStep} step @returns {Promise<ReviewStatus>} */
@@ -271,14 +339,28 @@ export const getPhotos = (id, object) => get(`${of(id)}/objects/${object}/photos
 
 /** @param {string} id @returns {Promise<SceneSummary>} */
 export const getScene = (id) => get(`${of(id)}/scene`);
+/** @param {string} id @returns {Promise<TrueLengths>} */
+export const listLengths = (id) => get(`${of(id)}/lengths`);
+/** @param {string} id @param {TrueLengthIn} length @returns {Promise<TrueLengths>} */
+export const addLength = (id, length) => send("POST", `${of(id)}/lengths`, length);
+/** @param {string} id @param {number} length @returns {Promise<TrueLengths>} */
+export const removeLength = (id, length) => send("DELETE", `${of(id)}/lengths/${length}`);
 /** @param {string} id @returns {Promise<Certificate>} */
 export const getCertificate = (id) => get(`${of(id)}/certificate`);
 /** @param {string} id @returns {Promise<Bundle[]>} */
 export const listBundles = (id) => get(`${of(id)}/bundles`);
 /** @param {string} id @param {number} version @returns {Promise<BundleCheck>} */
 export const checkBundle = (id, version) => get(`${of(id)}/bundles/${version}/check`);
+/** @param {string} id @param {number} version @returns {Promise<BundleInside>} */
+export const bundleInside = (id, version) => get(`${of(id)}/bundles/${version}/inside`);
 /** @param {string} id @param {number} version @param {number} since @returns {Promise<BundleChange[]>} */
 export const compareBundles = (id, version, since) => get(`${of(id)}/bundles/${version}/changes?since=${since}`);
+/** @param {string} id @returns {Promise<Variants>} */
+export const listVariants = (id) => get(`${of(id)}/variants`);
+/** @param {string} id @param {VariantsIn} wish @returns {Promise<Job>} */
+export const makeVariants = (id, wish) => send("POST", `${of(id)}/variants`, wish);
+/** @param {string} id @param {string} name @returns {Promise<Variants>} */
+export const deleteVariants = (id, name) => send("DELETE", `${of(id)}/variants/${name}`);
 /** @param {string} id @returns {Promise<ViewerSession>} */
 export const openViewer = (id) => takenOn(() => send("POST", `${of(id)}/viewer`));
 /** @param {string} id @param {Partial<ViewerShow>} what @returns {Promise<ViewerShown>} */
@@ -287,3 +369,7 @@ export const showInViewer = (id, what) => takenOn(() => send("POST", `${of(id)}/
 export const moveJoints = (id, values) => takenOn(() => send("POST", `${of(id)}/viewer/joints`, { values }));
 /** Put what is being moved in the 3D view somewhere; with null, learn where it was dragged. @param {string} id @param {number[][] | null} pose @returns {Promise<ViewerPlaced>} */
 export const placeInViewer = (id, pose) => takenOn(() => send("POST", `${of(id)}/viewer/place`, { pose }));
+/** @param {string} id @returns {Promise<import("./api-types").ViewerCamera>} */
+export const getViewerCamera = (id) => takenOn(() => get(`${of(id)}/viewer/camera`));
+/** What the last click in the 3D view was on. @param {string} id @returns {Promise<ViewerPicked>} */
+export const getPicked = (id) => takenOn(() => get(`${of(id)}/viewer/picked`));

@@ -18,6 +18,8 @@
 const at = (project) => `/api/projects/${encodeURIComponent(project)}`;
 /** @param {string} project @param {Ref} object */
 const on = (project, object) => `${at(project)}/objects/${object}`;
+/** The object that a change is of; NaN where the server has not named it. @param {Change} change */
+export const objectOf = ({ path }) => Number(/\/objects\/(\d+)/.exec(path)?.[1]);
 /** @param {object} json @returns {Record<string, unknown>} */
 const body = (json) => ({ ...json });
 
@@ -32,7 +34,7 @@ export const changeObject = (project, seen, wanted) => ({
   method: "PATCH",
   path: on(project, seen.id),
   json: { ...wanted, version: seen.version },
-  seen: { name: seen.name, category: seen.category },
+  seen: { name: seen.name, category: seen.category, assignee: seen.assignee },
 });
 /**
  * A drawn front, or what it is called. `version`, of an object that is stored, is what it will be once changes before it are.
@@ -111,11 +113,11 @@ export const undoRedo = (project, which, wanted) => ({
   path: `${at(project)}/${which}`,
   json: body(wanted),
 });
-/** @param {string} project @param {string[]} ids @returns {Change<SceneObject[]>} */
-export const confirmProposals = (project, ids) => ({
+/** @param {string} project @param {string[]} ids @param {string} [category] of all, else as proposed @returns {Change<SceneObject[]>} */
+export const confirmProposals = (project, ids, category) => ({
   method: "POST",
   path: `${at(project)}/proposals/confirm`,
-  json: { ids },
+  json: { ids, category },
 });
 /** @param {string} project @param {string[]} ids @returns {Change<Proposals>} */
 export const dismissProposals = (project, ids) => ({
@@ -136,6 +138,19 @@ export const changeOverride = (project, seen, patch) => ({
   path: `${on(project, seen.object)}/override`,
   json: { ...patch, version: seen.version },
   seen: body(seen.override),
+});
+/**
+ * What a run made from the scan and nobody clicked, by its name in the scene.
+ * @param {string} project
+ * @param {{ run_name: string, override?: import("./api-types").OverrideData }} seen
+ * @param {Partial<OverridePatch>} patch
+ * @returns {Change<Reviewed>}
+ */
+export const changeMade = (project, seen, patch) => ({
+  method: "PATCH",
+  path: `${at(project)}/scene/${encodeURIComponent(seen.run_name)}/override`,
+  json: { ...patch },
+  seen: body(seen.override ?? {}),
 });
 /** What people said of an object's candidates. @param {CandidateGroup} group */
 export const verdictOf = (group) =>

@@ -14,11 +14,13 @@ import { disagreements } from "./lib/merge.js";
 const LABELS = {
   name: "Name",
   category: "Category",
+  assignee: "Assigned to",
   front: "Drawn front",
   hinge: "Hinge",
   joint_lower: "Opens from",
   joint_upper: "Opens to",
   joints: "Each joint opens to",
+  states: "Frames marked closed or open",
   dimensions_m: "Width, depth, height",
   pose: "Place",
   candidate: "Candidate",
@@ -73,6 +75,7 @@ async function wantedStill(name, seen, wanted, theirs) {
  */
 function inWords(field, value) {
   if (value === "" && field === "verdict") return "none";
+  if (!value && field === "assignee") return "nobody";
   if (value === null || value === undefined || value === "") return "computed";
   if (field === "pose" && Array.isArray(value)) {
     return `at ${value
@@ -82,9 +85,16 @@ function inWords(field, value) {
   }
   if (field === "dimensions_m" && Array.isArray(value))
     return `${value.map((side) => (100 * side).toFixed(1)).join(" × ")} cm`;
+  if (field === "states") return marksInWords(/** @type {import("./lib/opening-marks.js").States} */ (value));
   if (field === "front") return sizeInWords(/** @type {PromptsFileFrontOutput} */ (value));
   if (typeof value === "number" && field.startsWith("joint_")) return `${value.toFixed(3)} (radians or metres)`;
   return String(value);
+}
+
+/** @param {import("./lib/opening-marks.js").States} states */
+function marksInWords(states) {
+  const frames = Object.values(states).flatMap((marks) => marks.map(({ frame }) => frame));
+  return frames.length ? `frames ${frames.join(", ")}` : "none";
 }
 
 /** @param {PromptsFileFrontOutput} front */

@@ -77,7 +77,7 @@ export function slider(text, input) {
 
 /**
  * New children in the place of the old ones. Who was at one of them by keyboard stays where they were: at the one with the same
- * `data-at`, "what:which", else at the next of the same "what".
+ * `data-at`, "what:which", else at the next of the same "what"; and what was selected of a text still is.
  * @param {HTMLElement} parent
  * @param {...(Node | string)} children
  */
@@ -86,10 +86,16 @@ export function renew(parent, ...children) {
   const old = at instanceof HTMLElement ? (at.dataset.at ?? "") : "";
   const alike = `[data-at^="${CSS.escape(old.split(":")[0] ?? "")}:"]`;
   const place = at ? [...parent.querySelectorAll(alike)].indexOf(at) : -1;
+  const selected =
+    at instanceof HTMLInputElement && at.selectionStart !== null ? [at.selectionStart, at.selectionEnd] : [];
   parent.replaceChildren(...children);
   if (!at) return;
   const now = /** @type {HTMLElement[]} */ ([...parent.querySelectorAll(alike)]);
-  (now.find((one) => one.dataset.at === old) ?? now[Math.min(place, now.length - 1)])?.focus({ preventScroll: true });
+  const next = now.find((one) => one.dataset.at === old) ?? now[Math.min(place, now.length - 1)];
+  next?.focus({ preventScroll: true });
+  const [from, to] = selected;
+  if (next instanceof HTMLInputElement && next.selectionStart !== null && from !== undefined)
+    next.setSelectionRange(from, to ?? from);
 }
 
 /** An element whose listeners, fetches and timers end when it leaves the page. */

@@ -13,6 +13,10 @@ if (new URLSearchParams(location.search).has("token")) {
   history.replaceState(null, "", "/login"); // the key leaves the address, and the next reload asks for no key
 }
 
+const provider = /** @type {HTMLAnchorElement} */ (document.querySelector("#provider"));
+const wanted = new URLSearchParams(location.search).get("next");
+if (wanted) provider.search = String(new URLSearchParams({ next: wanted }));
+
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
   const said = new FormData(form);
@@ -23,7 +27,7 @@ form.addEventListener("submit", async (event) => {
     (alertLine.textContent = `${error.message}: it goes on by itself in ${Math.ceil((error.retryMs ?? 0) / 1000)} s`);
   try {
     await signIn(String(said.get("name")), String(said.get("password")), waits);
-    location.assign(nextPage(new URLSearchParams(location.search).get("next"), location.origin));
+    location.assign(nextPage(wanted, location.origin));
   } catch (error) {
     alertLine.textContent = error instanceof ApiError ? `${error.message}: ${error.hint}` : String(error);
     button.disabled = false;

@@ -2,7 +2,8 @@
 
 /** @typedef {{ page: string, project: string | null, query: URLSearchParams }} Route */
 
-const PAGES = ["annotate", "elevation", "run", "review", "download"];
+const ALONE = ["inbox", "people", "templates", "webhooks"]; // of no project
+const PAGES = ["annotate", "elevation", "run", "review", "download", "agreement"];
 
 /**
  * @param {URL | Location} address
@@ -11,7 +12,7 @@ const PAGES = ["annotate", "elevation", "run", "review", "download"];
 export function routeOf(address) {
   const [first, project, page] = address.pathname.split("/").filter(Boolean);
   const query = new URLSearchParams(address.search);
-  if (first === "people") return { page: "people", project: null, query };
+  if (first && ALONE.includes(first)) return { page: first, project: null, query };
   if (first !== "p" || !project) return { page: "projects", project: null, query };
   return { page: page && PAGES.includes(page) ? page : "overview", project, query };
 }
@@ -26,8 +27,8 @@ export function startRouter(show) {
     if (!(link instanceof HTMLAnchorElement) || event.defaultPrevented || event.button !== 0) return;
     if (event.ctrlKey || event.metaKey || event.shiftKey || link.target || link.hasAttribute("download")) return;
     const url = new URL(link.href);
-    if (url.origin !== location.origin || !(["/", "/people"].includes(url.pathname) || url.pathname.startsWith("/p/")))
-      return;
+    const ours = ["", ...ALONE].includes(url.pathname.slice(1)) || url.pathname.startsWith("/p/");
+    if (url.origin !== location.origin || !ours) return;
     event.preventDefault();
     go(url.pathname + url.search);
   });

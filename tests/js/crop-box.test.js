@@ -28,8 +28,17 @@ const BOX = {
 
 test("a box before the camera has twelve edges and six sides, called as one sees them", () => {
   assert.equal(edges(BOX, CAMERA).length, 12);
-  const named = Object.fromEntries(sides(BOX, CAMERA).map((side) => [side.name, side]));
-  assert.deepEqual(Object.keys(named).toSorted(), ["Back", "Bottom", "Front", "Left side", "Right side", "Top"]);
+  const named = Object.fromEntries(
+    sides(BOX, CAMERA).map((side) => [side.name, side]),
+  );
+  assert.deepEqual(Object.keys(named).toSorted(), [
+    "Back",
+    "Bottom",
+    "Front",
+    "Left side",
+    "Right side",
+    "Top",
+  ]);
   assert.ok(named["Left side"].at.x < named["Right side"].at.x);
   assert.ok(named.Top.at.y < named.Bottom.at.y);
   assert.ok(named.Front.distance < named.Back.distance);
@@ -44,7 +53,8 @@ test("the same box stored with other axes is called the same", () => {
       [-1, 0, 0],
     ],
   };
-  const at = (box) => Object.fromEntries(sides(box, CAMERA).map(({ name, at }) => [name, at]));
+  const at = (box) =>
+    Object.fromEntries(sides(box, CAMERA).map(({ name, at }) => [name, at]));
   assert.deepEqual(at(turned), at(BOX));
 });
 
@@ -58,5 +68,8 @@ test("a side moves along its own way, the opposite one stays, and some thickness
 });
 
 test("what reaches behind the camera is not drawn", () => {
-  assert.equal(edges({ ...BOX, corner_m: [-0.5, -0.5, -0.5] }, CAMERA).length, 4);
+  assert.equal(
+    edges({ ...BOX, corner_m: [-0.5, -0.5, -0.5] }, CAMERA).length,
+    4,
+  );
 });

@@ -7,6 +7,7 @@ import {
   decoded,
   handleAfter,
   handleAt,
+  handleLike,
   likelyCategory,
   nearestEdge,
   overlap,
@@ -41,10 +42,18 @@ test("a rectangle goes to the recording's world and comes back", () => {
 });
 
 test("a front off the plane, beside it or on its back is on another one", () => {
-  const off = (/** @type {number} */ by) => cornersOf(PLANE, RECT).map(([x = 0, y = 0, z = 0]) => [x - s * by, y, z + c * by]);
+  const off = (/** @type {number} */ by) =>
+    cornersOf(PLANE, RECT).map(([x = 0, y = 0, z = 0]) => [
+      x - s * by,
+      y,
+      z + c * by,
+    ]);
   assert.ok(rectOf(PLANE, off(0.02)));
   assert.equal(rectOf(PLANE, off(0.05)), null);
-  assert.equal(rectOf(PLANE, cornersOf(PLANE, { ...RECT, left: 3, right: 3.5 })), null);
+  assert.equal(
+    rectOf(PLANE, cornersOf(PLANE, { ...RECT, left: 3, right: 3.5 })),
+    null,
+  );
   const [a, b, d, e] = cornersOf(PLANE, RECT);
   assert.equal(rectOf(PLANE, /** @type {number[][]} */ ([b, a, e, d])), null);
 });
@@ -56,7 +65,12 @@ function lines() {
     clarity[block * 240 + 60] = 255;
     if (block > 4) clarity[block * 240 + 120] = 255;
   }
-  return decoded({ block: 10, blocks: 9, positions: 240, clarity: btoa(String.fromCharCode(...clarity)) });
+  return decoded({
+    block: 10,
+    blocks: 9,
+    positions: 240,
+    clarity: btoa(String.fromCharCode(...clarity)),
+  });
 }
 
 test("an edge snaps to the line that its own height shows, within reach", () => {
@@ -97,16 +111,33 @@ test("a handle stays on its front, upright beside a door's side and lying on a d
   const door = handleAt(RECT, { x: 0.79, y: 0.2 });
   assert.ok(door.top_m - door.bottom_m > door.right_m - door.left_m);
   assert.ok(door.right_m <= 0.3 + 1e-9);
-  const drawer = handleAt({ left: 0, right: 0.6, top: 0, bottom: 0.15 }, { x: 0.3, y: 0.05 });
+  const drawer = handleAt(
+    { left: 0, right: 0.6, top: 0, bottom: 0.15 },
+    { x: 0.3, y: 0.05 },
+  );
   assert.ok(drawer.right_m - drawer.left_m > drawer.top_m - drawer.bottom_m);
 });
 
 test("a handle stays where it is when an edge is moved, and goes with the front", () => {
   const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
   const wider = handleAfter(box, RECT, { ...RECT, right: 1, bottom: 0.92 });
-  assert.deepEqual(wider, { left_m: 0.1, right_m: 0.12, bottom_m: 0.15, top_m: 0.31 });
+  assert.deepEqual(wider, {
+    left_m: 0.1,
+    right_m: 0.12,
+    bottom_m: 0.15,
+    top_m: 0.31,
+  });
   assert.equal(handleAfter(box, RECT, { ...RECT, left: 0.3, right: 0.9 }), box);
   assert.equal(handleAfter("none", RECT, { ...RECT, right: 1 }), "none");
+});
+
+test("a handle is copied as far from the edge that it is near, else as far from the middle, and never over the front", () => {
+  const box = { left_m: 0.2, right_m: 0.22, bottom_m: -0.05, top_m: 0.05 };
+  const from = { left: 0, right: 0.5, top: 0, bottom: 0.7 };
+  const to = (/** @type {number} */ wide, /** @type {number} */ high) => ({ left: 2, right: 2 + wide, top: 1, bottom: 1 + high });
+  assert.deepEqual(handleLike(box, from, to(0.5, 0.7)), box);
+  assert.deepEqual(handleLike(box, from, to(0.7, 0.3)), { left_m: 0.3, right_m: 0.32, bottom_m: -0.05, top_m: 0.05 });
+  assert.deepEqual(handleLike(box, from, to(0.5, 0.06)), { ...box, bottom_m: -0.03, top_m: 0.03 });
 });
 
 test("a handle that its front no longer reaches is looked for anew", () => {
@@ -122,8 +153,15 @@ test("fronts that nobody could tell apart are the same, whatever order they are 
   const front = { corners_m: cornersOf(PLANE, RECT), handle, hinge: null };
   const back = cornersOf(PLANE, rectOf(PLANE, front.corners_m) ?? RECT);
   assert.ok(sameFront(front, { corners_m: back, handle: said }));
-  assert.ok(!sameFront(front, { ...front, corners_m: cornersOf(PLANE, { ...RECT, right: 0.801 }) }));
-  assert.ok(!sameFront(front, { ...front, handle: { ...handle, top_m: 0.261 } }));
+  assert.ok(
+    !sameFront(front, {
+      ...front,
+      corners_m: cornersOf(PLANE, { ...RECT, right: 0.801 }),
+    }),
+  );
+  assert.ok(
+    !sameFront(front, { ...front, handle: { ...handle, top_m: 0.261 } }),
+  );
   assert.ok(!sameFront(front, { ...front, handle: "none" }));
   assert.ok(!sameFront(front, { ...front, hinge: "left" }));
 });
@@ -136,7 +174,10 @@ test("what a front is follows from its shape and height", () => {
 
 test("an edge let go among lines that are all clear stays where the hand was, and a far one draws it off no near one", () => {
   const cell = 0.0025;
-  const at = (/** @type {(i: number) => number} */ clear) => ({ positions: Float32Array.from({ length: 400 }, (_, i) => clear(i)), cell });
+  const at = (/** @type {(i: number) => number} */ clear) => ({
+    positions: Float32Array.from({ length: 400 }, (_, i) => clear(i)),
+    cell,
+  });
   const wide = at((i) => (i > 180 && i < 220 ? 1 : 0));
   assert.ok(Math.abs(snapped(0.501, 0.012, [], wide) - 0.501) < 0.002); // half a cell, and the cell's middle
   const two = at((i) => (i === 200 ? 0.8 : i === 204 ? 1 : 0));

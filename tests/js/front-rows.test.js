@@ -1,11 +1,18 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { again, divided, inOrder, renamed } from "../../static/js/lib/front-rows.js";
+import {
+  again,
+  divided,
+  inOrder,
+  renamed,
+} from "../../static/js/lib/front-rows.js";
 
 const RECT = { left: 0.2, top: 0.1, right: 1.8, bottom: 0.8 };
 const millimetres = (/** @type {any[] | null} */ rects) =>
-  rects?.map(({ left, right, top, bottom }) => [left, right, top, bottom].map((edge) => Math.round(1000 * edge)));
+  rects?.map(({ left, right, top, bottom }) =>
+    [left, right, top, bottom].map((edge) => Math.round(1000 * edge)),
+  );
 
 test("a front is divided into equal parts, or as its sizes were typed, with the rest as one more", () => {
   assert.deepEqual(millimetres(divided(RECT, "upright", "2")), [
@@ -25,24 +32,49 @@ test("a front is divided into equal parts, or as its sizes were typed, with the 
 });
 
 test("what is no division, or has no room, divides nothing", () => {
-  for (const text of ["", "1", "0", "a", "900 900", "600 -100", "3 /", "2 / 3 / 4", "600 2000"])
+  for (const text of [
+    "",
+    "1",
+    "0",
+    "a",
+    "900 900",
+    "600 -100",
+    "3 /",
+    "2 / 3 / 4",
+    "600 2000",
+  ])
     assert.equal(divided(RECT, "upright", text), null, text);
 });
 
 test("a front again stands beside it or below it, as large, a seam away", () => {
-  assert.deepEqual(millimetres([again(RECT, "upright"), again(RECT, "level")]), [
-    [1803, 3403, 100, 800],
-    [200, 1800, 803, 1503],
-  ]);
+  assert.deepEqual(
+    millimetres([again(RECT, "upright"), again(RECT, "level")]),
+    [
+      [1803, 3403, 100, 800],
+      [200, 1800, 803, 1503],
+    ],
+  );
 });
 
 test("columns go from left to right, each from the top down, though drawn by hand", () => {
-  const at = (/** @type {string} */ name, /** @type {number} */ left, /** @type {number} */ top) => ({
+  const at = (
+    /** @type {string} */ name,
+    /** @type {number} */ left,
+    /** @type {number} */ top,
+  ) => ({
     name,
     rect: { left, top, right: left + 0.4, bottom: top + 0.2 },
   });
-  const fronts = [at("d", 0.6, 0.4), at("b", 0.098, 0.4), at("c", 0.602, 0.1), at("a", 0.1, 0.1)];
-  assert.deepEqual(inOrder(fronts).map(({ name }) => name), ["a", "b", "c", "d"]);
+  const fronts = [
+    at("d", 0.6, 0.4),
+    at("b", 0.098, 0.4),
+    at("c", 0.602, 0.1),
+    at("a", 0.1, 0.1),
+  ];
+  assert.deepEqual(
+    inOrder(fronts).map(({ name }) => name),
+    ["a", "b", "c", "d"],
+  );
 });
 
 test("fronts are numbered past the names of others, and no name is there twice on the way", () => {
@@ -55,5 +87,7 @@ test("fronts are numbered past the names of others, and no name is there twice o
     now.set(key, name);
   }
   assert.deepEqual([...now.values()], ["drawer_1", "drawer_2", "drawer_4"]);
-  assert.deepEqual(renamed(fronts.slice(0, 1), "pantry", []), [{ key: "0", name: "pantry" }]);
+  assert.deepEqual(renamed(fronts.slice(0, 1), "pantry", []), [
+    { key: "0", name: "pantry" },
+  ]);
 });

@@ -4,8 +4,11 @@ import { test } from "node:test";
 import { motionOf } from "../../static/js/lib/joints.js";
 
 test("a joint is named by what a person before it sees", () => {
-  const joint = (/** @type {any} */ type, /** @type {number[]} */ axis, /** @type {number[]} */ origin) =>
-    motionOf(/** @type {any} */ ({ type, axis, origin }));
+  const joint = (
+    /** @type {any} */ type,
+    /** @type {number[]} */ axis,
+    /** @type {number[]} */ origin,
+  ) => motionOf(/** @type {any} */ ({ type, axis, origin }));
   assert.equal(joint("prismatic", [0, -1, 0], [0, 0, 0]), "Slides out");
   assert.equal(joint("prismatic", [1, 0, 0], [0, 0, 0]), "Slides right");
   assert.equal(joint("prismatic", [-0.99, 0.05, 0], [0, 0, 0]), "Slides left");

@@ -11,7 +11,13 @@ const DOOR = {
   largest: 1.5,
   limit_source: "at_least",
   source: "measured",
-  states: [state(0, 0.01), state(10, 0.7, 0.05), state(20, 1.4), state(30, null, null), state(50, 0.02)],
+  states: [
+    state(0, 0.01),
+    state(10, 0.7, 0.05),
+    state(20, 1.4),
+    state(30, null, null),
+    state(50, 0.02),
+  ],
 };
 
 test("a state is said in words, with twice its standard deviation", () => {
@@ -20,12 +26,20 @@ test("a state is said in words, with twice its standard deviation", () => {
   assert.equal(stateIn(DOOR, 20), "open, 80° ± 1°");
   assert.equal(stateIn(DOOR, 30), "unknown");
   assert.equal(stateIn(DOOR, 40), "");
-  const drawer = { ...DOOR, kind: "prismatic", largest: 0.4, states: [state(0, 0.2, 0.003)] };
+  const drawer = {
+    ...DOOR,
+    kind: "prismatic",
+    largest: 0.4,
+    states: [state(0, 0.2, 0.003)],
+  };
   assert.equal(stateIn(drawer, 0), "opening, 20 cm ± 6 mm");
 });
 
 test("frames that do not show it part its spans", () => {
-  const spans = spansOf({ ...DOOR, states: [state(0, 0), state(10, 0), state(30, 0)] }, [0, 10, 20, 30]);
+  const spans = spansOf(
+    { ...DOOR, states: [state(0, 0), state(10, 0), state(30, 0)] },
+    [0, 10, 20, 30],
+  );
   assert.deepEqual(spans, [
     { from: 0, to: 2, phase: "closed" },
     { from: 3, to: 4, phase: "closed" },

@@ -2,14 +2,29 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { decodeBox } from "../../static/js/lib/masks.js";
-import { encoded, isEmpty, runsOf, wholeMask } from "../../static/js/lib/painting.js";
+import {
+  encoded,
+  isEmpty,
+  runsOf,
+  wholeMask,
+} from "../../static/js/lib/painting.js";
 
-const MASK = { width: 4, height: 2, pixels: Uint8Array.from([0, 1, 1, 0, 0, 0, 0, 1]) };
+const MASK = {
+  width: 4,
+  height: 2,
+  pixels: Uint8Array.from([0, 1, 1, 0, 0, 0, 0, 1]),
+};
 
 test("a mask's runs begin with what is off it and cover the frame", () => {
   assert.deepEqual(runsOf(MASK), { width: 4, height: 2, runs: [1, 2, 4, 1] });
-  assert.deepEqual(runsOf({ width: 2, height: 1, pixels: Uint8Array.from([1, 1]) }).runs, [0, 2]);
-  assert.deepEqual(runsOf({ width: 2, height: 1, pixels: new Uint8Array(2) }).runs, [2]);
+  assert.deepEqual(
+    runsOf({ width: 2, height: 1, pixels: Uint8Array.from([1, 1]) }).runs,
+    [0, 2],
+  );
+  assert.deepEqual(
+    runsOf({ width: 2, height: 1, pixels: new Uint8Array(2) }).runs,
+    [2],
+  );
 });
 
 test("a painted mask goes out as those of the server come, and a box is put in its frame", async () => {
@@ -17,7 +32,10 @@ test("a painted mask goes out as those of the server come, and a box is put in i
   assert.deepEqual(wholeMask(bits, await decodeBox(bits)), MASK);
   assert.equal(isEmpty(MASK), false);
   const box = { ...bits, left: 1, top: 1, box_width: 2, box_height: 1 };
-  assert.deepEqual([...wholeMask(box, Uint8Array.from([1, 1])).pixels], [0, 0, 0, 0, 0, 1, 1, 0]);
+  assert.deepEqual(
+    [...wholeMask(box, Uint8Array.from([1, 1])).pixels],
+    [0, 0, 0, 0, 0, 1, 1, 0],
+  );
 });
 
 test("a mask with nothing on it has no box, as those of the server", async () => {

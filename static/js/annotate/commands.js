@@ -23,6 +23,7 @@ export const ONE_A_PRESS = [
   "confirm-proposal",
   "dismiss-proposal",
   "confirm-all",
+  "alike",
   "segment",
   "comment",
   "depth",
@@ -74,7 +75,13 @@ function moves({ player, objects, masks }) {
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
-function changes({ objects, edits, player, pane: { proposals }, presses, painter, cropper }) {
+function changes({ objects, edits, player, pane: { proposals, checklist }, presses, painter, cropper, canvas }) {
+  const findAlike = () => {
+    const { chosen } = objects;
+    if (!chosen && !proposals.likeOne) return say("Choose an object first.");
+    canvas.focus(); // Enter is about what is found from now on, not about a button
+    proposals.findLike(chosen);
+  };
   const deleteLast = () => {
     const last = objects.chosen?.points.findLast((point) => point.frame === player.frame?.index);
     if (last) edits.removePoint(last.id);
@@ -99,6 +106,8 @@ function changes({ objects, edits, player, pane: { proposals }, presses, painter
     "dismiss-proposal": () => proposals.dismiss(),
     "next-proposal": () => proposals.move(1),
     "previous-proposal": () => proposals.move(-1),
+    alike: findAlike,
+    "next-listed": () => checklist.step(),
     "confirm-all": () => proposals.confirmAll(),
     comment: () => (presses.pinning = !presses.pinning),
   };
@@ -121,7 +130,8 @@ function looks({ objects, masks, player, canvas, tools, evidence, mosaic }) {
   return {
     "pick-number": (key) => objects.choose(objects.sorted[Number(key) - 1]?.id ?? objects.current),
     finish: () => objects.choose(null),
-    hide: () => objects.current !== null && objects.toggle(objects.current),
+    hide: () => objects.current !== null && objects.hide([objects.current]),
+    lock: () => objects.current !== null && objects.lock([objects.current]),
     solo: () => objects.solo(),
     raw: () => canvas.showRaw(true),
     depth: () => player.switchDepth(),
@@ -139,14 +149,19 @@ function looks({ objects, masks, player, canvas, tools, evidence, mosaic }) {
  * @param {Pick<Doers, "player" | "objects">} doers
  * @param {string[]} categories
  * @param {(category: string) => void} categorise
+ * @param {{ names: string[], assign: (name: string | null) => void }} people whom the chosen or selected objects may be assigned to
  * @returns {import("../lib/commands.js").Command[]}
  */
-export function offers(typed, { player, objects }, categories, categorise) {
+export function offers(typed, { player, objects }, categories, categorise, { names, assign }) {
   const position = player.frames.positionOf(Number(typed || Number.NaN));
   const frame = position < 0 ? [] : [{ text: `${typed.trim()}: go to that frame`, run: () => player.seek(position) }];
   return [
     ...frame,
     ...objects.sorted.map(({ id, name }) => ({ text: `Object ${name}`, run: () => objects.choose(id) })),
+    ...(objects.changed.length && names.length ? [...names, null] : []).map((name) => ({
+      text: `Assign to ${name ?? "nobody"}`,
+      run: () => assign(name),
+    })),
     ...categories.map((name) => ({ text: `Category ${name}`, run: () => categorise(name) })),
   ];
 }

@@ -1,10 +1,14 @@
 /**
  * What a person does to the objects, sent through the outbox. Says "object" {object} for every answer, "made" {object} when a
- * click made a new one, "clicks" when those on their way changed, "saved" {text, tone} about how it stands.
+ * click made a new one, "making" {name, coming} when that began or ended, "clicks" when those on their way changed, "saved" {text, tone} about how it stands.
  */
 
+import { getFoundFronts } from "../api.js";
 import * as changes from "../changes.js";
-import { say } from "../elements/toasts.js";
+import { say, sayError } from "../elements/toasts.js";
+import { arranged } from "../lib/arranged.js";
+import { counted } from "../lib/format.js";
+import { renamed } from "../lib/front-rows.js";
 import { newKey, outbox } from "../outbox.js";
 import { saving } from "../saving.js";
 
@@ -43,13 +47,14 @@ export class Edits extends EventTarget {
   /**
    * Clicks on the current object, or on a new one.
    * @param {PointIn[]} points
-   * @param {{ category: string, infer: boolean }} how
+   * @param {{ category: string, name?: string, infer: boolean }} how a new one is called its category and a number without a name
    */
-  place(points, { category, infer }) {
+  place(points, { category, name, infer }) {
     const key = newKey();
     const target = this.#objects.current ?? this.#coming;
     this.#onTheirWay(key, points);
-    const sent = target === null ? this.#make(key, points, category, infer) : this.#add(key, target, points, infer);
+    const sent =
+      target === null ? this.#make(key, { category, name, points }, infer) : this.#add(key, target, points, infer);
     sent
       .then(
         (object) => this.#say("object", { object }),
@@ -70,18 +75,19 @@ export class Edits extends EventTarget {
 
   /**
    * @param {string} key
-   * @param {PointIn[]} points
-   * @param {string} category
+   * @param {{ category: string, name?: string, points: PointIn[] }} wanted
    * @param {boolean} infer
    */
-  async #make(key, points, category, infer) {
+  async #make(key, wanted, infer) {
     this.#coming = `{${key}}`;
+    this.#say("making", { name: wanted.name, coming: true });
     const isMine = () => this.#coming === `{${key}}`;
     try {
-      const object = await this.save(changes.addObject(this.project, { category, points }, infer), key);
+      const object = await this.save(changes.addObject(this.project, wanted, infer), key);
       if (isMine()) this.#say("made", { object });
       return object;
     } finally {
+      this.#say("making", { name: wanted.name, coming: false });
       if (isMine()) this.#coming = null; // also where it was refused: the next click tries anew
     }
   }
@@ -118,11 +124,37 @@ export class Edits extends EventTarget {
 
   /**
    * @param {number} id
-   * @param {{ name?: string, category?: string, crop?: import("../api-types").PromptsFileCrop | null }} wanted
+   * @param {{ name?: string, category?: string, assignee?: string | null, crop?: import("../api-types").PromptsFileCrop | null }} wanted
    */
   patch(id, wanted) {
     const seen = this.#objects.get(id);
-    if (seen) this.#tell(changes.changeObject(this.project, seen, wanted));
+    return seen ? this.#tell(changes.changeObject(this.project, seen, wanted)) : Promise.resolve(false);
+  }
+
+  /**
+   * @param {SceneObject[]} objects
+   * @param {string | null} name
+   */
+  async assign(objects, name) {
+    const answers = await Promise.all(objects.map(({ id }) => this.patch(id, { assignee: name })));
+    const count = answers.filter(Boolean).length;
+    if (!count) return;
+    const what = count === 1 ? objects[answers.indexOf(true)]?.name : counted(count, "object");
+    say(name ? `${what}: assigned to ${name}, in their inbox` : `${what}: assigned to nobody`, { kind: "good" });
+  }
+
+  /**
+   * One name for several, numbered from left to right and from the top down as they stand in the room.
+   * @param {SceneObject[]} objects
+   * @param {string} name
+   */
+  async renameAll(objects, name) {
+    const fronts = await getFoundFronts(this.project).catch((error) => (sayError(error), null));
+    if (!fronts) return;
+    const mine = arranged(objects, fronts).map((object) => ({ key: String(object.id), name: object.name }));
+    const taken = this.#objects.sorted.filter((one) => !objects.includes(one)).map((one) => one.name);
+    for (const step of renamed(mine, name, taken))
+      if (!(await this.patch(Number(step.key), { name: step.name }))) return;
   }
 
   /**
@@ -140,10 +172,12 @@ export class Edits extends EventTarget {
       say(`${gone.name} is merged into ${kept.name}`, { hint: "undo twice brings it back" });
   }
 
-  /** @param {number} id */
-  async remove(id) {
-    const name = this.#objects.get(id)?.name ?? "object";
-    if (await this.#tell(changes.deleteObject(this.project, id))) say(`Deleted ${name}; undo brings it back`);
+  /** @param {SceneObject[]} objects */
+  async remove(objects) {
+    const answers = await Promise.all(objects.map(({ id }) => this.#tell(changes.deleteObject(this.project, id))));
+    const gone = objects.filter((_, k) => answers[k]);
+    if (gone.length === 1) say(`Deleted ${gone[0]?.name}; undo brings it back`);
+    if (gone.length > 1) say(`Deleted ${gone.length} objects; each undo brings one back`);
   }
 
   /** @param {number | string | null} object */
@@ -178,13 +212,18 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Send a change and say how it stands; what the server refuses is said here.
+   * Send a change and say how it stands; what the server refuses, and what a lock forbids, is said here.
    * @template T
    * @param {Change<T>} change
    * @param {string} [key]
    * @returns {Promise<T>}
    */
   save(change, key) {
+    const locked = this.#objects.get(changes.objectOf(change));
+    if (locked && this.#objects.isLocked(locked.id)) {
+      say(`${locked.name} is locked: unlock it in the list to change it`);
+      return Promise.reject(new Error("locked"));
+    }
     return saving(change, key, (how) => this.#say("saved", how));
   }
 

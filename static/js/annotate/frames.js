@@ -68,6 +68,13 @@ export class Frames {
     return image;
   }
 
+  /** All of its pixels, for who looks closely. @param {FrameInfo} frame */
+  whole(frame) {
+    const image = new Image();
+    image.src = `/media/${this.#project}/frames/${frame.index}.jpg?v=${this.#version}`;
+    return image;
+  }
+
   /**
    * What can be shown at once in the place of a frame that is not here yet: its small picture, else a near one's.
    * @param {number} position

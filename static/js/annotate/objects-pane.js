@@ -1,29 +1,28 @@
-/** The left of the page: undo and redo, the next object's category, the objects, what is proposed, the way on. Says "undo", "redo". */
+/** The left of the page: undo and redo, what the next object is, those still to click, the objects, what is proposed, the way on. Says "undo", "redo". */
+
+import { meanOf } from "../lib/listing.js";
 
 import { h, icon } from "../dom.js";
+import { Checklist } from "./checklist.js";
 import { ObjectList } from "../elements/object-list.js";
 import { ProposalList } from "../elements/proposal-list.js";
 
 /** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
 
 export class ObjectsPane extends EventTarget {
+  /** Who looks, where people have accounts. @type {string | undefined} */
+  me;
   list = new ObjectList();
   proposals = new ProposalList();
-  #category = h("input", {
-    type: "text",
-    value: "drawer",
-    list: "categories",
-    "aria-label": "Category of the next object",
-  });
+  checklist = new Checklist();
   #run = h("a", { class: "button primary" }, "Run…");
   element = h(
     "aside",
     { class: "objects-pane", "aria-label": "Objects" },
     h("div", { class: "heading" }, h("h1", {}, "Objects"), this.#button("undo", "Undo"), this.#button("redo", "Redo")),
-    h("label", { class: "next" }, h("span", { class: "muted" }, "Category of the next"), this.#category),
-    this.list,
-    this.proposals,
-    this.#run,
+    h("div", { class: "next" }, this.list.new, ...this.checklist.fields),
+    this.list.head,
+    h("div", { class: "scrolled" }, this.checklist.element, this.list, this.proposals, this.#run),
   );
 
   /** @param {string} id */
@@ -32,26 +31,28 @@ export class ObjectsPane extends EventTarget {
     this.#run.href = `/p/${id}/run`;
   }
 
-  /** Of the next object. */
-  get category() {
-    return this.#category.value.trim() || "object";
-  }
-
-  set category(name) {
-    this.#category.value = name;
-  }
-
   /**
    * @param {SceneObjects} objects
+   * @param {import("./masks.js").Masks} masks
    * @param {(object: number) => import("../lib/contradictions.js").Said[]} contradicted what its masks contradict
    */
-  draw(objects, contradicted) {
-    this.list.setObjects(objects.sorted, {
-      current: objects.current,
-      isHidden: (object) => objects.isHidden(object.id),
-      colourOf: (object) => objects.colour(object),
-      contradicted: (object) => contradicted(object.id),
-    });
+  draw(objects, masks, contradicted) {
+    const { current } = objects;
+    this.checklist.objects = objects.sorted;
+    this.list.setObjects(
+      objects.sorted.map((object, k) => ({
+        object,
+        number: k + 1,
+        colour: objects.colour(object),
+        sure: meanOf(masks.lane(object.id)),
+        said: contradicted(object.id),
+        current: object.id === current,
+        selected: objects.isSelected(object.id),
+        hidden: objects.isHidden(object.id),
+        locked: objects.isLocked(object.id),
+        mine: object.assignee === this.me,
+      })),
+    );
   }
 
   /**

@@ -17,6 +17,8 @@ export class Player extends EventTarget {
   position = 0;
   #canvas;
   #strip;
+  /** @type {FrameInfo | null} whose every pixel was asked for */
+  #sharpened = null;
   #asDepth = false;
   #playing = 0;
   #settling = 0;
@@ -29,6 +31,7 @@ export class Player extends EventTarget {
     super();
     this.#canvas = canvas;
     this.#strip = strip;
+    canvas.addEventListener("view", () => this.#sharpen());
   }
 
   /** Show the picture that the HTML asked for, until the table of frames is here. @param {string} project */
@@ -125,6 +128,7 @@ export class Player extends EventTarget {
 
   /** The frame's picture, or what is at hand until it is here. */
   #showPicture() {
+    this.#sharpened = null;
     const frame = this.frame;
     if (!frame) return;
     const image = this.#asDepth ? new Image() : this.frames.large(frame);
@@ -134,6 +138,17 @@ export class Player extends EventTarget {
     image.addEventListener("load", show, { once: true });
     const meanwhile = this.#asDepth ? null : this.frames.atOnce(this.position);
     if (meanwhile) this.#canvas.setFrame(meanwhile, frame, `Frame ${frame.index}`);
+  }
+
+  /** A frame that is zoomed into is shown with all its pixels. */
+  #sharpen() {
+    const frame = this.frame;
+    if (!frame || this.#asDepth || this.#sharpened === frame || !this.#canvas.wantsMore) return;
+    this.#sharpened = frame;
+    const image = this.frames.whole(frame);
+    const show = () =>
+      this.frame === frame && !this.#asDepth && this.#canvas.setFrame(image, frame, `Frame ${frame.index}`);
+    image.addEventListener("load", show, { once: true });
   }
 
   #settle() {

@@ -13,7 +13,7 @@ export class Presses extends EventTarget {
   #objects;
   #edits;
   #player;
-  #category;
+  #next;
   #under;
   /** Whether the next click makes a new object wherever it falls. */
   #forced = false;
@@ -24,15 +24,15 @@ export class Presses extends EventTarget {
    * @param {import("./scene-objects.js").SceneObjects} objects
    * @param {import("./edits.js").Edits} edits
    * @param {import("./player.js").Player} player
-   * @param {() => string} category of the next object
+   * @param {() => { category: string, name?: string }} next what the next object is
    * @param {(spot: Spot) => number[]} under the objects whose masks are there, the uppermost first
    */
-  constructor(objects, edits, player, category, under) {
+  constructor(objects, edits, player, next, under) {
     super();
     this.#objects = objects;
     this.#edits = edits;
     this.#player = player;
-    this.#category = category;
+    this.#next = next;
     this.#under = under;
   }
 
@@ -102,7 +102,7 @@ export class Presses extends EventTarget {
   #place(points, hold) {
     this.#batching = hold;
     this.#forced = false;
-    this.#edits.place(points, { category: this.#category(), infer: !hold });
+    this.#edits.place(points, { ...this.#next(), infer: !hold });
   }
 
   /** @param {Spot & { frame: number }} pin */

@@ -1,9 +1,12 @@
 /**
- * The objects of the project as the page knows them: which is chosen, which are hidden, in which colour each is drawn.
+ * The objects of the project as the page knows them: which is chosen, which are selected besides, hidden or locked, in which colour
+ * each is drawn. A lock is this browser's own, and kept: it guards what is finished against one's own slips.
  * Says "change" when any of it is to be drawn anew, "choose" when another one or none is chosen, "gone" {id}.
  */
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
+
+const LOCKED = "r2c2r-locked";
 
 export class SceneObjects extends EventTarget {
   /** @type {Map<number, SceneObject>} */
@@ -12,6 +15,11 @@ export class SceneObjects extends EventTarget {
   #current = null;
   /** @type {Set<number>} */
   #hidden = new Set();
+  /** @type {Set<number>} */
+  #locked = new Set();
+  /** @type {Set<number>} several, to be changed together */
+  #selected = new Set();
+  #project = "";
   /** @type {string[]} */
   palette = ["#e69f00"];
 
@@ -20,6 +28,12 @@ export class SceneObjects extends EventTarget {
     this.#all = new Map(objects.map((object) => [object.id, object]));
     if (this.#current !== null && !this.#all.has(this.#current)) this.choose(null);
     else this.#say("change");
+  }
+
+  /** @param {string} id */
+  set project(id) {
+    this.#project = id;
+    this.#locked = new Set(JSON.parse(localStorage.getItem(`${LOCKED}-${id}`) ?? "[]"));
   }
 
   /** The number of the chosen one. */
@@ -60,6 +74,39 @@ export class SceneObjects extends EventTarget {
     return this.#hidden.has(id);
   }
 
+  /** @param {number} id */
+  isLocked(id) {
+    return this.#locked.has(id);
+  }
+
+  /** Lock them, or unlock them where all are. @param {number[]} ids */
+  lock(ids) {
+    this.#switch(this.#locked, ids);
+    localStorage.setItem(`${LOCKED}-${this.#project}`, JSON.stringify([...this.#locked]));
+  }
+
+  /** Several, in the order they were made. */
+  get selected() {
+    return this.sorted.filter(({ id }) => this.#selected.has(id));
+  }
+
+  /** Those that a command is about: the selected ones, else the chosen one. */
+  get changed() {
+    const { selected, chosen } = this;
+    return selected.length ? selected : chosen ? [chosen] : [];
+  }
+
+  /** @param {number} id */
+  isSelected(id) {
+    return this.#selected.has(id);
+  }
+
+  /** These alone. @param {number[]} ids */
+  select(ids) {
+    this.#selected = new Set(ids);
+    this.#say("change");
+  }
+
   /** An answer to a change: what the live connection said of the same change may be newer. @param {SceneObject} object */
   answered(object) {
     if ((this.get(object.id)?.version ?? -1) < object.version) this.store(object);
@@ -80,9 +127,17 @@ export class SceneObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** Hide it, or show it again. @param {number} id */
-  toggle(id) {
-    if (!this.#hidden.delete(id)) this.#hidden.add(id);
+  /** Hide them, or show them again where all are hidden. @param {number[]} ids */
+  hide(ids) {
+    this.#switch(this.#hidden, ids);
+  }
+
+  /** @param {Set<number>} set @param {number[]} ids */
+  #switch(set, ids) {
+    const all = ids.every((id) => set.has(id));
+    for (const id of ids)
+      if (all) set.delete(id);
+      else set.add(id);
     this.#say("change");
   }
 

@@ -188,7 +188,10 @@ export class AppShell extends LiveElement {
     }));
     const everywhere = [
       { text: "Go to Projects", run: () => go("/") },
+      { text: "Go to Inbox", run: () => go("/inbox") },
       { text: "Go to People", run: () => go("/people") },
+      { text: "Go to Templates", run: () => go("/templates") },
+      { text: "Go to Webhooks", run: () => go("/webhooks") },
       { text: "Dark or light", run: switchTheme },
       { text: "Keyboard and mouse help", keys: "?", run: () => this.#help.toggle() },
     ];

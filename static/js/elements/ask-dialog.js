@@ -1,17 +1,18 @@
 /** One question with room for an answer. */
 
 import { h } from "../dom.js";
+import { mentionBox } from "./mention-box.js";
 
 /**
  * Ask for a text; null when the person thinks better of it.
  * @param {string} title
  * @param {string} label
- * @param {{ button?: string, notes?: string[], required?: boolean }} [options]
+ * @param {{ button?: string, notes?: string[], required?: boolean, value?: string, names?: string[] }} [options] names: of people that @ offers
  * @returns {Promise<string | null>}
  */
-export function askForText(title, label, { button = "OK", notes = [], required = true } = {}) {
+export function askForText(title, label, { button = "OK", notes = [], required = true, value = "", names = [] } = {}) {
   return new Promise((resolve) => {
-    const field = h("textarea", { rows: 3, required, maxLength: 1000 });
+    const field = h("textarea", { rows: 3, required, maxLength: 1000, value });
     const dialog = h(
       "dialog",
       { "aria-label": title, class: "ask" },
@@ -21,6 +22,7 @@ export function askForText(title, label, { button = "OK", notes = [], required =
         "form",
         { method: "dialog", class: "stack" },
         h("label", {}, label, field),
+        names.length ? mentionBox(field, names) : null,
         h(
           "div",
           { class: "row" },

@@ -4,13 +4,14 @@ import { h, LiveElement } from "../dom.js";
 
 /** @typedef {import("../api-types").Backend} Backend */
 
-/** @typedef {"segmenter" | "generator" | "matcher"} Seam */
+/** @typedef {"segmenter" | "generator" | "matcher" | "arm"} Seam */
 
 /** @type {Record<Seam, [string, string]>} title and what to know */
 const TITLES = {
-  segmenter: ["Masks", "The method that makes them; the masks of both are kept when you switch"],
-  generator: ["Candidates", "Who makes the meshes; the next run uses it"],
-  matcher: ["Alignment", "Who finds a mesh's place in the photos; the next run uses it"],
+  segmenter: ["Masks", "The method that segments the objects; the masks of both are kept when you switch"],
+  generator: ["Candidates", "The method that generates the meshes; the next run uses it"],
+  arm: ["Arm", "The arm that tries every joint of the bundle, and where it may stand; the next run uses it"],
+  matcher: ["Alignment", "The method that finds where a mesh is in the photos; the next run uses it"],
 };
 
 export class BackendChoice extends LiveElement {
@@ -68,7 +69,7 @@ export class BackendChoice extends LiveElement {
         {},
         h("strong", {}, backend.name),
         ` ${backend.summary} `,
-        h("span", { class: `chip ${tone}` }, backend.licence),
+        backend.licence ? h("span", { class: `chip ${tone}` }, backend.licence) : null,
         backend.available ? null : h("span", { class: "muted" }, ` ${backend.reason}`),
       ),
     );

@@ -12,15 +12,22 @@ const HEIGHT = 28;
 /**
  * The verdict with its remarks, worst first.
  * @param {CaptureFacts} capture
+ * @param {number} notices that are told below it
  */
-export function verdictCard(capture) {
+export function verdictCard(capture, notices) {
   return h(
     "div",
     { class: "stack verdict" },
     h("p", {}, h("span", { class: `chip ${tone(capture.verdict)}` }, capture.verdict || "not examined")),
     capture.remarks.length
       ? h("ol", { class: "remarks" }, ...capture.remarks.map(remarkLine))
-      : h("p", { class: "muted" }, "Poses, depth and colour agree; nothing stands in the way."),
+      : h(
+          "p",
+          { class: "muted" },
+          notices
+            ? "Poses, depth and colour agree frame by frame; what reading it noticed is listed below."
+            : "Poses, depth and colour agree; nothing stands in the way.",
+        ),
   );
 }
 

@@ -1,6 +1,6 @@
 /** What people said about a spot. Emits "show-comment" Comment, "comments" Comment[] (open ones) whenever they change. */
 
-import { listComments, resolveComment } from "../api.js";
+import { listComments, listNames, resolveComment } from "../api.js";
 import { addComment } from "../changes.js";
 import { h, LiveElement, renew } from "../dom.js";
 import { Answers } from "../lib/answers.js";
@@ -53,7 +53,9 @@ export class CommentList extends LiveElement {
    * @param {string} about
    */
   async ask(pin, about) {
-    const text = await askForText(`Comment on ${about}`, "What should change?", { button: "Comment" });
+    const names = await listNames(this.project).catch(() => []); // a comment can be written without
+    const label = names.length ? "What should change? @ names somebody" : "What should change?";
+    const text = await askForText(`Comment on ${about}`, label, { button: "Comment", names });
     if (!text) return;
     try {
       await outbox.send(addComment(this.project, { ...pin, text }));
@@ -79,7 +81,14 @@ export class CommentList extends LiveElement {
   /** @param {Comment} comment */
   #item(comment) {
     const settled = comment.resolved_at !== null;
-    const where = comment.frame !== null ? `frame ${comment.frame}` : comment.point_world ? "in the scene" : "";
+    const where =
+      comment.frame !== null
+        ? `frame ${comment.frame}`
+        : comment.view
+          ? "with a view"
+          : comment.point_world
+            ? "in the scene"
+            : "";
     const show = h(
       "button",
       { type: "button", class: "quiet pick" },

@@ -4,7 +4,7 @@ import { h, icon, LiveElement, renew } from "../dom.js";
 import { jointValue } from "../lib/format.js";
 import { drawLane } from "../lib/lane-view.js";
 import { drawOpening } from "../lib/opening-view.js";
-import { stateIn } from "../lib/openings.js";
+import { stateSaid } from "../lib/openings.js";
 import { sourceChip, sourceWord } from "../source-chip.js";
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
@@ -38,9 +38,13 @@ export class FilmStrip extends LiveElement {
       this.#thumbs.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), this.#thumbs), {
         signal,
       });
-    const observer = new ResizeObserver(() => this.#measure());
+    const page = document.documentElement.style;
+    const observer = new ResizeObserver(() => {
+      page.setProperty("--strip-height", `${this.offsetHeight}px`); // messages stand above it
+      this.#measure();
+    });
     observer.observe(this);
-    signal.addEventListener("abort", () => observer.disconnect());
+    signal.addEventListener("abort", () => (observer.disconnect(), page.removeProperty("--strip-height")));
     this.replaceChildren(
       h("div", { class: "transport" }, this.#play, this.#slider, this.#text),
       this.#thumbs,
@@ -120,7 +124,7 @@ export class FilmStrip extends LiveElement {
     const frame = indices[this.#position] ?? -1;
     for (const [canvas, lane] of this.#opened) {
       drawOpening(canvas, this.#openedSize, lane, indices, this.#position, ink);
-      lane.state.textContent = stateIn(lane.opening, frame);
+      lane.state.textContent = stateSaid(lane.opening, frame);
     }
   }
 

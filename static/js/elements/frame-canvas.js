@@ -79,6 +79,10 @@ export class FrameCanvas extends LiveElement {
     });
   }
 
+  focus() {
+    this.#canvas.focus();
+  }
+
   // What is shown
 
   /**
@@ -94,6 +98,12 @@ export class FrameCanvas extends LiveElement {
     this.#canvas.setAttribute("aria-label", label);
     if (changed || this.#fitted) this.fit();
     else this.#draw();
+  }
+
+  /** Whether more pixels of the frame would show than its picture has. */
+  get wantsMore() {
+    const held = this.#image?.naturalWidth ?? 0;
+    return held > 0 && held < this.#size.width && this.#size.width * this.#view.scale * devicePixelRatio > held;
   }
 
   /** @param {Layer[]} layers */

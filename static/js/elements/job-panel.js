@@ -1,8 +1,9 @@
 /** One job: stages, progress, time left, cancel, retry, log. */
 
 import { cancelJob, getJobEvents, getJobLog, retryJob } from "../api.js";
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, renew } from "../dom.js";
 import { duration } from "../lib/format.js";
+import { stageWord } from "../lib/words.js";
 import { sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").Job} Job */
@@ -47,7 +48,8 @@ export class JobPanel extends LiveElement {
       h("span", { class: `chip ${tone}` }, STATES[job.state]),
       h("span", { class: "muted" }, [running ? job.message : "", left || queue].filter(Boolean).join(" · ")),
     );
-    this.replaceChildren(
+    renew(
+      this,
       h(
         "div",
         { class: "stack" },
@@ -67,8 +69,14 @@ export class JobPanel extends LiveElement {
    */
   #stage(job, stage) {
     const value = stage.state === "done" ? 1 : stage.name === job.stage ? job.stage_fraction : 0;
-    const bar = h("progress", { value, max: 1, "aria-label": stage.name });
-    return h("li", { class: stage.state }, h("span", {}, stage.name), bar, h("span", { class: "state" }, stage.state));
+    const bar = h("progress", { value, max: 1, "aria-label": stageWord(stage.name) });
+    return h(
+      "li",
+      { class: stage.state },
+      h("span", {}, stageWord(stage.name)),
+      bar,
+      h("span", { class: "state" }, stage.state),
+    );
   }
 
   /** @param {NonNullable<Job["error"]>} error */
@@ -93,8 +101,11 @@ export class JobPanel extends LiveElement {
   #buttons(job, running) {
     const row = h("div", { class: "row" });
     /** @type {(text: string, act: () => Promise<unknown>, tone?: string) => void} */
-    const add = (text, act, tone = "") =>
-      row.append(h("button", { type: "button", class: tone, onClick: () => act().catch(sayError) }, text));
+    const add = (text, act, tone = "") => {
+      const button = h("button", { type: "button", class: tone, onClick: () => act().catch(sayError) }, text);
+      button.dataset.at = `${text}:`;
+      row.append(button);
+    };
     if (running) add("Cancel", async () => (this.job = await cancelJob(job.id)));
     const ended = ["failed", "cancelled"].includes(job.state);
     if (ended && job.no_retry) row.append(h("span", { class: "muted" }, `It cannot be tried again: ${job.no_retry}.`));

@@ -1,44 +1,60 @@
 /**
- * The objects of a project. Emits "pick-object" id|null (not "select": fields fire that themselves, and it bubbles),
- * "rename" {id, name, version}, "categorise" {id, category, version}, "delete" id, "toggle" id, "stop" id,
- * "merge" {id, other}.
+ * The objects of a project. Emits "pick-object" id|null (null: a new one), "choose-several" ids, "rename" {id, name, version},
+ * "categorise" {id, category, version}, "rename-all" {ids, name}, "categorise-all" {ids, category}, "assign" {ids, name}, "hide" ids,
+ * "lock" ids, "delete" ids, "stop" id, "merge" {id, other}. A line is made anew when what it shows has changed, and painted once it is in sight.
  */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
 import { inkOn } from "../lib/colour.js";
-import { matches } from "../lib/filter.js";
 import { counted, usableName } from "../lib/format.js";
+import { listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
+import { SelectionBar } from "./selection-bar.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {import("../lib/contradictions.js").Said} Said */
-/** @typedef {{ current: number | null, isHidden: (object: SceneObject) => boolean, colourOf: (object: SceneObject) => string, contradicted: (object: SceneObject) => Said[] }} View */
+/** @typedef {import("../lib/listing.js").Entry<SceneObject> & { colour: string, said: Said[], selected: boolean }} Listed */
+/** @typedef {Listed & { notices: string[] }} Entry */
 
 const MANY = 9; // objects, from which they are searched through
 
 export class ObjectList extends LiveElement {
+  new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
   #list = h("ul", { class: "object-list" });
   #categories = h("datalist", { id: "categories" });
-  #new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
   #search = h("input", { type: "search", placeholder: "Name or category", "aria-label": "Find objects" });
   #found = h("span", { class: "muted", role: "status" });
-  #find = h("div", { class: "find", hidden: true }, this.#search, this.#found);
-  /** What is drawn again when something else is searched for. */
-  #again = () => {};
-  #drawn = "";
+  #order = options("Order of the objects", ORDERS);
+  #state = options("Which objects", STATES);
+  #find = h("div", { class: "find", hidden: true }, this.#search, this.#found, this.#order, this.#state);
+  #bar = new SelectionBar();
+  /** What stands above the list and stays there while it scrolls. */
+  head = h("div", { class: "list-head" }, this.#find, this.#bar.element);
+  /** @type {Entry[]} */
+  #entries = [];
+  /** @type {Map<string, { said: string, line: HTMLElement }>} lines by what they are of */
+  #lines = new Map();
+  /** @type {string[]} whom objects may be assigned to; empty where nobody has an account */
+  #names = [];
   /** @type {number | null} whose line was brought into sight */
   #shown = null;
-  /** @type {(() => void) | null} what to draw once the person has finished typing */
-  #waiting = null;
+  /** @type {number | null} whose line was selected last: Shift selects from there */
+  #from = null;
+  /** Whether to draw once the person has finished typing. */
+  #waiting = false;
 
   connected() {
-    this.replaceChildren(h("div", { class: "list-head" }, this.#new, this.#find), this.#list, this.#categories);
-    const search = () => {
-      this.#again();
+    const { signal } = this;
+    this.replaceChildren(this.#list, this.#categories);
+    const again = () => {
+      this.#draw();
       this.parentElement?.scrollTo(0, 0); // to what was found
     };
-    this.#search.addEventListener("input", search, { signal: this.signal });
-    this.#new.addEventListener("click", () => this.emit("pick-object", null), { signal: this.signal });
-    this.addEventListener("focusout", () => setTimeout(() => this.#waiting?.()), { signal: this.signal });
+    for (const field of [this.#search, this.#order, this.#state]) field.addEventListener("input", again, { signal });
+    this.new.addEventListener("click", () => this.emit("pick-object", null), { signal });
+    this.addEventListener("focusout", () => setTimeout(() => this.#waiting && this.#draw()), { signal });
+    this.addEventListener("focusin", () => this.#rove(), { signal });
+    this.addEventListener("keydown", (event) => this.#onKey(event), { signal });
+    this.#bar.tell = (type, detail) => this.emit(type, detail);
   }
 
   /** @param {{ name: string, label: string }[]} categories */
@@ -48,33 +64,90 @@ export class ObjectList extends LiveElement {
     );
   }
 
-  /**
-   * @param {SceneObject[]} objects
-   * @param {View} view
-   */
-  setObjects(objects, view) {
-    const { current, isHidden } = view;
-    this.#waiting = null;
-    if (this.#isTyping(current)) {
-      this.#waiting = () => this.setObjects(objects, view);
-      return;
-    }
-    this.#again = () => this.setObjects(objects, view);
-    this.#new.setAttribute("aria-pressed", String(current === null));
-    const typed = this.#search.value.trim();
-    const state = JSON.stringify([typed, objects, current, objects.map(isHidden), objects.map(view.contradicted)]);
-    if (state === this.#drawn) return;
-    this.#drawn = state;
+  /** Whom objects may be assigned to. @param {string[]} names */
+  setNames(names) {
+    this.#names = names;
+    this.#bar.names = names;
+    for (const option of this.#state.options)
+      if (OF_PEOPLE.includes(option.value)) option.hidden = option.disabled = !names.length;
+    this.#lines.clear(); // each says whom it may be assigned to
+    this.#draw();
+  }
+
+  /** @param {Listed[]} entries in the order they were made */
+  setObjects(entries) {
+    this.#entries = toldOnce(entries);
+    this.#draw();
+  }
+
+  #draw() {
+    const entries = this.#entries;
+    const current = entries.find((entry) => entry.current)?.object.id ?? null;
+    this.#waiting = this.#isTyping(current);
+    if (this.#waiting) return;
+    this.new.setAttribute("aria-pressed", String(current === null));
+    const groups = this.#groups;
+    const lines = new Map(
+      groups.flatMap(({ heading, entries: of }) => [
+        ...(heading ? [this.#line(`group:${heading}`, of.length, () => groupHeading(heading, of.length))] : []),
+        ...of.map((entry) => this.#line(String(entry.object.id), entry, () => this.#item(entry))),
+      ]),
+    );
+    this.#lines = lines;
     const none = h("li", { class: "muted none" }, "Click a drawer, a door or a thing in the picture.");
-    const found = objects.flatMap((object, k) => {
-      const shown = object.id === current || matches(typed, [object.name, object.category]);
-      return shown ? [this.#item(object, k + 1, view)] : [];
-    });
-    this.#find.hidden = objects.length < MANY && !typed;
-    this.#found.textContent = `${found.length} of ${objects.length}`;
-    renew(this.#list, ...(objects.length ? found : [none]));
+    const drawn = entries.length ? [...lines.values()].map(({ line }) => line) : [none];
+    if (drawn.some((line, k) => line !== this.#list.children[k]) || drawn.length !== this.#list.childElementCount)
+      renew(this.#list, ...drawn);
+    this.#find.hidden = entries.length < MANY && !this.#search.value;
+    this.#found.textContent = `${this.#ids.length} of ${entries.length}`;
+    this.#bar.show(entries.filter(({ selected }) => selected));
+    this.#rove();
     if (this.#shown !== current) this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
     this.#shown = current;
+  }
+
+  /** The line that is there where it says the same, else a new one. @param {string} key @param {unknown} says @param {() => HTMLElement} made @returns {[string, { said: string, line: HTMLElement }]} */
+  #line(key, says, made) {
+    const said = JSON.stringify(says);
+    const there = this.#lines.get(key);
+    return [key, there?.said === said ? there : { said, line: made() }];
+  }
+
+  get #groups() {
+    const [state, order] = [this.#state.value, this.#order.value];
+    return /** @type {{ heading: string, entries: Entry[] }[]} */ (
+      listed(this.#entries, {
+        typed: this.#search.value.trim(),
+        state: /** @type {import("../lib/listing.js").State} */ (state),
+        order: /** @type {import("../lib/listing.js").Order} */ (order),
+      })
+    );
+  }
+
+  /** Those shown, from the top down. */
+  get #ids() {
+    return this.#groups.flatMap(({ entries }) => entries.map(({ object }) => object.id));
+  }
+
+  /** One line is a stop of the Tab key: where the keyboard is, else the current one, else the first; arrows reach the others. */
+  #rove() {
+    const lines = /** @type {HTMLElement[]} */ ([...this.#list.children]).filter((line) => line.querySelector(".pick"));
+    const stop =
+      lines.find((line) => line.matches(":focus-within")) ?? lines.find((line) => line.matches(".current")) ?? lines[0];
+    for (const line of lines)
+      for (const button of line.querySelectorAll("button")) button.tabIndex = line === stop ? 0 : -1;
+  }
+
+  /** @param {KeyboardEvent} event */
+  #onKey(event) {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    const at = event.target;
+    if (!step || !(at instanceof HTMLButtonElement) || !at.matches(":focus-visible")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const what = at.dataset.at?.split(":")[0];
+    const alike = /** @type {HTMLElement[]} */ ([...this.#list.querySelectorAll(`[data-at^="${what}:"]`)]);
+    alike[alike.indexOf(at) + step]?.focus();
   }
 
   /**
@@ -83,44 +156,62 @@ export class ObjectList extends LiveElement {
    */
   #isTyping(current) {
     const field = document.activeElement;
-    return field instanceof HTMLInputElement && this.#list.contains(field) && field.dataset.at?.endsWith(`:${current}`);
+    return (
+      field instanceof HTMLInputElement &&
+      this.#list.contains(field) &&
+      field.dataset.at?.split(":")[1] === String(current)
+    );
   }
 
-  /**
-   * @param {SceneObject} object
-   * @param {number} number
-   * @param {View} view
-   */
-  #item(object, number, { current: chosen, isHidden, colourOf, contradicted }) {
+  /** With Ctrl one more or one less, with Shift all from the last one on. @param {number} id @param {{ shiftKey: boolean }} held */
+  #select(id, { shiftKey }) {
+    const selected = this.#entries.flatMap(({ object, selected }) => (selected ? [object.id] : []));
+    const more = shiftKey ? span(this.#ids, this.#from, id) : [id];
+    const fewer = !shiftKey && selected.includes(id);
+    this.#from = id;
+    this.emit("choose-several", fewer ? selected.filter((one) => one !== id) : [...selected, ...more]);
+  }
+
+  /** @param {Entry} entry */
+  #item(entry) {
+    const { object, number, colour, current, selected, hidden, locked, said, notices } = entry;
     const { id, name } = object;
-    const [current, hidden] = [id === chosen, isHidden(object)];
-    const pick = h("button", { class: "pick", "aria-pressed": String(current), title: name }, name);
-    const eye = h("button", { class: "quiet", "aria-label": `${hidden ? "Show" : "Hide"} ${name}` });
-    eye.append(icon(hidden ? "eye-off" : "eye"));
-    const remove = h("button", { class: "quiet danger", "aria-label": `Delete ${name}` }, icon("trash"));
-    for (const [button, type] of /** @type {const} */ ([
-      [pick, "pick-object"],
-      [eye, "toggle"],
+    const badge = button("select", `Select ${number}, ${name}`, id, String(number));
+    badge.classList.add("badge");
+    badge.style.color = inkOn(colour);
+    badge.setAttribute("aria-pressed", String(selected));
+    badge.addEventListener("click", (event) => this.#select(id, event));
+    const pick = h("button", { type: "button", class: "pick", "aria-pressed": String(current), title: name }, name);
+    pick.dataset.at = `pick-object:${id}`;
+    pick.addEventListener("click", (event) =>
+      event.ctrlKey || event.metaKey || event.shiftKey ? this.#select(id, event) : this.emit("pick-object", id),
+    );
+    const lock = button("lock", `${locked ? "Unlock" : "Lock"} ${name}`, id, icon(locked ? "lock" : "unlock"));
+    const eye = button("hide", `${hidden ? "Show" : "Hide"} ${name}`, id, icon(hidden ? "eye-off" : "eye"));
+    const remove = button("delete", `Delete ${name}`, id, icon("trash"));
+    remove.classList.add("danger");
+    for (const [one, type] of /** @type {const} */ ([
+      [lock, "lock"],
+      [eye, "hide"],
       [remove, "delete"],
-    ])) {
-      button.type = "button";
-      button.dataset.at = `${type}:${id}`;
-      button.addEventListener("click", () => this.emit(type, id));
-    }
-    const badge = h("span", { class: "badge" }, String(number));
-    badge.style.color = inkOn(colourOf(object));
+    ]))
+      one.addEventListener("click", () => this.emit(type, [id]));
     const item = h(
       "li",
-      { class: current ? "current" : "" },
-      h("div", { class: "head" }, badge, pick, eye, remove),
-      h("div", { class: "row muted state" }, state(object, current), this.#stop(object)),
-      current ? this.#fields(object) : null,
-      ...[...contradicted(object), ...object.doubts.map((text) => ({ object: id, text }))].map((said) =>
+      {
+        class: Object.entries({ current, selected, locked })
+          .flatMap(([name, is]) => (is ? [name] : []))
+          .join(" "),
+      },
+      h("div", { class: "head" }, badge, pick, lock, eye, remove),
+      h("div", { class: "row muted state" }, state(entry), this.#stop(object), assigned(object)),
+      current && !locked ? this.#fields(object) : null,
+      ...[...said, ...object.doubts.map((text) => ({ object: id, text }))].map((said) =>
         h("div", { class: "contradicted", role: "status" }, said.text, this.#merge(said, name)),
       ),
-      ...object.notices.map((notice) => h("div", { class: "muted" }, notice)),
+      ...notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
-    item.style.setProperty("--swatch", colourOf(object));
+    item.style.setProperty("--swatch", colour);
     return item;
   }
 
@@ -138,8 +229,7 @@ export class ObjectList extends LiveElement {
   /** @param {SceneObject} object */
   #stop(object) {
     if (object.segment !== "running" && object.segment !== "waiting") return null;
-    const stop = h("button", { type: "button", class: "quiet", "aria-label": `Stop finding ${object.name}` }, "Stop");
-    stop.dataset.at = `stop:${object.id}`;
+    const stop = button("stop", `Stop finding ${object.name}`, object.id, "Stop");
     stop.addEventListener("click", () => this.emit("stop", object.id));
     return stop;
   }
@@ -152,7 +242,8 @@ export class ObjectList extends LiveElement {
       input.dataset.at = `${name}:${object.id}`;
       input.addEventListener("change", () => {
         input.value = name === "name" ? usableName(input.value) : input.value.trim();
-        if (!input.value || input.value === value) return;
+        input.value ||= value; // of what was typed nothing can be in a name
+        if (input.value === value) return;
         const type = name === "name" ? "rename" : "categorise";
         this.emit(type, { id: object.id, [name]: input.value, version: object.version });
       });
@@ -162,30 +253,82 @@ export class ObjectList extends LiveElement {
       });
       return h("label", {}, h("span", { class: "muted" }, label), input);
     };
+    const find = h("button", { type: "button", class: "quiet" }, "Find the ones like this");
+    find.dataset.at = `alike:${object.id}`;
+    find.addEventListener("click", () => this.emit("find-alike", object.id));
     return h(
       "div",
       { class: "fields" },
       field("category", "Category", object.category, { list: "categories" }),
       field("name", "Name", object.name),
+      this.#assigning(object),
+      find,
     );
+  }
+
+  /** @param {SceneObject} object */
+  #assigning({ id, name, assignee }) {
+    if (!this.#names.length) return null;
+    const names = new Set([...this.#names, ...(assignee ? [assignee] : [])]);
+    const choice = h(
+      "select",
+      { "aria-label": `${name} is assigned to` },
+      h("option", { value: "" }, "nobody"),
+      ...[...names].map((one) => h("option", { value: one }, one)),
+    );
+    choice.value = assignee ?? "";
+    choice.dataset.at = `assign:${id}`;
+    choice.addEventListener("change", () => this.emit("assign", { ids: [id], name: choice.value || null }));
+    return h("label", {}, h("span", { class: "muted" }, "Assigned to"), choice);
   }
 }
 
-/**
- * @param {SceneObject} object
- * @param {boolean} current
- */
-function state(object, current) {
+/** With what is to know of each object, which the current one says, and one of several for which it is the same. @param {Listed[]} entries @returns {Entry[]} */
+function toldOnce(entries) {
+  const told = new Set();
+  return entries.map((entry) => {
+    const notices = entry.object.notices.filter((notice) => entry.current || !told.has(notice));
+    for (const notice of entry.object.notices) told.add(notice);
+    return { ...entry, notices };
+  });
+}
+
+/** @param {string} heading @param {number} count */
+function groupHeading(heading, count) {
+  return h("li", { class: "group" }, h("h2", {}, heading, h("span", { class: "muted" }, ` ${count}`)));
+}
+
+/** A button of an object's line. @param {string} what @param {string} label @param {number} id @param {Node | string} shown */
+function button(what, label, id, shown) {
+  const made = h("button", { type: "button", class: "quiet", "aria-label": label, title: label }, shown);
+  made.dataset.at = `${what}:${id}`;
+  return made;
+}
+
+/** @param {string} label @param {Record<string, string>} texts by value */
+function options(label, texts) {
+  return h(
+    "select",
+    { "aria-label": label },
+    ...Object.entries(texts).map(([value, text]) => h("option", { value }, text)),
+  );
+}
+
+/** @param {SceneObject} object */
+function assigned({ assignee }) {
+  return assignee ? h("span", { class: "chip", title: "assigned to" }, `@${assignee}`) : null;
+}
+
+/** @param {Entry} entry */
+function state({ object, current, sure }) {
   if (!object.points.length && !object.front) return "no click yet";
   const clicks = object.front ? "drawn" : counted(object.points.length, "click");
   if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
-  if (object.mask_frames) {
-    if (object.segment === "partial") return `${clicks} · stopped after ${counted(object.mask_frames, "frame")}`;
-    const text = `${clicks} · ${counted(object.mask_frames, "frame")} `;
-    if (!current) return text;
-    const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
-    return h("span", {}, text, drawn);
-  }
-  return clicks;
+  if (!object.mask_frames) return clicks;
+  if (object.segment === "partial") return `${clicks} · stopped after ${counted(object.mask_frames, "frame")}`;
+  const text = `${clicks} · ${counted(object.mask_frames, "frame")}${sure === null ? "" : ` · ${Math.round(100 * sure)} % sure`} `;
+  if (!current) return text;
+  const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
+  return h("span", {}, text, drawn);
 }

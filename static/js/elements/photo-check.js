@@ -1,15 +1,17 @@
 /**
  * The object's mesh over the photos it was seen in: outline, ghost, distance to the measured depth, before and after the fit; where
  * it was filmed open, as open as it was. Comments of the photo are pins; the object fills the picture, or the photo does.
- * Emits "pin-point" {frame, x, y} on a double click.
+ * Emits "pin-point" {frame, x, y} on a double click, "mark" {leaf, frame, value} where a person says how far a leaf stands open.
  */
 
 import { getPhotos } from "../api.js";
-import { h, LiveElement, renew, segments, slider } from "../dom.js";
+import { detailOf, h, LiveElement, renew, segments, slider } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { boxEdges } from "../lib/box-view.js";
 import { sheetOf } from "../lib/crop-view.js";
-import { jointValue } from "../lib/format.js";
+import { holdAt, leafAt, openingAt } from "../lib/leaf.js";
+import { MODELS } from "../lib/words.js";
+import { OpeningMarks } from "./opening-marks.js";
 import { sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").ObjectPhotos} ObjectPhotos */
@@ -17,11 +19,10 @@ import { sayError } from "./toasts.js";
 /** @typedef {ObjectPhotos["of"][number]} Of */
 /** @typedef {"ghost" | "outline" | "residual"} Look */
 
-/** @type {Record<Of, string>} */
-const OF = { placed: "Placed", primitive: "Boxes", fitted: "Fitted" };
 /** @type {Record<Look, string>} */
 const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
 const PIN_R = 0.008; // of the photo's width
+const HOLD_PX = 9; // on the screen
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -40,12 +41,18 @@ export class PhotoCheck extends LiveElement {
   #near = true;
   /** @type {import("../api-types").Comment[]} */
   #comments = [];
+  #pinned = ""; // which comments are drawn
   /** @type {{ pose: number[][], size: number[] } | null} what a correction would make of the box */
   #preview = null;
   #photo = h("img", { alt: "" });
   #under = h("img", { class: "over", alt: "" });
   #over = h("img", { class: "over", alt: "" });
   #lines = document.createElementNS(SVG, "svg");
+  #box = document.createElementNS(SVG, "g");
+  #pins = document.createElementNS(SVG, "g");
+  #leaves = document.createElementNS(SVG, "g");
+  marks = new OpeningMarks();
+  #said = ""; // what people marked of the object
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "75", "aria-label": "Opacity over the photo" });
   #split = h("input", { type: "range", min: "0", max: "100", value: "100", "aria-label": "Before and after the fit" });
   #tools = h("div", { class: "bar" });
@@ -57,11 +64,18 @@ export class PhotoCheck extends LiveElement {
   connected() {
     this.#lines.setAttribute("class", "over");
     this.#lines.setAttribute("aria-hidden", "true");
+    this.#lines.append(this.#pins, this.#box, this.#leaves);
     this.#sheet.append(this.#lines);
-    const observer = new ResizeObserver(() => this.#place());
+    const observer = new ResizeObserver(() => (this.#place(), this.#drawLeaves(), this.marks.draw()));
     observer.observe(this.#pictures);
     this.signal.addEventListener("abort", () => observer.disconnect());
-    this.replaceChildren(this.#tools, this.#pictures, this.#legend, this.#strip);
+    this.replaceChildren(this.#tools, this.#pictures, this.#legend, this.marks.element, this.#strip);
+    /** @type {(type: string, act: (detail: any) => void) => void} */
+    const onMarks = (type, act) =>
+      this.marks.addEventListener(type, (event) => act(detailOf(event)), { signal: this.signal });
+    onMarks("turn", () => this.#drawLeaves());
+    onMarks("seek", ({ frame }) => this.seek(frame));
+    onMarks("mark", (mark) => this.emit("mark", { ...mark, frame: this.frame }));
     for (const slider of [this.#opacity, this.#split])
       slider.addEventListener("input", () => this.#fade(), { signal: this.signal });
     this.#pictures.addEventListener("dblclick", (event) => this.#pin(event), { signal: this.signal });
@@ -78,13 +92,32 @@ export class PhotoCheck extends LiveElement {
     try {
       await this.#answers.take(getPhotos(this.project, object), (found) => {
         if (this.#object !== object) return;
+        const { frame } = this;
         this.#all = found;
+        if (frame !== null) this.#at = nearest(found.photos, frame); // marks bring others in
         if (!found.of.includes(this.#of)) this.#of = found.of.at(-1) ?? "placed";
         this.#draw();
       });
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /**
+   * What people marked of the object, and why nothing more may be marked (empty where it may).
+   * @param {number} object
+   * @param {import("../lib/opening-marks.js").States} states
+   * @param {string} refusal
+   */
+  about(object, states, refusal) {
+    const said = JSON.stringify([object, states]);
+    const again = object === this.#object && this.#said !== said && this.#said.startsWith(`[${object},`);
+    this.#said = said;
+    if (refusal !== this.marks.refusal) {
+      this.marks.refusal = refusal;
+      this.#draw();
+    }
+    if (again) this.show(object);
   }
 
   /** An object's box of the finished scene; null where there is none, or while it is not known. @param {number} object */
@@ -102,7 +135,7 @@ export class PhotoCheck extends LiveElement {
   /** @param {import("../api-types").Comment[]} comments that are open */
   setComments(comments) {
     this.#comments = comments;
-    this.#drawBox();
+    this.#drawPins();
   }
 
   /** @param {number} step */
@@ -112,9 +145,20 @@ export class PhotoCheck extends LiveElement {
     this.#draw();
   }
 
+  /** The photo of a frame, or the one nearest to it. @param {number} frame */
+  seek(frame) {
+    this.#at = nearest(this.#all?.photos ?? [], frame);
+    this.#draw();
+  }
+
   /** @param {boolean} on whether the mesh is hidden for as long as a key is held */
   blink(on) {
     this.#pictures.classList.toggle("blink", on);
+  }
+
+  /** Of the photo that is shown; null where there is none. */
+  get frame() {
+    return this.#current?.frame ?? null;
   }
 
   get #current() {
@@ -127,24 +171,28 @@ export class PhotoCheck extends LiveElement {
     this.#pictures.hidden = !photo;
     if (!all || !photo || !all.of.length) {
       this.#tools.replaceChildren();
+      this.marks.element.hidden = true;
       this.#legend.textContent = "No photo to check this object on: run the pipeline first.";
       return this.#strip.replaceChildren();
     }
     this.#photo.src = this.#frameUrl(photo, 960);
     this.#photo.alt = `Frame ${photo.frame}`;
     this.#over.src = this.#overlayUrl(photo, this.#of, this.#look);
-    this.#over.alt = `${OF[this.#of]}, ${LOOKS[this.#look].toLowerCase()}`;
+    this.#over.alt = `${MODELS[this.#of]}, ${LOOKS[this.#look].toLowerCase()}`;
     const before = this.#of === "fitted" ? "primitive" : "placed";
     this.#under.hidden = this.#look !== "ghost" || this.#of === before;
     if (!this.#under.hidden) this.#under.src = this.#overlayUrl(photo, before, "ghost");
     this.#drawTools(all, before);
+    this.marks.show(all.leaves, photo);
     this.#place();
+    this.#drawLeaves();
+    this.#drawPins();
     this.#drawBox();
     this.#fade();
     this.#legend.textContent =
       this.#look === "residual"
         ? "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree."
-        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}${filmed(photo)}. Hold B for the photo alone; double click pins a comment.`;
+        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}. Hold B for the photo alone; double click pins a comment.`;
     this.#strip.replaceChildren(...all.photos.map((other, k) => this.#thumb(other, k)));
   }
 
@@ -173,7 +221,7 @@ export class PhotoCheck extends LiveElement {
     const looks = /** @type {Look[]} */ (Object.keys(LOOKS));
     renew(
       this.#tools,
-      segments("Stage", ...all.of.map((of) => button(OF[of], of === this.#of, () => (this.#of = of)))),
+      segments("Model", ...all.of.map((of) => button(MODELS[of], of === this.#of, () => (this.#of = of)))),
       segments("Look", ...looks.map((look) => button(LOOKS[look], look === this.#look, () => (this.#look = look)))),
       segments(
         "What fills the picture",
@@ -182,7 +230,7 @@ export class PhotoCheck extends LiveElement {
       ),
       h("span", { class: "spring" }),
       slider("Opacity", this.#opacity),
-      this.#under.hidden ? "" : slider(`${OF[before]} ↔`, this.#split),
+      this.#under.hidden ? "" : slider(`${MODELS[before]} ↔ ${MODELS[this.#of].toLowerCase()}`, this.#split),
     );
   }
 
@@ -211,19 +259,76 @@ export class PhotoCheck extends LiveElement {
   #drawBox() {
     const photo = this.#current;
     const box = this.#preview;
-    this.#lines.replaceChildren();
+    this.#box.replaceChildren(...(photo && box ? boxLines(box.pose, box.size, photo) : []));
+  }
+
+  /** Where each leaf is taken hold of, and those that are turned as they would stand. */
+  #drawLeaves() {
+    const photo = this.#current;
+    const leaves = photo && !this.marks.element.hidden ? this.marks.leaves : [];
+    const held = this.#leaves.querySelector(":scope > .hold.held"); // a finger or the mouse is on it: it stays
+    const parts = leaves.flatMap(({ leaf, value, turned }) => {
+      const lines = photo && turned ? boxLines(leafAt(leaf, value), leaf.size_m, photo) : [];
+      const at = photo && !this.marks.refusal ? holdAt(leaf, value, photo) : null;
+      const hold = at && this.#hold(leaf, at, held instanceof SVGElement ? held : null);
+      return hold ? [...lines, hold] : lines;
+    });
+    this.#leaves.replaceChildren(...parts);
+  }
+
+  /**
+   * @param {import("../api-types").Leaf} leaf
+   * @param {[number, number]} at
+   * @param {SVGElement | null} held
+   */
+  #hold(leaf, at, held) {
+    const hold =
+      held?.dataset.joint === leaf.joint ? held : /** @type {SVGElement} */ (document.createElementNS(SVG, "circle"));
+    const scale = this.#sheet.clientWidth / (this.#current?.width ?? 1) || 1;
+    for (const [name, value] of Object.entries({ cx: at[0], cy: at[1], r: HOLD_PX / scale }))
+      hold.setAttribute(name, String(value));
+    if (hold === held) return hold;
+    hold.setAttribute("class", "hold");
+    hold.dataset.joint = leaf.joint;
+    hold.addEventListener("pointerdown", (event) => this.#drag(/** @type {PointerEvent} */ (event), hold, leaf));
+    return hold;
+  }
+
+  /**
+   * Turn a leaf by its edge; where it is let go of, it stands in this photo.
+   * @param {PointerEvent} event
+   * @param {SVGElement} hold
+   * @param {import("../api-types").Leaf} leaf
+   */
+  #drag(event, hold, leaf) {
+    const photo = this.#current;
     if (!photo) return;
+    event.preventDefault();
+    const ends = new AbortController();
+    let to = NaN;
+    const on = (/** @type {string} */ type, /** @type {(event: PointerEvent) => void} */ act) =>
+      window.addEventListener(type, (moved) => act(/** @type {PointerEvent} */ (moved)), { signal: ends.signal });
+    const end = () => (ends.abort(), hold.classList.remove("held"));
+    hold.classList.add("held");
+    on("pointermove", (moved) => {
+      const { x, y } = this.#pixel(moved, photo);
+      to = openingAt(leaf, photo, x, y);
+      this.marks.turn(leaf, to);
+    });
+    on("pointerup", () => (end(), Number.isNaN(to) || this.marks.mark(leaf, to)));
+    on("pointercancel", () => (end(), this.marks.drop()));
+    this.signal.addEventListener("abort", end, { signal: ends.signal });
+  }
+
+  /** The comments of the photo. Who points at one goes on reading it while others are said: what is there stays the same. */
+  #drawPins() {
+    const photo = this.#current;
+    const here = this.#comments.filter(({ frame, object }) => frame === photo?.frame && object === this.#object);
+    const drawn = JSON.stringify([photo?.frame, photo?.width, here]);
+    if (!photo || drawn === this.#pinned) return;
+    this.#pinned = drawn;
     this.#lines.setAttribute("viewBox", `0 0 ${photo.width} ${photo.height}`);
-    const here = this.#comments.filter(({ frame, object }) => frame === photo.frame && object === this.#object);
-    this.#lines.append(...here.map((comment) => this.#commentPin(comment, photo)));
-    if (!box) return;
-    for (const { from, to, front } of boxEdges(box.pose, box.size, photo)) {
-      const line = document.createElementNS(this.#lines.namespaceURI, "line");
-      const at = { x1: from[0], y1: from[1], x2: to[0], y2: to[1] };
-      for (const [name, value] of Object.entries(at)) line.setAttribute(name, String(value));
-      line.setAttribute("class", front ? "front" : "side");
-      this.#lines.append(line);
-    }
+    this.#pins.replaceChildren(...here.map((comment) => this.#commentPin(comment, photo)));
   }
 
   /** @param {import("../api-types").Comment} comment @param {Photo} photo */
@@ -242,10 +347,16 @@ export class PhotoCheck extends LiveElement {
   #pin(event) {
     const photo = this.#current;
     if (!photo) return;
+    this.emit("pin-point", { frame: photo.frame, ...this.#pixel(event, photo) });
+  }
+
+  /** @param {MouseEvent} event @param {Photo} photo */
+  #pixel(event, { width, height }) {
     const shown = this.#photo.getBoundingClientRect();
-    const x = ((event.clientX - shown.left) / shown.width) * photo.width;
-    const y = ((event.clientY - shown.top) / shown.height) * photo.height;
-    this.emit("pin-point", { frame: photo.frame, x, y });
+    return {
+      x: ((event.clientX - shown.left) / shown.width) * width,
+      y: ((event.clientY - shown.top) / shown.height) * height,
+    };
   }
 
   /**
@@ -266,11 +377,19 @@ export class PhotoCheck extends LiveElement {
   }
 }
 
-/** How far its joints were open in the photo. @param {Photo} photo */
-function filmed({ states }) {
-  const said = states.map(({ joint, type, value }) => {
-    const alone = states.length === 1 ? "" : `${joint} `;
-    return value === null ? `${alone}not known` : `${alone}${jointValue(type, value)}`;
+/** Which photo is of a frame, or of the one nearest to it. @param {Photo[]} photos @param {number} frame */
+function nearest(photos, frame) {
+  const away = photos.map((photo) => Math.abs(photo.frame - frame));
+  return Math.max(away.indexOf(Math.min(...away)), 0);
+}
+
+/** @param {number[][]} pose @param {number[]} size @param {Photo} photo */
+function boxLines(pose, size, photo) {
+  return boxEdges(pose, size, photo).map(({ from, to, front }) => {
+    const line = document.createElementNS(SVG, "line");
+    const at = { x1: from[0], y1: from[1], x2: to[0], y2: to[1] };
+    for (const [name, value] of Object.entries(at)) line.setAttribute(name, String(value));
+    line.setAttribute("class", front ? "front" : "side");
+    return line;
   });
-  return said.length ? `, filmed open by ${said.join(", ")}` : "";
 }

@@ -1,13 +1,14 @@
 /**
  * What the segmenter found by itself, to confirm or dismiss. Emits "proposals-changed" (draw them anew), "show-frame" frame,
- * "objects-made" SceneObject[]. The page asks for the outlines of a frame with `outlinesOn`.
+ * "confirming" (objects are on their way), "objects-made" SceneObject[]. The page asks for the outlines of a frame with `outlinesOn`.
  */
 
-import { getProposals, restoreProposals } from "../api.js";
+import { getFoundFronts, getProposals, restoreProposals } from "../api.js";
 import { confirmProposals, dismissProposals } from "../changes.js";
 import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { counted } from "../lib/format.js";
+import { alike, kindOf } from "../lib/likeness.js";
 import { neighbour, surest } from "../lib/proposals.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -26,18 +27,21 @@ export class ProposalList extends LiveElement {
   #all = { state: "none", fraction: 0, items: [], dismissed: 0 };
   /** @type {string | null} */
   #current = null;
+  /** The object whose like are shown alone. @type {{ id: number, name: string, kind: import("../lib/likeness.js").Kind } | null} */
+  #like = null;
   #heading = h("h2", {}, "Proposals");
   #progress = h("progress", { max: 1, value: 0, "aria-label": "Looking for objects" });
   #note = h("p", { class: "muted", role: "status" });
   #list = h("ul", { class: "proposal-list" });
   #least = h(
     "select",
-    { "aria-label": "Least confidence" },
-    ...[95, 90, 80, 70, 50].map((percent) => h("option", { value: String(percent / 100) }, `${percent} %`)),
+    { "aria-label": "Least confidence", title: "Confirm all from here up" },
+    ...[95, 90, 80, 70, 50].map((percent) => h("option", { value: String(percent / 100) })),
   );
   #every = h("button", { type: "button" });
-  #bulk = h("div", { class: "row" }, this.#every, h("span", { class: "muted" }, "from"), this.#least);
+  #bulk = h("div", { class: "row" }, this.#every, h("span", { class: "muted" }, "at least"), this.#least);
   #restore = h("button", { type: "button", class: "quiet" });
+  #others = h("button", { type: "button", class: "quiet", onClick: () => this.findLike(null) }, "All proposals");
   #timer = 0;
   /** @type {Set<string>} ids that are being confirmed or dismissed */
   #going = new Set();
@@ -52,6 +56,7 @@ export class ProposalList extends LiveElement {
         this.#heading,
         this.#progress,
         this.#note,
+        this.#others,
         this.#bulk,
         this.#list,
         this.#restore,
@@ -86,7 +91,7 @@ export class ProposalList extends LiveElement {
 
   /** @param {number} frame */
   outlinesOn(frame) {
-    return this.#all.items
+    return this.#items
       .filter((item) => item.frame === frame)
       .map((item) => ({
         points: item.outline,
@@ -98,12 +103,47 @@ export class ProposalList extends LiveElement {
 
   /** What a person may do now, in one line; null when nothing is highlighted. */
   get tip() {
-    return this.#chosen && `Y makes this ${this.#chosen.category} an object, X dismisses it, N goes on.`;
+    const chosen = this.#chosen;
+    if (!this.#like || !chosen)
+      return chosen && `Y makes this ${chosen.category} an object, X dismisses it, N goes on.`;
+    const { name, kind } = this.#like;
+    return `Like ${name}? Enter makes this a ${kind.category}, X dismisses it, N goes on, Esc ends.`;
+  }
+
+  /** Whether only those like one object are shown. */
+  get likeOne() {
+    return this.#like !== null;
+  }
+
+  /**
+   * Show those alone that are like an object, the most alike first, and highlight the first; null: all again.
+   * @param {SceneObject | null} object
+   */
+  async findLike(object) {
+    try {
+      const fronts = object ? await getFoundFronts(this.project) : [];
+      const kind =
+        object &&
+        kindOf(
+          object.category,
+          fronts.find((front) => front.object === object.id),
+        );
+      this.#like = object && kind && { id: object.id, name: object.name, kind };
+      this.#show(object ? (this.#items[0] ?? null) : null);
+      if (object) this.scrollIntoView({ block: "nearest" });
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** Those shown: all, or those like one object, by their likeness. */
+  get #items() {
+    return this.#like ? alike(this.#like.kind, this.#all.items) : this.#all.items;
   }
 
   /** @param {1 | -1} step */
   move(step) {
-    this.#show(neighbour(this.#all.items, this.#current, step));
+    this.#show(neighbour(this.#items, this.#current, step));
   }
 
   /** Confirm the highlighted one and go to the next; with none highlighted, show the first: nobody confirms what they have not seen. */
@@ -119,18 +159,20 @@ export class ProposalList extends LiveElement {
   }
 
   confirmAll() {
-    const ids = surest(this.#all.items, Number(this.#least.value)).map((item) => item.id);
+    const ids = surest(this.#items, Number(this.#least.value)).map((item) => item.id);
     if (ids.length) this.#confirm(ids);
   }
 
   get #chosen() {
-    return this.#all.items.find((item) => item.id === this.#current) ?? null;
+    return this.#items.find((item) => item.id === this.#current) ?? null;
   }
 
   /** @param {string[]} ids */
   #confirm(ids) {
+    const category = this.#like?.kind.category;
+    this.emit("confirming");
     this.#leave(ids, async () => {
-      const made = await outbox.send(confirmProposals(this.project, ids));
+      const made = await outbox.send(confirmProposals(this.project, ids, category));
       this.emit("objects-made", made);
       say(made.length === 1 ? `Confirmed ${made[0]?.name}` : `Confirmed ${counted(made.length, "proposal")}`);
     });
@@ -149,7 +191,7 @@ export class ProposalList extends LiveElement {
    * @param {() => Promise<void>} change
    */
   #leave(ids, change) {
-    const next = ids.length === 1 ? neighbour(this.#all.items, ids[0] ?? null, 1, new Set(ids)) : null;
+    const next = ids.length === 1 ? neighbour(this.#items, ids[0] ?? null, 1, new Set(ids)) : null;
     for (const id of ids) this.#going.add(id);
     this.#all = { ...this.#all, items: this.#all.items.filter((item) => !this.#going.has(item.id)) };
     this.#show(next);
@@ -202,39 +244,53 @@ export class ProposalList extends LiveElement {
 
   #draw() {
     this.#drawState();
-    const sure = surest(this.#all.items, Number(this.#least.value)).length;
-    this.#bulk.hidden = !this.#all.items.length;
-    this.#every.textContent = `Confirm ${sure}`;
+    const items = this.#items;
+    const sure = surest(items, Number(this.#least.value)).length;
+    for (const option of this.#least.options)
+      option.text = `${Math.round(100 * Number(option.value))} % ${this.#like ? "alike" : "sure"}`;
+    this.#bulk.hidden = !items.length;
+    this.#others.hidden = !this.#like;
+    this.#every.textContent = sure ? `Confirm ${sure}` : "None";
     this.#every.disabled = sure === 0;
-    renew(this.#list, ...this.#all.items.map((item) => this.#row(item)));
+    renew(this.#list, ...items.map((item) => this.#row(item)));
     this.#restore.hidden = this.#all.dismissed === 0;
     this.#restore.textContent = `Bring back ${this.#all.dismissed} dismissed`;
   }
 
   #drawState() {
-    const { state, items, fraction } = this.#all;
-    this.#heading.textContent = `Proposals (${items.length})`;
+    const { state, fraction } = this.#all;
+    const items = this.#items;
+    this.#heading.textContent = `${this.#like ? `Like ${this.#like.name}` : "Proposals"} (${items.length})`;
     this.#progress.hidden = state !== "running";
     this.#progress.value = fraction;
     this.#note.textContent =
       state === "running"
         ? `Looking for fronts and things… ${Math.round(100 * fraction)} %`
-        : items.length
-          ? "Y confirms the highlighted one, X dismisses it, N and P move."
-          : state === "done"
-            ? "Nothing left to confirm. Click what is missing."
-            : "They appear once the scan is prepared.";
+        : this.#like
+          ? likeNote(this.#like, items.length)
+          : items.length
+            ? "Y confirms the highlighted one, X dismisses it, N and P move."
+            : state === "done"
+              ? "Nothing left to confirm. Click what is missing."
+              : "They appear once the scan is prepared.";
   }
 
   /** @param {Proposal} item */
   #row(item) {
     const current = item.id === this.#current;
     const name = `${item.category} on frame ${item.frame}`;
+    const about = `${percent(item)}${this.#like ? " alike" : ""} · ${size(item)}`;
     const pick = h(
       "button",
-      { type: "button", class: "pick", "aria-pressed": String(current), "aria-label": `Show the proposed ${name}` },
+      {
+        type: "button",
+        class: "pick",
+        "aria-pressed": String(current),
+        "aria-label": `${item.category} ${about}, proposed on frame ${item.frame}`,
+      },
       h("strong", {}, item.category),
-      h("span", { class: "muted" }, `${percent(item)} · ${size(item)}`),
+      " ",
+      h("span", { class: "muted" }, about),
     );
     pick.addEventListener("click", () => this.#show(item));
     const yes = h("button", { type: "button", class: "quiet", "aria-label": `Confirm the ${name}` }, icon("check"));
@@ -246,6 +302,13 @@ export class ProposalList extends LiveElement {
     no.dataset.at = `dismiss:${item.id}`;
     return h("li", { class: current ? "current" : "" }, pick, yes, no);
   }
+}
+
+/** @param {{ name: string, kind: import("../lib/likeness.js").Kind }} like @param {number} count */
+function likeNote({ name, kind }, count) {
+  if (!count) return `No proposal is like ${name}. Click what is missing.`;
+  const by = kind.sides ? "By category, size and handle." : "By category: it has no flat front to compare.";
+  return `${by} Enter confirms the highlighted one as ${kind.category}, Shift+Enter all so much alike, X dismisses, Esc ends.`;
 }
 
 /** @param {Proposal} item */

@@ -17,7 +17,7 @@ export function sceneTable(scene) {
     { class: "stack" },
     h(
       "div",
-      { class: "scroll" },
+      { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Objects of the scene" },
       h(
         "table",
         {},
@@ -62,7 +62,7 @@ function row(item) {
     h("td", { class: "whole" }, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
     h("td", { class: "number" }, String(item.mask_frames)),
     h("td", { class: "number" }, rms),
-    h("td", { class: "muted" }, item.warnings.join("; ")),
+    h("td", { class: "muted notes" }, ...item.warnings.map((warning) => h("div", {}, warning))),
   );
 }
 
@@ -101,7 +101,16 @@ export function certificateCard(certificate) {
   return h(
     "section",
     { class: "card stack" },
-    h("h2", {}, "Certificate ", h("span", { class: `chip ${certificate.passed ? "good" : "bad"}` }, state)),
+    h(
+      "h2",
+      {},
+      "Certificate ",
+      h("span", { class: `chip ${!certificate.current ? "" : certificate.passed ? "good" : "bad"}` }, state),
+      certificate.current ? "" : h("span", { class: "chip warn" }, "stale"),
+    ),
+    certificate.current
+      ? null
+      : h("p", {}, `Of version ${certificate.version}: something was changed since, and the next run certifies that.`),
     h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
     h(
       "div",

@@ -3,6 +3,10 @@
 import { ApiError } from "../api.js";
 import { h, icon } from "../dom.js";
 
+/** @typedef {{ kind?: "good" | "bad" | "", hint?: string, offer?: { text: string, run: () => void } | null }} Options */
+
+const SHOWN_MS = 6000;
+
 export class Toasts extends HTMLElement {
   connectedCallback() {
     this.setAttribute("role", "status");
@@ -11,27 +15,33 @@ export class Toasts extends HTMLElement {
 
   /**
    * @param {string} text
-   * @param {{ kind?: "good" | "bad" | "", hint?: string }} [options]
+   * @param {Options} [options]
    */
-  add(text, { kind = "", hint = "" } = {}) {
+  add(text, { kind = "", hint = "", offer = null } = {}) {
     const close = h("button", { class: "quiet", type: "button", "aria-label": "Close this message" }, icon("cross"));
     const toast = h(
       "div",
       { class: `toast ${kind}` },
       h("div", {}, h("div", {}, text), hint ? h("div", { class: "muted" }, hint) : null),
+      offer ? h("button", { type: "button", onClick: () => (toast.remove(), offer.run()) }, offer.text) : null,
       close,
     );
     close.addEventListener("click", () => toast.remove());
-    if (kind !== "bad") setTimeout(() => toast.remove(), 6000);
+    if (kind !== "bad") leaveAfter(toast, offer ? 2 * SHOWN_MS : SHOWN_MS);
     this.append(toast);
     while (this.childElementCount > 4) this.firstElementChild?.remove();
   }
 }
 
+/** It goes when its time is over, but not from under a pointer or a person at its buttons. @param {HTMLElement} toast @param {number} ms */
+function leaveAfter(toast, ms) {
+  setTimeout(() => (toast.matches(":hover, :focus-within") ? leaveAfter(toast, SHOWN_MS) : toast.remove()), ms);
+}
+
 /**
  * Say something in the corner of the page.
  * @param {string} text
- * @param {{ kind?: "good" | "bad" | "", hint?: string }} [options]
+ * @param {Options} [options]
  */
 export function say(text, options) {
   const toasts = document.querySelector("r2c2r-toasts");

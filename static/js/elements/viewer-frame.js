@@ -1,6 +1,6 @@
 /**
  * The 3D view: viser in an iframe of our own origin; the bundle's own 3D page, or a picture, and a retry when it is down.
- * Emits "shown" ViewerShown, "not-ready" message, "dragging" while somebody drags in it.
+ * Emits "shown" ViewerShown, "not-ready" message, "dragging" while somebody drags in it, "clicked".
  */
 
 import { ApiError, openViewer, showInViewer } from "../api.js";
@@ -13,6 +13,7 @@ import { sayError } from "./toasts.js";
 /** @typedef {import("../api-types").ViewerShown} ViewerShown */
 
 const CAMERA_KEYS = new Set(["w", "a", "s", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown", "tab"]);
+const CLICK_PX = 4; // a press that moved further was a drag
 const LAST_MS = 250; // where a drag ended is told a moment after it did
 
 export class ViewerFrame extends LiveElement {
@@ -48,11 +49,13 @@ export class ViewerFrame extends LiveElement {
     }
   }
 
-  /** @param {Partial<ViewerShow>} what */
+  /** The last wish wins; where to look or stand is asked once and must not be lost to it. @param {Partial<ViewerShow>} what */
   show(what) {
     this.#wanted = what;
     if (!this.#url) return;
-    this.#queue = this.#queue.then(() => (this.#wanted === what ? this.#ask(what, true) : undefined));
+    this.#queue = this.#queue.then(() =>
+      this.#wanted === what || what.look || what.camera ? this.#ask(what, true) : undefined,
+    );
   }
 
   /**
@@ -89,6 +92,14 @@ export class ViewerFrame extends LiveElement {
     inside?.addEventListener("pointermove", dragging, { signal: this.signal });
     const ended = () => setTimeout(() => this.emit("dragging"), LAST_MS);
     inside?.addEventListener("pointerup", ended, { signal: this.signal, capture: true });
+    let from = [0, 0];
+    const pressed = (/** @type {PointerEvent} */ { clientX, clientY }) => (from = [clientX, clientY]);
+    inside?.addEventListener("pointerdown", pressed, { signal: this.signal, capture: true });
+    const released = (/** @type {PointerEvent} */ { clientX, clientY, button }) => {
+      const moved = Math.hypot(clientX - (from[0] ?? 0), clientY - (from[1] ?? 0));
+      if (button === 0 && moved < CLICK_PX) this.emit("clicked");
+    };
+    inside?.addEventListener("pointerup", released, { signal: this.signal, capture: true });
     for (const type of /** @type {const} */ (["keydown", "keyup"]))
       inside?.addEventListener(type, passOn, { signal: this.signal, capture: true });
   }

@@ -1,6 +1,6 @@
 /**
  * The chosen front in numbers and words, and the fronts of the plane. Says "choose" key, "size" {side, metres}, "category",
- * "name", "hinge", "handle" with what is wanted, "divide" {way, text}, "next" and "adopt".
+ * "name", "hinge", "handle" with what is wanted, "divide" {way, text}, "next", "copy" and "adopt".
  */
 
 import { h, renew } from "../dom.js";
@@ -30,6 +30,7 @@ export class FrontPane extends EventTarget {
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
   #handle = h("select", {}, ...options({ "": "looked for", none: "none", drawn: "drawn" }));
   #adopt = h("button", { type: "button", onClick: () => this.#say("adopt") });
+  #copy = h("button", { type: "button", onClick: () => this.#say("copy") }, "Copy handle and hinge (C)");
   #fields = h(
     "fieldset",
     { class: "front-fields", disabled: true },
@@ -43,7 +44,7 @@ export class FrontPane extends EventTarget {
     label("Divide width", this.#across),
     label("Divide height", this.#down),
   );
-  element = h("aside", { class: "fronts", "aria-label": "Fronts" }, this.#fields, this.#adopt, this.#list);
+  element = h("aside", { class: "fronts", "aria-label": "Fronts" }, this.#fields, this.#copy, this.#adopt, this.#list);
   /** @type {Placed | null} */
   #shown = null;
 
@@ -138,6 +139,8 @@ export class FrontPane extends EventTarget {
     this.#side.textContent = this.slides(leading?.category ?? "") ? "Slides to" : "Hinge";
     set(this.#hinge, leading?.hinge ?? "");
     set(this.#handle, leading?.handle === "none" ? "none" : leading?.handle && leading.drawn ? "drawn" : "");
+    this.#copy.hidden = !leading || chosen.size < 2;
+    this.#copy.title = `Those of ${leading?.name}, to the other chosen fronts`;
     this.#adopt.hidden = cut === 0;
     this.#adopt.textContent = cut === 1 ? "Take the cut panel (A)" : `Take ${cut} cut panels (A)`;
     renew(this.#list, ...inOrder(fronts).map((front) => this.#row(front, chosen.has(front.key), paint(front))));

@@ -36,11 +36,11 @@ export class PlaneList extends EventTarget {
   #button(item) {
     const { width, height } = sizeOf(item);
     const size = `${width.toFixed(2)} × ${height.toFixed(2)} m`;
-    const picture = h("img", { src: item.url, alt: "", loading: "lazy" });
+    const picture = h("img", { src: item.url, alt: `Plane ${item.id + 1},`, loading: "lazy" });
     const choose = () => this.dispatchEvent(new CustomEvent("choose", { detail: item.id }));
     return h(
       "button",
-      { type: "button", "aria-label": `Plane ${item.id + 1}, ${size}`, "data-plane": String(item.id), onClick: choose },
+      { type: "button", "data-plane": String(item.id), onClick: choose },
       picture,
       h("span", {}, size, " ", h("span", { class: "chip" }, "0 fronts")),
     );

@@ -8,7 +8,7 @@ const EDGES = [0, 1, 2, 3].flatMap((k) => [
   [k + 4, ((k + 1) % 4) + 4],
   [k, k + 4],
 ]);
-const NEAR_M = 0.05;
+export const NEAR_M = 0.05;
 
 /**
  * The box's edges in pixels, front face first; those behind the camera are left out.
@@ -37,7 +37,7 @@ export function boxEdges(pose, size, camera) {
  * @param {Matrix} matrix
  * @param {number[]} point
  */
-function apply(matrix, [x = 0, y = 0, z = 0]) {
+export function apply(matrix, [x = 0, y = 0, z = 0]) {
   return matrix.slice(0, 3).map(([a = 0, b = 0, c = 0, t = 0]) => a * x + b * y + c * z + t);
 }
 
@@ -46,6 +46,6 @@ function apply(matrix, [x = 0, y = 0, z = 0]) {
  * @param {number[]} point in front of the camera
  * @returns {[number, number]}
  */
-function pixel(camera, [x = 0, y = 0, z = 1]) {
+export function pixel(camera, [x = 0, y = 0, z = 1]) {
   return [(camera.fx * x) / z + camera.cx, (camera.fy * y) / z + camera.cy];
 }

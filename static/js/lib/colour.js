@@ -1,4 +1,4 @@
-/** Which of a light and a dark text is the better to read on a colour. */
+/** Colours as the page writes them, and which of a light and a dark text is the better to read on one. */
 
 import { rgbOf } from "./masks.js";
 
@@ -9,6 +9,17 @@ const LIGHT = "#ffffff";
 export function inkOn(colour) {
   const ground = luminance(colour);
   return contrast(ground, luminance(LIGHT)) > contrast(ground, luminance(DARK)) ? LIGHT : DARK;
+}
+
+/** #rrggbb of three shares from 0 to 1. @param {number[]} shares */
+export function hexOf(shares) {
+  return `#${shares
+    .map((share) =>
+      Math.round(255 * share)
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("")}`;
 }
 
 /** Relative luminance, 0 to 1 (WCAG 2.2). @param {string} colour */

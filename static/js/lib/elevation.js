@@ -268,6 +268,29 @@ export function handleAfter(handle, before, after) {
   return isOn(after, stays) ? stays : null;
 }
 
+/**
+ * The handle of one front on another: as far from an edge that it is near, else in the middle as it was.
+ * @param {Box} box
+ * @param {Rect} from
+ * @param {Rect} to
+ * @returns {Box}
+ */
+export function handleLike(box, from, to) {
+  const [left_m, right_m] = alongSide(box.left_m, box.right_m, widthOf(from), widthOf(to));
+  const [bottom_m, top_m] = alongSide(box.bottom_m, box.top_m, heightOf(from), heightOf(to));
+  return { left_m, right_m, bottom_m, top_m };
+}
+
+/** From its middle. @param {number} low @param {number} high @param {number} before length of the side @param {number} after @returns {[number, number]} */
+function alongSide(low, high, before, after) {
+  const middle = (low + high) / 2;
+  const half = Math.min(high - low, after) / 2;
+  const atAnEdge = Math.abs(middle) > before / 6;
+  const wanted = middle + (atAnEdge ? (Math.sign(middle) * (after - before)) / 2 : 0);
+  const at = Math.min(Math.max(wanted, half - after / 2), after / 2 - half);
+  return [round(at - half), round(at + half)];
+}
+
 /** @param {Box} box from one centre @param {{ x: number, y: number }} from @param {{ x: number, y: number }} to @returns {Box} */
 function shifted(box, from, to) {
   const [right, up] = [from.x - to.x, to.y - from.y];

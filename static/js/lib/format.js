@@ -53,7 +53,8 @@ export function jointValue(type, value) {
   return type === "revolute" ? `${Math.round((value * 180) / Math.PI)}°` : `${(100 * value).toFixed(0)} cm`;
 }
 
-/** A name as simulators accept it: what people put between words becomes an underscore. @param {string} typed */
+/** A name as simulators accept it: accents go, and what else is no letter, digit or underscore becomes one. @param {string} typed */
 export function usableName(typed) {
-  return typed.trim().replaceAll(/[\s.-]+/g, "_");
+  const plain = typed.trim().normalize("NFKD").replaceAll(/\p{M}/gu, "");
+  return plain.replaceAll(/\W+/g, "_").replaceAll(/^_|_$/g, "");
 }

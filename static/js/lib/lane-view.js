@@ -1,5 +1,6 @@
 /** A lane, drawn: a bar where an object has a mask, hatched where that is doubtful, a diamond at each click, a line where one is. */
 
+import { diamond } from "./diamond.js";
 import { runs } from "./lanes.js";
 
 /** @typedef {{ colour: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView frames are confidences by index */
@@ -43,12 +44,7 @@ export function drawLane(canvas, { width, height }, lane, indices, position, ink
  * @param {number} y
  */
 function drawDiamond(context, x, y) {
-  context.beginPath();
-  context.moveTo(x, y - DIAMOND);
-  context.lineTo(x + DIAMOND, y);
-  context.lineTo(x, y + DIAMOND);
-  context.lineTo(x - DIAMOND, y);
-  context.closePath();
+  diamond(context, x, y, DIAMOND);
   context.fillStyle = "#ffffff";
   context.fill();
   context.strokeStyle = "#10131a";

@@ -1,10 +1,12 @@
-/** An opening's lane: its angle or travel over the frames with twice its standard deviation; hatched where it is not known. */
+/** An opening's lane: its angle or travel over the frames with twice its standard deviation; hatched where it is not known, a diamond where a person marked it. */
 
+import { diamond } from "./diamond.js";
 import { readings, spansOf } from "./openings.js";
 
 /** @typedef {import("../api-types").Opening} Opening */
 
 const MARGIN_PX = 4;
+const MARK_PX = 4;
 
 /**
  * @param {HTMLCanvasElement} canvas
@@ -48,6 +50,10 @@ export function drawOpening(canvas, { width, height }, { opening, colour }, indi
   });
   context.stroke();
   context.fillStyle = ink;
+  for (const { position: at, value } of known.filter(({ marked }) => marked)) {
+    diamond(context, x(at), y(value), MARK_PX);
+    context.fill();
+  }
   context.fillRect(x(position) - 1, 0, 2, height);
 }
 

@@ -1,11 +1,12 @@
 /** A front as it was filmed to move: what it does in a frame, in words, and its angle or travel over time. */
 
 import { jointValue } from "./format.js";
+import { isMarked } from "./opening-marks.js";
 
 /** @typedef {import("../api-types").Opening} Opening */
 /** @typedef {"closed" | "opening" | "open" | "unknown"} Phase */
 /** @typedef {{ from: number, to: number, phase: Phase }} Span of positions in the list of frames, `to` beyond the last */
-/** @typedef {{ position: number, value: number, sigma: number }} Reading */
+/** @typedef {{ position: number, value: number, sigma: number, marked: boolean }} Reading */
 
 const CLOSED = { revolute: 0.035, prismatic: 0.006 }; // 2 degrees, 6 mm: nearer to closed than states are known
 const OPEN = 0.9; // of the widest state seen
@@ -29,6 +30,12 @@ export function stateIn(opening, frame) {
   if (state.value === null || phase === "closed") return phase;
   const spread = state.sigma === null ? "" : ` ± ${spreadOf(opening.kind, 2 * state.sigma)}`;
   return `${phase}, ${jointValue(opening.kind, state.value)}${spread}`;
+}
+
+/** The same, and whether a person said so. @param {Opening} opening @param {number} frame */
+export function stateSaid(opening, frame) {
+  const by = isMarked(opening.states.find((one) => one.frame === frame)) ? ", set by a person" : "";
+  return stateIn(opening, frame) + by;
 }
 
 /** @param {Opening["kind"]} kind @param {number} value */
@@ -58,6 +65,8 @@ export function readings(opening, indices) {
   const at = new Map(indices.map((index, position) => [index, position]));
   return opening.states.flatMap(({ frame, value, sigma }) => {
     const position = at.get(frame);
-    return value === null || position === undefined ? [] : [{ position, value, sigma: sigma ?? 0 }];
+    return value === null || position === undefined
+      ? []
+      : [{ position, value, sigma: sigma ?? 0, marked: sigma === null }];
   });
 }

@@ -21,9 +21,10 @@ export function neighbour(items, current, step, without = new Set()) {
 }
 
 /**
+ * In whole percent, as they are shown.
  * @param {Proposal[]} items
  * @param {number} least confidence 0..1
  */
 export function surest(items, least) {
-  return items.filter((item) => item.confidence >= least);
+  return items.filter((item) => Math.round(100 * item.confidence) >= Math.round(100 * least));
 }

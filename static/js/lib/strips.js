@@ -29,10 +29,10 @@ export function strips(moments) {
       off: m.brightness < 0.08 || m.brightness > 0.92,
       text: percent(m.brightness),
     })),
-    strip(moments, "Disagreement", "off their neighbours", (m) => ({
+    strip(moments, "Depth mismatch", "whose depth does not match their neighbours", (m) => ({
       height: (m.error_mm ?? 0) / most,
       off: m.error_mm !== null && m.error_mm > Math.max(15, 3 * usual),
-      text: m.error_mm === null ? "nothing to compare with" : `${m.error_mm.toFixed(0)} mm`,
+      text: m.error_mm === null ? "no other frame to compare with" : `${m.error_mm.toFixed(0)} mm`,
     })),
   ];
 }
@@ -50,7 +50,7 @@ function strip(moments, name, problem, draw) {
     return { ...bar, height: Math.min(Math.max(bar.height, 0), 1), frame: moment.frame_index };
   });
   const off = bars.filter((bar) => bar.off).length;
-  return { name, bars, summary: off ? `${off} of ${bars.length} frames ${problem}` : "even" };
+  return { name, bars, summary: off ? `${off} of ${bars.length} frames ${problem}` : "no frame stands out" };
 }
 
 /** @param {number} share */

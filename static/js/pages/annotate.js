@@ -26,6 +26,7 @@ import { partedText } from "../lib/parted.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
+import { offerToSkip } from "../skip.js";
 
 /** @typedef {import("../api-types").Comment} Comment */
 /** @typedef {import("../api-types").SceneObject} SceneObject */
@@ -43,6 +44,8 @@ export class AnnotatePage extends LiveElement {
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
   #categories = [];
+  /** @type {string[]} whom objects may be assigned to */
+  #names = [];
   // What is seen
   #canvas = new FrameCanvas();
   #strip = new FilmStrip();
@@ -57,7 +60,7 @@ export class AnnotatePage extends LiveElement {
     this.#objects,
     this.#edits,
     this.#player,
-    () => this.#pane.category,
+    () => this.#pane.checklist.next,
     (spot) => this.#canvas.objectsAt(spot),
   );
   #parts = {
@@ -92,6 +95,7 @@ export class AnnotatePage extends LiveElement {
 
   connected() {
     for (const part of [
+      this.#objects,
       this.#painter,
       this.#cropper,
       this.#edits,
@@ -113,6 +117,7 @@ export class AnnotatePage extends LiveElement {
       h("div", { class: "annotate" }, this.#pane.element, stage, this.#evidence.element, this.#strip),
       this.#mosaic,
     );
+    offerToSkip("Skip to the picture", this.#canvas, this.signal);
     this.#listen();
     this.#player.showFirst(this.project);
     this.#load();
@@ -125,7 +130,16 @@ export class AnnotatePage extends LiveElement {
 
   /** What the palette offers on this page besides its keys. @param {string} typed */
   commands(typed) {
-    return offers(typed, this.#parts, this.#categories, (category) => this.#categorise(category));
+    const { checklist } = this.#pane;
+    const listed = checklist.left.map(({ name }) => ({
+      text: `Click next: ${name}`,
+      run: () => checklist.choose(name),
+    }));
+    const others = offers(typed, this.#parts, this.#categories, (category) => this.#categorise(category), {
+      names: this.#names,
+      assign: (name) => this.#edits.assign(this.#objects.changed, name),
+    });
+    return [...others, ...listed];
   }
 
   #listen() {
@@ -173,14 +187,23 @@ export class AnnotatePage extends LiveElement {
     const { comments } = this.#evidence;
     for (const action of ["undo", "redo"]) this.#on(this.#pane, action, () => this.act(action));
     this.#on(list, "pick-object", (id) => (id === null ? this.#presses.startNew() : this.#objects.choose(id)));
-    this.#on(list, "toggle", (id) => this.#objects.toggle(id));
-    this.#on(list, "delete", (id) => this.#edits.remove(id));
+    this.#on(list, "choose-several", (ids) => this.#objects.select(ids));
+    this.#on(list, "hide", (ids) => this.#objects.hide(ids));
+    this.#on(list, "lock", (ids) => this.#objects.lock(ids));
+    this.#on(list, "delete", (ids) => this.#edits.remove(this.#those(ids)));
+    this.#on(list, "rename-all", ({ ids, name }) => this.#edits.renameAll(this.#those(ids), name));
+    this.#on(list, "categorise-all", ({ ids, category }) =>
+      this.#those(ids).forEach(({ id }) => this.#categorise(category, id)),
+    );
+    this.#on(list, "assign", ({ ids, name }) => this.#edits.assign(this.#those(ids), name));
     this.#on(list, "merge", ({ id, other }) => this.#edits.merge(id, other));
+    this.#on(list, "find-alike", () => this.act("alike"));
     this.#on(list, "stop", (id) => this.#edits.stopSegmenting(id));
     this.#on(list, "rename", ({ id, name }) => this.#edits.patch(id, { name }));
     this.#on(list, "categorise", ({ id, category }) => this.#categorise(category, id));
     this.#on(proposals, "proposals-changed", () => (this.#picture.drawProposals(), this.#drawTip()));
     this.#on(proposals, "show-frame", (index) => this.#player.seekFrame(index));
+    this.#on(proposals, "confirming", () => this.#objects.choose(null)); // at once: undo is of them, not of the one before
     this.#on(proposals, "objects-made", (objects) => this.#adopt(objects));
     this.#on(comments, "comments", () => this.#picture.drawPins());
     this.#on(comments, "show-comment", (comment) => this.#showComment(comment));
@@ -195,12 +218,14 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#objects, "change", () => this.#drawObjects());
     this.#on(this.#objects, "choose", () => this.#chosen());
     this.#on(this.#objects, "gone", ({ id }) => this.#masks.forget(id));
-    this.#on(this.#contradictions, "change", () => this.#pane.draw(this.#objects, this.#contradicted));
+    this.#on(this.#contradictions, "change", () => this.#drawList());
     this.#on(this.#edits, "object", ({ object }) => this.#objects.answered(object));
     this.#on(this.#edits, "made", ({ object }) => (this.#objects.answered(object), this.#objects.choose(object.id)));
+    this.#on(this.#edits, "making", ({ name, coming }) => this.#pane.checklist.making(name, coming));
     this.#on(this.#edits, "clicks", () => this.#picture.drawMarkers());
     this.#on(this.#edits, "saved", ({ text, tone }) => this.#tools.saved(text, tone));
     this.#on(live, "object", ({ object }) => object.project === this.project && this.#objects.store(object));
+    this.#on(live, "project", () => this.#player.frame && this.#relist().catch(sayError));
     this.#on(live, "parted", ({ name, others }) => say(partedText(name, others)));
     this.#on(live, "live", ({ status }) => this.#tools.segmenter.show(status));
     this.#on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#begunAnew());
@@ -216,14 +241,24 @@ export class AnnotatePage extends LiveElement {
     target.addEventListener(type, (event) => act(detailOf(event)), { signal: this.signal });
   }
 
+  /** @param {number[]} ids */
+  #those(ids) {
+    return ids.flatMap((id) => this.#objects.get(id) ?? []);
+  }
+
   async #load() {
     this.#tip.say("Loading the frames…");
     try {
-      const [project, frames, system] = await Promise.all([
+      const [project, frames, system, names] = await Promise.all([
         api.getProject(this.project, this.signal),
         api.listFrames(this.project),
         api.getSystem(),
+        api.listNames(this.project),
       ]);
+      if (system.account) this.#pane.me = system.user;
+      this.#pane.checklist.listed = project.checklist;
+      this.#names = names;
+      this.#pane.list.setNames(names);
       this.#objects.palette = system.palette;
       this.#categories = system.categories.map((category) => category.name);
       this.#pane.list.setCategories(system.categories);
@@ -242,6 +277,12 @@ export class AnnotatePage extends LiveElement {
     const [objects] = await Promise.all([api.listObjects(this.project), this.#masks.load()]);
     this.#objects.fill(objects);
     this.#fetchMasks();
+  }
+
+  /** Another list of objects to click may have been chosen. */
+  async #relist() {
+    const { checklist } = await api.getProject(this.project, this.signal);
+    this.#pane.checklist.listed = checklist;
   }
 
   /** The server was started again: its segmenter is to be opened anew. */
@@ -264,6 +305,7 @@ export class AnnotatePage extends LiveElement {
   /** @param {number} object that is seen on other frames now */
   #grown(object) {
     if (object === this.#objects.current) this.#evidence.cloud.refresh();
+    this.#drawList();
     this.#picture.drawLanesSoon();
   }
 
@@ -274,10 +316,9 @@ export class AnnotatePage extends LiveElement {
     this.#evidence.cloud.show(current);
   }
 
-  /** @param {SceneObject[]} objects confirmed just now: the next click starts a new object */
+  /** @param {SceneObject[]} objects confirmed just now */
   #adopt(objects) {
     for (const object of objects) this.#objects.answered(object);
-    this.#objects.choose(null);
     this.#tools.saved(`saved ${new Date().toLocaleTimeString()}`);
   }
 
@@ -287,8 +328,8 @@ export class AnnotatePage extends LiveElement {
    * @param {number | null} id
    */
   #categorise(category, id = this.#objects.current) {
-    this.#pane.category = category;
-    if (id !== null) this.#edits.patch(id, { category });
+    if (id === null) this.#pane.checklist.category = category;
+    else this.#edits.patch(id, { category });
   }
 
   /** @param {{ frame: number, x: number, y: number }} pin */
@@ -324,9 +365,13 @@ export class AnnotatePage extends LiveElement {
     this.#drawTip();
   }
 
+  #drawList() {
+    this.#pane.draw(this.#objects, this.#masks.stored, this.#contradicted);
+  }
+
   #drawObjects() {
     this.#drawCrop(); // and the tip
-    this.#pane.draw(this.#objects, this.#contradicted);
+    this.#drawList();
     this.#picture.drawObjects();
     if (this.#player.frame) this.#contradictions.lookSoon(this.#player.frame);
   }
@@ -346,11 +391,20 @@ export class AnnotatePage extends LiveElement {
     if (event.key === "Escape" && this.#cropper.on) return void this.#cropper.use();
     if (event.key === "Escape" && this.#painter.tool) return this.#painter.use(null);
     if (event.key === "Enter" && this.#painter.close()) return event.preventDefault();
+    if (this.#pane.proposals.likeOne && this.#likeKey(event)) return event.preventDefault();
     if (event.key === " ") return (event.preventDefault(), void this.#canvas.holdSpace(true)); // a tap plays: #onKeyUp
     const click = (/** @type {0 | 1} */ label) =>
       this.#canvas.crosshair && this.#presses.click({ ...this.#canvas.crosshair, label, hold: false });
     if (crosshairKey(event, this.#canvas, click)) return event.preventDefault();
     this.#commands.press(event);
+  }
+
+  /** While those like an object are shown, Enter is about them. @param {KeyboardEvent} event @returns {boolean} whether it was */
+  #likeKey({ key, shiftKey, repeat }) {
+    const { proposals } = this.#pane;
+    if (key === "Escape") proposals.findLike(null);
+    else if (key === "Enter" && !repeat) shiftKey ? proposals.confirmAll() : proposals.confirm();
+    return ["Escape", "Enter"].includes(key);
   }
 
   /** @param {KeyboardEvent} event */

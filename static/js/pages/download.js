@@ -1,9 +1,11 @@
 /** The bundle: formats, certificate, versions with checksums. */
 
-import { ApiError, checkBundle, compareBundles, getCertificate, getSystem, listBundles } from "../api.js";
+import { ApiError, bundleInside, checkBundle, compareBundles, getCertificate, getSystem, listBundles } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
+import { assetCard, robotCard, simulatorCard } from "../elements/bundle-inside.js";
 import { certificateCard } from "../elements/results.js";
 import { say, sayError } from "../elements/toasts.js";
+import { VariantSets } from "../elements/variant-sets.js";
 import { Answers } from "../lib/answers.js";
 import { bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
@@ -20,10 +22,12 @@ const CONTENT = [
 export class DownloadPage extends LiveElement {
   project = "";
   #answers = new Answers();
-  #body = h("div", { class: "page stack" });
+  #variants = new VariantSets();
 
   connected() {
-    this.replaceChildren(this.#body);
+    this.#variants.project = this.project;
+    this.#variants.hidden = true;
+    this.replaceChildren(h("div", { class: "page stack" }, this.#variants));
     live.addEventListener("project", () => this.#load(), { signal: this.signal });
     this.#load();
   }
@@ -37,10 +41,11 @@ export class DownloadPage extends LiveElement {
   }
 
   /** @param {Awaited<ReturnType<typeof everything>>} all */
-  #draw({ bundles, formats, certificate }) {
+  #draw({ bundles, formats, certificate, inside }) {
     const newest = bundles[0];
     if (!newest) return this.#empty();
-    this.#body.replaceChildren(
+    this.#variants.hidden = false;
+    this.#around(
       h(
         "header",
         {},
@@ -51,12 +56,20 @@ export class DownloadPage extends LiveElement {
         ? ""
         : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
       h("div", { class: "split" }, this.#choice(newest, formats), certificate ? certificateCard(certificate) : ""),
-      this.#versions(bundles),
+      inside ? h("div", { class: "split" }, simulatorCard(inside, certificate), assetCard(inside, newest)) : "",
     );
+    this.#variants.after(...(inside?.robots ?? []).map(robotCard), this.#versions(bundles));
+  }
+
+  /** The page drawn anew but for the variants: somebody may type there. @param {...(Node | string)} before them */
+  #around(...before) {
+    for (const child of [...(this.#variants.parentElement?.childNodes ?? [])])
+      if (child !== this.#variants) child.remove();
+    this.#variants.before(...before);
   }
 
   #empty() {
-    this.#body.replaceChildren(
+    this.#around(
       h("header", {}, h("h1", {}, "Download")),
       h(
         "section",
@@ -200,12 +213,16 @@ export class DownloadPage extends LiveElement {
 /** What the page tells; no certificate before the first run is through. @param {string} project */
 async function everything(project) {
   const [bundles, { formats }] = await Promise.all([listBundles(project), getSystem()]);
-  if (!bundles.length) return { bundles, formats, certificate: null };
-  const certificate = await getCertificate(project).catch((error) => {
-    if (error instanceof ApiError && error.status === 409) return null;
-    throw error;
-  });
-  return { bundles, formats, certificate };
+  const newest = bundles[0];
+  if (!newest) return { bundles, formats, certificate: null, inside: null };
+  const [certificate, inside] = await Promise.all([
+    getCertificate(project).catch((error) => {
+      if (error instanceof ApiError && error.status === 409) return null;
+      throw error;
+    }),
+    bundleInside(project, newest.version),
+  ]);
+  return { bundles, formats, certificate, inside };
 }
 
 /** @param {string} project */

@@ -3,49 +3,86 @@
 import { changeProject, getHistory, getProject, getSystem, readAgain } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
+import { Assignee } from "../elements/assignee.js";
 import { BackendChoice } from "../elements/backend-choice.js";
 import { JobPanel } from "../elements/job-panel.js";
+import { ObjectChecklist } from "../elements/object-checklist.js";
 import { MemberList } from "../elements/member-list.js";
+import { offerExport } from "../elements/export-dialog.js";
+import { historyRow, NewsList } from "../elements/news-list.js";
+import { OpinionList } from "../elements/opinion-list.js";
 import { sayError } from "../elements/toasts.js";
+import { TrueLengthList } from "../elements/true-lengths.js";
+import { UploadCard } from "../elements/upload-card.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
 import { Answers } from "../lib/answers.js";
-import { ago, bytes, counted } from "../lib/format.js";
+import { bytes, counted } from "../lib/format.js";
 import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Project} Project */
 
-const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher"]);
+const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher", "arm"]);
 const BESIDE = new Set(["unregistered", "colour_focal_length"]); // causes that the doctor's fit mends
 
 export class OverviewPage extends LiveElement {
   project = "";
   #answers = new Answers();
-  #head = h("header");
+  #assignee = new Assignee();
+  #title = h("h1");
+  #next = h("span");
+  #head = h("header", {}, this.#title, this.#assignee, this.#next);
   #importing = h("section", { class: "card stack", hidden: true });
   #scan = h("div", { class: "split", hidden: true });
   #work = h("div", { class: "split", hidden: true });
   #history = h("section", { class: "stack" });
+  #upload = new UploadCard();
+  #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
   #job = new JobPanel();
   #viewer = new ViewerFrame();
+  #news = new NewsList();
   #members = new MemberList();
+  #checklist = new ObjectChecklist();
+  #opinions = new OpinionList();
+  #lengths = new TrueLengthList();
   #choices = SEAMS.map((seam) => Object.assign(new BackendChoice(), { seam }));
+  /** Which method does each stage; the list of all is opened by who wants another. */
+  #methods = h("summary", {}, "Methods");
   #shown = false;
   #read = ""; // what was drawn of the recording: the same again would make the page jump
 
   connected() {
-    this.#members.project = this.project;
+    this.#assignee.project = this.#news.project = this.#members.project = this.#lengths.project = this.project;
+    this.#checklist.project = this.#opinions.project = this.project;
     this.#work.replaceChildren(
-      h("div", { class: "stack" }, ...this.#choices),
       h("section", { class: "card cloud" }, this.#viewer),
+      h("details", { class: "card stack methods" }, this.#methods, ...this.#choices),
     );
     this.replaceChildren(
-      h("div", { class: "page" }, this.#head, this.#importing, this.#scan, this.#work, this.#members, this.#history),
+      h(
+        "div",
+        { class: "page" },
+        this.#head,
+        this.#news,
+        this.#importing,
+        this.#upload,
+        this.#scan,
+        this.#work,
+        this.#checklist,
+        this.#lengths,
+        this.#opinions,
+        this.#members,
+        this.#history,
+      ),
+      this.#picker,
     );
     const { signal } = this;
+    this.#picker.addEventListener("change", () => this.#give(), { signal });
     for (const choice of this.#choices) {
       choice.addEventListener("choose", (event) => this.#choose(detailOf(event)), { signal });
     }
+    this.#lengths.addEventListener("rescaled", (event) => this.#draw(detailOf(event)), { signal });
     getSystem().then((system) => {
+      this.#upload.limit = system.max_upload_bytes;
       for (const choice of this.#choices) choice.backends = system[`${choice.seam}s`];
     }, sayError);
     live.addEventListener("project", () => this.#load(), { signal });
@@ -59,6 +96,24 @@ export class OverviewPage extends LiveElement {
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /** What may be done about a recording that is not here. @param {Project} project */
+  #missing(project) {
+    const made = project.counts.objects;
+    return h(
+      "p",
+      {},
+      made ? `Kept until it is here: ${counted(made, "object")}, and what people said. ` : "",
+      h("button", { type: "button", class: "primary", onClick: () => this.#picker.click() }, "Choose the recording"),
+    );
+  }
+
+  async #give() {
+    const file = this.#picker.files?.[0];
+    this.#picker.value = "";
+    const project = file && (await this.#upload.send(file, this.project));
+    if (project) this.#draw(project);
   }
 
   /** @param {{ seam: string, name: string }} chosen */
@@ -75,15 +130,27 @@ export class OverviewPage extends LiveElement {
   #draw(project) {
     if (project.id !== this.project) return;
     for (const choice of this.#choices) choice.chosen = project[choice.seam];
+    this.#methods.textContent = `Methods: ${SEAMS.map((seam) => project[seam])
+      .filter((name) => name !== "none")
+      .join(", ")}`;
     this.#job.job = project.status === "ready" ? null : project.job;
     const ready = project.status === "ready";
     const capture = ready ? project.capture : null;
-    this.#head.replaceChildren(h("h1", {}, project.name), nextStep(project));
+    this.#title.textContent = project.name;
+    this.#next.replaceChildren(exporting(project), " ", nextStep(project));
+    this.#assignee.name = project.assignee;
     this.#importing.hidden = ready;
-    this.#importing.replaceChildren(h("h2", {}, "Importing"), failure(project) ?? "", this.#job);
-    this.#scan.hidden = this.#work.hidden = !capture;
+    const missing = project.awaits_recording;
+    this.#importing.replaceChildren(
+      h("h2", {}, missing ? "The recording is missing" : "Importing"),
+      failure(project) ?? "",
+      ...(missing ? [this.#missing(project)] : []),
+      ...(project.job ? [this.#job] : []),
+    );
+    this.#scan.hidden = this.#work.hidden = this.#lengths.hidden = this.#opinions.hidden = !capture;
     if (capture) this.#drawScan(project, capture);
     this.#drawHistory();
+    this.#checklist.show(project);
     if (capture && !this.#shown) {
       this.#shown = true;
       this.#viewer.open(this.project, { mode: "cloud" });
@@ -127,7 +194,7 @@ export class OverviewPage extends LiveElement {
       "section",
       { class: "card stack" },
       h("h2", {}, "The recording"),
-      verdictCard(capture),
+      verdictCard(capture, project.notices.length),
       this.#registering(project, capture),
       h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
       list(project.notices),
@@ -178,25 +245,20 @@ export class OverviewPage extends LiveElement {
       const told = rows.length
         ? h("table", {}, h("tbody", {}, ...rows))
         : h("p", { class: "muted" }, "No one has changed anything yet.");
-      this.#history.replaceChildren(h("h2", {}, "History"), told);
+      const effort = h(
+        "a",
+        { href: `/api/projects/${this.project}/effort.csv`, download: "" },
+        "Clicks and minutes of each person and object, as a table",
+      );
+      this.#history.replaceChildren(
+        h("h2", {}, "History"),
+        told,
+        rows.length ? h("p", {}, effort, " (CSV; pauses beyond two minutes are left out)") : "",
+      );
     } catch (error) {
       sayError(error);
     }
   }
-}
-
-/**
- * @param {import("../api-types").HistoryEntry} entry
- * @param {number} now
- */
-function historyRow(entry, now) {
-  return h(
-    "tr",
-    {},
-    h("td", {}, entry.undone ? h("s", {}, entry.text) : entry.text),
-    h("td", { class: "muted" }, entry.who),
-    h("td", { class: "muted" }, ago(entry.at, now)),
-  );
 }
 
 /** @param {Project} project */
@@ -223,6 +285,12 @@ function failure(project) {
     h("strong", {}, project.error.message),
     project.error.hint ? ` — ${project.error.hint}` : "",
   );
+}
+
+/** @param {Project} project */
+function exporting(project) {
+  if (project.status !== "ready") return "";
+  return h("button", { type: "button", onClick: () => offerExport(project).catch(sayError) }, "Export…");
 }
 
 /** @param {Project} project */

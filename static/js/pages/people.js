@@ -1,8 +1,10 @@
-/** Who may sign in: an admin adds, changes and removes accounts; everybody changes their own password. */
+/** Who may sign in, and where jobs run: an admin adds, changes and removes accounts; everybody changes their own password. */
 
 import { addAccount, changeAccount, changePassword, getSystem, listAccounts, removeAccount } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
 import { AuditRecord } from "../elements/audit-record.js";
+import { HoneypotList } from "../elements/honeypot-list.js";
+import { SeatList } from "../elements/seat-list.js";
 import { say, sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
 import { ago } from "../lib/format.js";
@@ -11,9 +13,9 @@ import { ago } from "../lib/format.js";
 /** @typedef {import("../api-types").SystemInfo} SystemInfo */
 
 const ROLES = /** @type {const} */ ([
-  ["annotator", "clicks, names, runs, comments"],
-  ["reviewer", "and accepts, corrects, approves"],
-  ["admin", "and imports from this machine, deletes projects, manages people"],
+  ["annotator", "clicks and names objects, starts runs, comments"],
+  ["reviewer", "does that too; accepts, rejects and corrects results, approves a project"],
+  ["admin", "does that too; imports from this machine, deletes projects, manages accounts"],
 ]);
 const SHORTEST = 10;
 
@@ -22,10 +24,21 @@ export class PeoplePage extends LiveElement {
   #own = h("section", { class: "card stack", hidden: true });
   #all = h("section", { class: "card stack", hidden: true });
   #record = h("section", { class: "card stack", hidden: true });
+  #honeypots = h("section", { class: "card stack", hidden: true });
+  #seats = h("section", { class: "card stack", hidden: true });
 
   connected() {
     this.replaceChildren(
-      h("div", { class: "page people" }, h("header", {}, h("h1", {}, "People")), this.#all, this.#own, this.#record),
+      h(
+        "div",
+        { class: "page people" },
+        h("header", {}, h("h1", {}, "People"), h("a", { class: "button quiet", href: "/webhooks" }, "Webhooks")),
+        this.#all,
+        this.#own,
+        this.#honeypots,
+        this.#seats,
+        this.#record,
+      ),
     );
     getSystem().then((system) => this.#draw(system), sayError);
   }
@@ -37,6 +50,10 @@ export class PeoplePage extends LiveElement {
     this.#all.hidden = role !== "admin";
     this.#record.hidden = role !== "admin";
     this.#record.replaceChildren(...(role === "admin" ? [new AuditRecord()] : []));
+    this.#honeypots.hidden = role !== "admin";
+    this.#honeypots.replaceChildren(...(role === "admin" ? [new HoneypotList()] : []));
+    this.#seats.hidden = role !== "admin";
+    this.#seats.replaceChildren(...(role === "admin" ? [new SeatList()] : []));
     if (role === "admin") this.#load(account);
   }
 
@@ -102,7 +119,7 @@ export class PeoplePage extends LiveElement {
       { class: "row form" },
       h("label", {}, "Name", name),
       h("label", {}, "Role", role),
-      h("label", {}, `Password, from ${SHORTEST} characters`, password),
+      h("label", {}, `Password, at least ${SHORTEST} characters`, password),
       h("button", { type: "submit", class: "primary" }, icon("plus"), "Add"),
     );
     form.addEventListener("submit", (event) => {
@@ -120,7 +137,7 @@ export class PeoplePage extends LiveElement {
       "form",
       { class: "row form" },
       h("label", {}, "Old password", old),
-      h("label", {}, `New password, from ${SHORTEST} characters`, fresh),
+      h("label", {}, `New password, at least ${SHORTEST} characters`, fresh),
       h("button", { type: "submit" }, "Change it"),
     );
     form.addEventListener("submit", (event) => {
@@ -195,7 +212,7 @@ function askForPassword(name) {
       h(
         "form",
         { method: "dialog", class: "stack" },
-        h("label", {}, `${SHORTEST} characters or more; tell it to ${name} yourself`, field),
+        h("label", {}, `At least ${SHORTEST} characters; give it to ${name} yourself`, field),
         h(
           "div",
           { class: "row" },

@@ -4,20 +4,26 @@ import {
   cancelUpload,
   changeProject,
   deleteProject,
+  duplicateProject,
   getSystem,
   listProjects,
+  listTemplates,
   listUploads,
   makeSample,
-  uploadRecording,
+  restoreProject,
+  setChecklist,
 } from "../api.js";
-import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
 import { matches } from "../lib/filter.js";
 import { FolderDialog } from "../elements/folder-dialog.js";
-import { stateChip as stateOf } from "../elements/review-state.js";
+import { askForText } from "../elements/ask-dialog.js";
+import { projectCard } from "../elements/project-card.js";
 import { say, sayError } from "../elements/toasts.js";
+import { TrashList } from "../elements/trash-list.js";
 import { UnknownList } from "../elements/unknown-list.js";
+import { UploadCard } from "../elements/upload-card.js";
 import { Answers } from "../lib/answers.js";
-import { ago, bytes, counted } from "../lib/format.js";
+import { bytes } from "../lib/format.js";
 import { live } from "../live.js";
 import { go } from "../router.js";
 
@@ -33,7 +39,7 @@ const MANY = 4; // projects, from which they are searched through
 export class ProjectsPage extends LiveElement {
   #answers = new Answers();
   #cards = h("ul", { class: "cards" });
-  #upload = h("div", { class: "card", hidden: true });
+  #upload = new UploadCard();
   #stopped = h("ul", { class: "cards stopped", "aria-label": "Uploads that stopped" });
   #unknown = new UnknownList();
   #picker = h("input", { type: "file", accept: ".r3d,.zip", hidden: true, "aria-label": "Recording" });
@@ -50,11 +56,21 @@ export class ProjectsPage extends LiveElement {
       ["size", "Largest first"],
     ].map(([value, text]) => h("option", { value }, text ?? "")),
   );
+  #place = h(
+    "select",
+    { "aria-label": "Which projects" },
+    ...[
+      ["", "In work"],
+      ["archive", "Archived"],
+    ].map(([value, text]) => h("option", { value }, text ?? "")),
+  );
+  #trash = new TrashList();
   #count = h("span", { class: "muted", role: "status" });
-  #find = h("div", { class: "row find-projects", hidden: true }, this.#search, this.#sort, this.#count);
+  #find = h("div", { class: "row find-projects", hidden: true }, this.#place, this.#search, this.#sort, this.#count);
+  #template = h("select", {});
+  #templates = h("label", { class: "row", hidden: true }, "Objects to click", this.#template);
   #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
   #admin = true;
-  #limit = Infinity;
 
   connected() {
     this.replaceChildren(
@@ -66,6 +82,8 @@ export class ProjectsPage extends LiveElement {
           {},
           h("h1", {}, "Projects"),
           h("a", { class: "button quiet", href: "/people" }, "People"),
+          h("a", { class: "button quiet", href: "/templates" }, "Templates"),
+          this.#templates,
           h("button", { type: "button", onClick: () => this.#sample() }, "Sample kitchen"),
           this.#browse,
           h(
@@ -80,31 +98,53 @@ export class ProjectsPage extends LiveElement {
         this.#unknown,
         this.#find,
         this.#cards,
+        this.#trash,
       ),
       this.#picker,
       this.#folders,
     );
     const { signal } = this;
     this.#picker.addEventListener("change", () => this.#send(this.#picker.files?.[0]), { signal });
-    this.#folders.addEventListener("imported", (event) => go(`/p/${detailOf(event).id}`), { signal });
+    this.#folders.addEventListener("imported", (event) => this.#made(detailOf(event)), { signal });
     this.addEventListener("dragover", (event) => this.#dragging(event), { signal });
     this.addEventListener("dragleave", () => this.classList.remove("dropping"), { signal });
     this.addEventListener("drop", (event) => this.#drop(event), { signal });
     for (const type of ["projects", "project", "job"]) live.addEventListener(type, () => this.#load(), { signal });
     this.#search.addEventListener("input", () => this.#show(this.#projects), { signal });
-    this.#sort.addEventListener("change", () => this.#show(this.#projects), { signal });
+    for (const select of [this.#sort, this.#place])
+      select.addEventListener("change", () => this.#show(this.#projects), { signal });
+    this.#trash.addEventListener("trash", () => this.#show(this.#projects), { signal });
     getSystem().then((system) => this.#allow(system), sayError);
+    listTemplates(signal).then((templates) => this.#offer(templates), sayError);
     this.#load();
     this.#showStopped();
   }
 
+  /** What new projects may take over. @param {import("../api-types").Template[]} templates */
+  #offer(templates) {
+    this.#templates.hidden = !templates.length;
+    this.#template.replaceChildren(
+      h("option", { value: "" }, "no list"),
+      ...templates.map(({ id, name }) => h("option", { value: String(id) }, name)),
+    );
+  }
+
+  /** A new project, with the objects of the template that is chosen. @param {{ id: string }} project */
+  async #made({ id }) {
+    if (this.#template.value) await setChecklist(id, Number(this.#template.value)).catch(sayError);
+    go(`/p/${id}`);
+  }
+
   /** @param {import("../api-types").SystemInfo} system */
   #allow(system) {
-    this.#limit = system.max_upload_bytes;
+    this.#upload.limit = system.max_upload_bytes;
     this.#admin = system.role === "admin";
     this.#browse.hidden = !this.#admin;
-    if (this.#admin) this.#unknown.load();
-    else this.#load();
+    this.#load();
+    if (!this.#admin) return;
+    this.#unknown.load();
+    this.#place.append(h("option", { value: "trash" }, "Trash"));
+    this.#trash.open();
   }
 
   async #load() {
@@ -118,12 +158,34 @@ export class ProjectsPage extends LiveElement {
   /** @param {Project[]} projects last touched first */
   #show(projects) {
     this.#projects = projects;
-    this.#find.hidden = projects.length < MANY && !this.#search.value;
-    const found = projects.filter(({ name }) => matches(this.#search.value.trim(), [name]));
+    const place = this.#place.value;
+    const typed = this.#search.value.trim();
+    const here = projects.filter(({ archived }) => archived === (place === "archive"));
+    const found = here.filter(({ name, tags }) => matches(typed, [name, ...tags]));
     const order = ORDERS[this.#sort.value];
     const sorted = order ? found.toSorted(order) : found;
-    this.#count.textContent = `${found.length} of ${projects.length}`;
-    this.#cards.replaceChildren(...(projects.length ? sorted.map((project) => this.#card(project)) : [this.#empty()]));
+    const set = typed || place;
+    const used = set || this.#find.contains(document.activeElement);
+    this.#find.hidden = projects.length < MANY && !used && here.length === projects.length && !this.#trash.size;
+    this.#count.textContent = `${found.length} of ${here.length}`;
+    this.#trash.hidden = place !== "trash";
+    for (const each of [this.#search, this.#sort, this.#count, this.#cards]) each.hidden = place === "trash";
+    const nothing = place ? h("li", { class: "muted none" }, "Nothing is archived.") : this.#empty();
+    const card = (/** @type {Project} */ project) =>
+      projectCard(project, {
+        admin: this.#admin,
+        act: (act) => this.#act(act, project),
+        find: (tag) => this.#look(tag),
+      });
+    renew(this.#cards, ...(here.length || set ? sorted.map(card) : []), ...(here.length ? [] : [nothing]));
+  }
+
+  /** @param {string} typed */
+  #look(typed) {
+    this.#search.value = typed;
+    this.#show(this.#projects);
+    this.#find.hidden = false;
+    this.#search.focus();
   }
 
   #empty() {
@@ -137,7 +199,7 @@ export class ProjectsPage extends LiveElement {
         h(
           "p",
           { class: "muted" },
-          "Drop a scan here: Record3D's .r3d, or a zip of what Stray Scanner, Polycam or another RGB-D app or dataset exports.",
+          "Drop a scan here: Record3D's .r3d, a zip of what Stray Scanner, Polycam or another RGB-D app or dataset exports, or a project's file from another server.",
         ),
         h("p", { class: "muted" }, "Or try everything on a kitchen made for it."),
         h(
@@ -150,47 +212,9 @@ export class ProjectsPage extends LiveElement {
     );
   }
 
-  /** @param {Project} project */
-  #card(project) {
-    const { counts, job } = project;
-    const busy = job && ["queued", "running", "cancelling"].includes(job.state) ? job : null;
-    const facts = project.frame_count ? counted(project.frame_count, "frame") : "";
-    const thumb = project.thumbnail
-      ? h("img", { class: "thumb", src: project.thumbnail, alt: "", loading: "lazy" })
-      : h("div", { class: "thumb" });
-    const what = [facts, counted(counts.objects, "object")];
-    const line = [bytes(project.size_bytes), ago(project.updated, Date.now() / 1000)];
-    return h(
-      "li",
-      { class: "card" },
-      thumb,
-      h(
-        "div",
-        { class: "body" },
-        h("h2", {}, h("a", { href: `/p/${project.id}` }, project.name)),
-        h("div", { class: "row" }, stateChip(project), reviewChip(project)),
-        busy ? h("progress", { value: busy.progress, max: 1, "aria-label": `${busy.kind} ${project.name}` }) : null,
-        h("div", { class: "muted" }, what.filter(Boolean).join(" · "), h("br"), line.filter(Boolean).join(" · ")),
-        h(
-          "div",
-          { class: "row acts" },
-          h("button", { type: "button", class: "quiet", onClick: () => this.#rename(project) }, "Rename"),
-          this.#admin
-            ? h(
-                "button",
-                { type: "button", class: "quiet danger", onClick: () => this.#delete(project) },
-                icon("trash"),
-                "Delete",
-              )
-            : null,
-        ),
-      ),
-    );
-  }
-
   async #sample() {
     try {
-      go(`/p/${(await makeSample({})).id}`);
+      await this.#made(await makeSample({}));
     } catch (error) {
       sayError(error);
     }
@@ -213,31 +237,9 @@ export class ProjectsPage extends LiveElement {
   async #send(file) {
     this.#picker.value = "";
     if (!file) return;
-    if (file.size > this.#limit) {
-      const hint = "put it on this machine and import it by its path";
-      return say(`${file.name} is ${bytes(file.size)}; uploads end at ${bytes(this.#limit)}`, { kind: "bad", hint });
-    }
-    const controller = new AbortController();
-    const bar = h("progress", { value: 0, max: 1, "aria-label": `Uploading ${file.name}` });
-    const state = h("span", { class: "muted", role: "status" });
-    const stop = h("button", { type: "button", onClick: () => controller.abort() }, "Stop");
-    this.#upload.replaceChildren(
-      h("div", { class: "row" }, `Uploading ${file.name}, ${bytes(file.size)}`, state, stop),
-      bar,
-    );
-    this.#upload.hidden = false;
     this.#stopped.replaceChildren();
-    /** @param {number} fraction @param {boolean} waiting */
-    const show = (fraction, waiting) => {
-      bar.value = fraction;
-      state.textContent = waiting ? "no connection: it goes on by itself" : fraction === 1 ? "looking at it…" : "";
-    };
-    try {
-      go(`/p/${(await uploadRecording(file, show, controller.signal)).id}`);
-    } catch (error) {
-      if (!controller.signal.aborted) sayError(error);
-    }
-    this.#upload.hidden = true;
+    const project = await this.#upload.send(file);
+    if (project) await this.#made(project);
     this.#showStopped();
   }
 
@@ -277,52 +279,51 @@ export class ProjectsPage extends LiveElement {
     );
   }
 
-  /** @param {Project} project */
-  async #rename(project) {
-    const name = prompt("Name of the project", project.name)?.trim();
-    if (!name || name === project.name) return;
-    await changeProject(project.id, { name }).catch(sayError);
+  /** @type {Record<import("../elements/project-card.js").Act, (project: Project) => Promise<unknown>>} */
+  #acts = {
+    rename: async ({ id, name }) => {
+      const wanted = prompt("Name of the project", name)?.trim();
+      if (wanted && wanted !== name) await changeProject(id, { name: wanted });
+    },
+    tag: async ({ id, name, tags }) => {
+      const label = "Words to find it by, with commas between them";
+      const given = await askForText(`Tags of ${name}`, label, {
+        button: "Keep",
+        required: false,
+        value: tags.join(", "),
+      });
+      if (given !== null)
+        await changeProject(id, {
+          tags: given
+            .split(",")
+            .map((tag) => tag.trim())
+            .filter(Boolean),
+        });
+    },
+    duplicate: async ({ id, name }) => {
+      const copy = await duplicateProject(id);
+      const offer = { text: "Open it", run: () => go(`/p/${copy.id}`) };
+      say(`${name} is duplicated`, { kind: "good", hint: copy.name, offer });
+    },
+    export: async (project) => (await import("../elements/export-dialog.js")).offerExport(project), // few ask for it
+    archive: async ({ id, name, archived }) => {
+      await changeProject(id, { archived: !archived });
+      const undo = () => changeProject(id, { archived }).then(() => this.#load(), sayError);
+      say(archived ? `${name} is in work again` : `${name} is archived`, { offer: { text: "Undo", run: undo } });
+    },
+    delete: async ({ id, name }) => {
+      await deleteProject(id);
+      const undo = () => restoreProject(id).then(() => this.#load(), sayError);
+      say(`${name} is in the trash`, { hint: "All of it is kept there.", offer: { text: "Undo", run: undo } });
+    },
+  };
+
+  /**
+   * @param {import("../elements/project-card.js").Act} act
+   * @param {Project} project
+   */
+  async #act(act, project) {
+    await this.#acts[act](project).catch(sayError);
     this.#load();
   }
-
-  /** @param {Project} project */
-  async #delete(project) {
-    if (!confirm(`Delete “${project.name}” with its recording, clicks and bundles? This cannot be undone.`)) return;
-    try {
-      const { freed_bytes } = await deleteProject(project.id);
-      say(`Deleted ${project.name}: ${bytes(freed_bytes)} freed`);
-    } catch (error) {
-      sayError(error);
-    }
-    this.#load();
-  }
-}
-
-/** @param {Project} project */
-function stateChip(project) {
-  if (project.status === "failed") return h("span", { class: "chip bad" }, "import failed");
-  if (project.status === "importing") return h("span", { class: "chip" }, "importing…");
-  if (project.job?.kind === "run" && ["queued", "running"].includes(project.job.state))
-    return h("span", { class: "chip" }, "running…");
-  if (project.result === "current") {
-    const passed = project.bundle?.passed;
-    return h(
-      "span",
-      { class: `chip ${passed ? "good" : "warn"}` },
-      passed ? "bundle certified" : "bundle with findings",
-    );
-  }
-  if (project.result === "stale") return h("span", { class: "chip warn" }, "changed since the last run");
-  return h("span", { class: "chip" }, project.counts.objects ? "annotating" : "new");
-}
-
-/** Where it stands between annotator and reviewer, and what waits for an answer. @param {Project} project */
-function reviewChip(project) {
-  const open = project.counts.open_comments;
-  return h(
-    "span",
-    { class: "row" },
-    stateOf(project.review_state),
-    open ? h("span", { class: "chip warn" }, counted(open, "open comment")) : "",
-  );
 }

@@ -5,6 +5,7 @@ import { CommentList } from "../elements/comment-list.js";
 import { ReviewState } from "../elements/review-state.js";
 import { say } from "../elements/toasts.js";
 import { Commands, isForPage } from "../keyboard.js";
+import { stageWord } from "../lib/words.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { Centre } from "../review/centre.js";
@@ -43,7 +44,8 @@ export class ReviewPage extends LiveElement {
   );
 
   connected() {
-    for (const part of [this.#objects, this.#state, this.#comments, this.#centre.photos]) part.project = this.project;
+    const { photos, compare } = this.#centre;
+    for (const part of [this.#objects, this.#state, this.#comments, photos, compare]) part.project = this.project;
     const left = h("div", { class: "objects" }, this.#state, this.#nav, this.#comments);
     this.replaceChildren(h("div", { class: "review" }, left, this.#centre.element, this.#panel));
     this.#listen();
@@ -74,8 +76,12 @@ export class ReviewPage extends LiveElement {
     on(this.#objects, "change", () => (this.#drawNav(), this.#centre.aboutObject()));
     on(this.#centre, "about", () => this.#drawPanel());
     on(this.#centre, "pin", (pin) => this.#comment(pin));
+    on(this.#centre, "mark", (mark) => this.#decisions.mark(mark));
     on(this.#centre, "store", (patch) => this.#decisions.correct(patch));
+    on(this.#centre.compare, "show-candidate", (candidate) => this.#showCandidate(candidate));
+    on(this.#centre.compare, "judge", ({ candidate, said }) => this.#decisions.judge(candidate, said));
     on(this.#decisions, "stored", (stored) => this.#stored(stored));
+    on(this.#decisions, "undone", () => this.#centre.show());
     on(this.#comments, "comments", (open) => this.#centre.photos.setComments(open));
     on(this.#comments, "show-comment", (comment) => this.#showComment(comment));
     on(live, "review", again);
@@ -94,9 +100,11 @@ export class ReviewPage extends LiveElement {
   }
 
   #drawNav() {
-    const choose = (/** @type {number} */ object) => this.#objects.choose(object);
-    const { groups, object } = this.#objects;
-    renew(this.#nav, ...objectNav(groups, { current: object, project: this.project, choose }));
+    const bringBack = (/** @type {{ name: string, run_name: string }} */ item) =>
+      this.#decisions.correctMade(item, { left_out: null });
+    const copy = (/** @type {Partial<import("../api-types").OverridePatch>} */ patch, /** @type {number[]} */ to) =>
+      this.#decisions.copy(patch, to);
+    renew(this.#nav, ...objectNav(this.#objects, bringBack, copy));
   }
 
   /** Only when something in it changed: a number may be half typed. */
@@ -127,18 +135,21 @@ export class ReviewPage extends LiveElement {
   #stored({ object, job }) {
     if (job) this.#hear(job);
     if (object === this.#objects.object) this.#centre.mover.drop();
+    this.#centre.show(); // what geometry can show of it, before any run
   }
 
   /** @param {Partial<CommentIn>} pin */
-  #comment(pin = {}) {
+  async #comment(pin = {}) {
     const { number, group } = this.#objects;
-    this.#comments.ask({ ...pin, object: number }, group?.name ?? "the project");
+    const view = pin.frame === undefined ? await this.#centre.kept().catch(() => null) : null; // a view that is down is not kept
+    this.#comments.ask({ ...pin, object: number, view }, group?.name ?? "the project");
   }
 
   /** @param {Comment} comment */
-  #showComment({ object, point_world: point }) {
+  #showComment({ object, point_world: point, view }) {
     if (object !== null) this.#objects.choose(object);
-    if (point) this.#centre.bar.set("scene");
+    if (view) this.#centre.restore(view);
+    else if (point) this.#centre.bar.set("scene");
   }
 
   /** @param {Job} job */
@@ -146,7 +157,7 @@ export class ReviewPage extends LiveElement {
     if (job.project !== this.project || job.kind !== "run") return;
     const { bar } = this.#centre;
     bar.job.hidden = !["queued", "running"].includes(job.state);
-    bar.job.textContent = `running ${job.stage} ${Math.round(100 * job.progress)} %`;
+    bar.job.textContent = `${stageWord(job.stage)}… ${Math.round(100 * job.progress)} %`;
     if (job.state === "done") this.#objects.load().then(() => this.#centre.show());
     if (job.state === "failed" && job.error) say(job.error.message, { kind: "bad", hint: job.error.hint });
   }

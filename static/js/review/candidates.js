@@ -33,8 +33,8 @@ export function choice(group) {
   );
 }
 
-/** @param {CandidateGroup} group */
-function ranked(group) {
+/** Its candidates, the one that is used first. @param {CandidateGroup} group */
+export function ranked(group) {
   const place = new Map(group.ranking.map((id, k) => [id, k]));
   /** @type {(candidate: Candidate) => number} */
   const order = ({ id }) => (id === group.chosen ? -1 : (place.get(id) ?? group.ranking.length));
@@ -80,7 +80,7 @@ function card(group, candidate, current, told) {
 }
 
 /** The figures in a line; those that are doubtful stand out. @param {Candidate} candidate */
-function evidence({ metrics, watertight, faces, generator }) {
+export function evidence({ metrics, watertight, faces, generator }) {
   /** @type {[string, boolean][]} text, and whether it is a warning */
   const figures = [];
   if (metrics.mask_iou !== undefined)
@@ -90,7 +90,8 @@ function evidence({ metrics, watertight, faces, generator }) {
   }
   if (metrics.seen_fraction !== undefined) figures.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
   if (metrics.extent_middle !== undefined && metrics.extent_short !== undefined) {
-    figures.push([`proportions 1 : ${metrics.extent_middle.toFixed(2)} : ${metrics.extent_short.toFixed(2)}`, false]);
+    const [middle, short] = [metrics.extent_middle, metrics.extent_short].map((side) => Math.round(100 * side));
+    figures.push([`sides 100 %, ${middle} %, ${short} % of the longest`, false]);
   }
   figures.push(
     [watertight ? "watertight" : "not watertight", !watertight],
@@ -112,7 +113,7 @@ function evidence({ metrics, watertight, faces, generator }) {
  * @param {"accepted" | "rejected"} said
  * @param {Told} told
  */
-function verdict(candidate, said, told) {
+export function verdict(candidate, said, told) {
   const [name, text] = said === "accepted" ? ["check", "Accept"] : ["cross", "Reject"];
   const button = h(
     "button",

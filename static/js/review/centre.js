@@ -1,27 +1,35 @@
 /**
  * The middle of the review: the object over its photos, or in the 3D view with its joints and the handles that move it.
- * Says "pin" {frame, x, y} where a comment is wanted, "store" {patch} when the object is to stay where it was moved, "about" when
+ * Says "pin" {frame, x, y} where a comment is wanted, "mark" {leaf, frame, value} where a leaf was said to stand so far open, "store" {patch} when the object is to stay where it was moved, "about" when
  * it is known whether it can be moved.
  */
 
-import { moveJoints, placeInViewer } from "../api.js";
+import { addLength, getPicked, getViewerCamera, moveJoints, placeInViewer } from "../api.js";
 import { detailOf, h } from "../dom.js";
+import { askForText } from "../elements/ask-dialog.js";
 import { PhotoCheck } from "../elements/photo-check.js";
-import { say } from "../elements/toasts.js";
+import { say, sayError } from "../elements/toasts.js";
 import { ViewerFrame } from "../elements/viewer-frame.js";
+import { offBy, parseLength } from "../lib/lengths.js";
+import { CandidateCompare } from "./compare.js";
+import { REVIEWERS } from "./decisions.js";
 import { JointPanel } from "./joint-panel.js";
 import { Mover } from "./mover.js";
 import { Paced } from "./paced.js";
+import { reading, withPoint } from "./tape.js";
 import { ViewBar } from "./view-bar.js";
 
 /** @typedef {import("../api-types").ViewerShow} ViewerShow */
 /** @typedef {import("../api-types").ViewerShown} ViewerShown */
 
 const MOVE_MS = 100;
+const PICK_MS = 150;
+const PICK_TRIES = 40;
 
 export class Centre extends EventTarget {
   bar = new ViewBar();
   photos = new PhotoCheck();
+  compare = new CandidateCompare();
   mover = new Mover();
   joints = new JointPanel((values) => this.#turn.add(values));
   #viewer = new ViewerFrame();
@@ -29,13 +37,18 @@ export class Centre extends EventTarget {
   #turn = new Paced(MOVE_MS, (/** @type {Record<string, number>} */ values) => moveJoints(this.#project, values));
   #place = new Paced(MOVE_MS, (/** @type {{ pose?: number[][] }} */ { pose }) => this.#drag(pose ?? null));
   #open = false; // nothing is shown before it is known what there is
+  /** @type {number[][]} */
+  #tape = [];
+  #picked = 0; // clicks in the 3D view that were answered
   #handles = false; // whether the 3D view has them
   element = h(
     "div",
     { class: "centre" },
     this.bar.element,
+    this.bar.below,
     this.#viewer,
     this.photos,
+    this.compare,
     this.joints.element,
     this.mover.element,
   );
@@ -51,9 +64,16 @@ export class Centre extends EventTarget {
     /** @type {(target: EventTarget, type: string, act: (detail: any) => void) => void} */
     const on = (target, type, act) => target.addEventListener(type, (event) => act(detailOf(event)), { signal });
     on(this.bar, "change", () => this.show());
+    on(this.bar, "measure", () => this.#measure([]));
+    on(this.bar, "keep-length", () => this.#keepLength().catch(sayError));
+    on(this.bar, "look", (look) => this.look(look));
+    on(this.#objects, "hide", () => this.bar.mode === "scene" && this.show());
+    on(this.#viewer, "clicked", () => !this.bar.moving && this.#pick().catch(sayError));
     on(this.mover, "shown", () => this.#drawMover());
     on(this.mover, "moved", () => this.#follow());
     on(this.mover, "store", (patch) => this.dispatchEvent(new CustomEvent("store", { detail: patch })));
+    on(this.compare, "seek-photo", (frame) => (this.photos.seek(frame), this.bar.set("photo")));
+    on(this.photos, "mark", (mark) => this.dispatchEvent(new CustomEvent("mark", { detail: mark })));
     on(this.photos, "pin-point", (pin) => this.dispatchEvent(new CustomEvent("pin", { detail: pin })));
     on(this.#viewer, "dragging", () => this.#handles && this.#place.add({}));
     on(this.#viewer, "shown", (shown) => this.#shown(shown));
@@ -68,38 +88,109 @@ export class Centre extends EventTarget {
     this.#viewer.open(this.#project, this.#wanted);
   }
 
-  /** Another object is looked at: on its photos rather than in the whole scene. */
+  /** Another object is looked at, as the one before was; what was made from the scan has no photos and no candidates. */
   turnTo() {
     this.bar.moving = false;
-    if (this.#open) this.bar.set(["scene", "cloud"].includes(this.bar.mode) ? "photo" : this.bar.mode);
+    const onlyInScene = this.#objects.madeName && !["scene", "cloud"].includes(this.bar.mode);
+    if (this.#open) this.bar.set(onlyInScene ? "scene" : this.bar.mode);
   }
 
   async show() {
     if (!this.#open) return;
-    const photo = this.bar.mode === "photo";
-    this.#viewer.hidden = photo;
-    this.photos.hidden = !photo;
+    const { mode, isSolid } = this.bar;
+    this.#viewer.hidden = !isSolid;
+    this.photos.hidden = mode !== "photo";
+    this.compare.hidden = mode !== "compare";
     if (this.bar.mode !== "scene") this.joints.element.hidden = true;
     this.#handles = false;
     this.#drawMover();
-    if (!photo) this.#viewer.show(this.#wanted);
+    if (isSolid) this.#viewer.show(this.#wanted);
+    if (mode === "compare") this.#compare();
     if (this.#objects.number === null) return;
     await this.photos.show(this.#objects.number);
     this.aboutObject();
   }
 
+  #compare() {
+    this.compare.judges = this.#objects.judges;
+    this.compare.show(this.#objects.group);
+  }
+
   /** What is known of the object changed: its box may be moved, once there is one. */
   aboutObject() {
     const { group, object } = this.#objects;
+    if (this.#open && this.bar.mode === "compare") this.#compare();
+    this.photos.about(object, group?.override.states ?? {}, this.#objects.judges ? "" : REVIEWERS);
     this.mover.about(group, this.photos.boxOf(object));
     this.bar.offer(this.mover.box !== null);
     this.#drawMover();
     this.dispatchEvent(new Event("about"));
   }
 
-  /** Turn the camera to the chosen object, or back to where all of the scene is seen. @param {"object" | "scene"} look */
+  /** What the click in the 3D view was on is looked at. */
+  async #pick() {
+    for (let tries = 0; tries < PICK_TRIES; tries++) {
+      const { number, object, name, point } = await getPicked(this.#project);
+      if (number !== this.#picked) {
+        this.#picked = number;
+        if (this.bar.measuring) return void (point && this.#measure(withPoint(this.#tape, point)));
+        if (object !== null && this.#objects.groups.some((group) => group.object === object))
+          this.#objects.choose(object);
+        else if (name) this.#objects.chooseMade(name);
+        return;
+      }
+      await new Promise((after) => setTimeout(after, PICK_MS)); // the click goes to the 3D view on a way of its own
+    }
+  }
+
+  /** @param {number[][]} points that the tape goes between */
+  #measure(points) {
+    this.#tape = points;
+    this.bar.read(reading(points), points.length === 2);
+    this.show();
+  }
+
+  /** What a tape says in the room of the length between the two points. */
+  async #keepLength() {
+    const [points, typed] = [
+      this.#tape,
+      await askForText("True length", "What does a tape say in the room? In mm, then what it is of", {
+        button: "Keep",
+        value: "",
+      }),
+    ];
+    if (typed === null || points.length !== 2) return;
+    const found = parseLength(typed);
+    if (!found) return say(`“${typed}” is no length`, { kind: "bad", hint: "such as 596, or 596 mm worktop" });
+    const kept = await addLength(this.#project, { ...found, points_world: points });
+    const said = kept.lengths.at(-1);
+    say(`Kept: ${said?.text ?? ""}, ${said ? offBy(said) : ""}`, {
+      kind: "good",
+      hint: "all are on the Overview page",
+    });
+  }
+
+  /** Turn the camera to the chosen object, or back to where all of the scene is seen. @param {NonNullable<ViewerShow["look"]>} look */
   look(look) {
-    if (this.bar.mode !== "photo") this.#viewer.show({ ...this.#wanted, look });
+    if (!this.bar.isSolid) return;
+    const frame = this.photos.frame;
+    if (look === "photo" && frame === null) return say("There is no photo of it to look from: choose another object");
+    this.#viewer.show({ ...this.#wanted, look, frame });
+  }
+
+  /** How the 3D view is looked at now, for a comment; null where it is a photo. @returns {Promise<import("../api-types").ViewerLookInput | null>} */
+  async kept() {
+    if (!this.bar.isSolid) return null;
+    const camera = await getViewerCamera(this.#project);
+    return { ...this.bar.kept, hidden: this.#wanted.hidden, camera };
+  }
+
+  /** As somebody looked at it who said something. @param {import("../api-types").ViewerLookOutput} look */
+  restore(look) {
+    this.#objects.hideOnly(look.hidden);
+    this.bar.restore(look);
+    this.show();
+    this.#viewer.show({ ...this.#wanted, camera: look.camera });
   }
 
   /**
@@ -109,6 +200,13 @@ export class Centre extends EventTarget {
   nudge(key, fine) {
     if (!this.bar.moving) this.bar.move(true);
     this.mover.nudge(key, fine);
+  }
+
+  /** Say something of the leaves over the photo; where no photo is shown, it is shown first. @param {(marks: import("../elements/opening-marks.js").OpeningMarks) => void} act */
+  mark(act) {
+    if (this.bar.mode !== "photo") return this.bar.set("photo");
+    if (!this.photos.marks.leaves.length) return say("Nothing of it opens: there is nothing to mark");
+    act(this.photos.marks);
   }
 
   get #project() {
@@ -123,6 +221,9 @@ export class Centre extends EventTarget {
       ...look,
       mode,
       object: mode === "cloud" ? null : number,
+      made: (mode === "scene" && this.#objects.madeName) || null,
+      tape: this.bar.measuring && mode !== "candidate" ? this.#tape : [],
+      hidden: mode === "scene" ? [...this.#objects.hidden] : [],
       candidate: mode === "candidate" ? candidate || null : null,
       box: this.bar.moving ? /** @type {ViewerShow["box"]} */ (this.mover.box) : null,
     };
@@ -130,7 +231,7 @@ export class Centre extends EventTarget {
 
   /** @param {ViewerShown} shown */
   #shown(shown) {
-    this.bar.told(shown.reduced);
+    this.bar.told(shown);
     this.#handles = this.bar.moving && shown.mode === "aligned";
     this.joints.show(shown.joints, this.#objects.items);
     this.joints.element.hidden = this.bar.mode !== "scene" || !shown.joints.length;

@@ -1,7 +1,7 @@
 /** What can be done in the review by a key or from the palette, by the names of the keymap. */
 
 /** What a key held down must not do again and again. */
-export const ONE_A_PRESS = ["comment", "more", "accept", "reject"];
+export const ONE_A_PRESS = ["comment", "more", "accept", "reject", "mark-closed", "mark-open", "unmark"];
 
 /**
  * @param {object} doers
@@ -12,7 +12,7 @@ export const ONE_A_PRESS = ["comment", "more", "accept", "reject"];
  * @returns {import("../keyboard.js").Actions}
  */
 export function actionsOf({ objects, decisions, centre, comment }) {
-  const { bar, photos, joints, mover } = centre;
+  const { bar, photos, compare, joints, mover } = centre;
   return {
     accept: () => decisions.accept(),
     reject: () => decisions.reject(),
@@ -25,10 +25,29 @@ export function actionsOf({ objects, decisions, centre, comment }) {
     "next-photo": () => photos.move(1),
     "previous-photo": () => photos.move(-1),
     blink: () => photos.blink(true),
+    "mark-closed": () => centre.mark((marks) => marks.closed()),
+    "mark-open": () => centre.mark((marks) => marks.open()),
+    unmark: () => centre.mark((marks) => marks.remove()),
+    "turn-leaf": (key) => centre.mark((marks) => marks.step(key === "=" ? 1 : -1)),
+    "next-leaf": () => centre.mark((marks) => marks.next()),
     sweep: () => joints.sweep(objects.group?.name ?? null),
     "frame-object": () => centre.look("object"),
     "frame-scene": () => centre.look("scene"),
+    "look-front": () => centre.look("front"),
+    "look-top": () => centre.look("top"),
+    "look-left": () => centre.look("left"),
+    "look-right": () => centre.look("right"),
+    "look-run": () => centre.look("run"),
+    "look-photo": () => centre.look("photo"),
+    section: () => bar.clip.toggle(),
+    measure: () => bar.toggleMeasure(),
+    parallel: () => bar.toggleParallel(),
+    "select-object": () => objects.number !== null && objects.toggleSelected(objects.object),
+    "hide-object": () => objects.shownName && objects.hide(objects.shownName, !objects.hidden.has(objects.shownName)),
+    "solo-object": () => objects.solo(),
     "view-candidate": () => bar.set("candidate"),
+    "view-compare": () => bar.set("compare"),
+    "spin-candidates": () => (bar.set("compare"), compare.spin()),
     "view-aligned": () => bar.set("aligned"),
     "view-scene": () => bar.set("scene"),
     "view-cloud": () => bar.set("cloud"),
@@ -36,6 +55,6 @@ export function actionsOf({ objects, decisions, centre, comment }) {
     "move-object": () => bar.move(!bar.moving),
     nudge: (key, fine) => centre.nudge(key, fine),
     "store-move": () => bar.moving && mover.store(),
-    "drop-move": () => bar.moving && mover.drop(),
+    "drop-move": () => (bar.moving ? mover.drop() : photos.marks.drop()),
   };
 }

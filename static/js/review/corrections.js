@@ -7,16 +7,24 @@ import { slidesSideways } from "../lib/joints.js";
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 
+/**
+ * @typedef {object} Kinds what it may be
+ * @property {import("../api-types").Category[]} categories
+ * @property {(category: string) => void} categorise
+ * @property {(template: string | null) => void} buildAs
+ */
+
+const OPENS = { revolute: "turns", prismatic: "slides", none: "does not open" };
 const SIDES = /** @type {const} */ (["automatic", "left", "right", "top", "bottom"]);
 const DEGREES = Math.PI / 180;
 
 /**
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
- * @param {{ move: (() => void) | null, open: boolean, judges: boolean }} how `move` begins to move it: null where there is no box yet
+ * @param {{ move: (() => void) | null, open: boolean, judges: boolean } & Kinds} how `move` begins to move it: null where there is no box yet
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
-export function corrections(group, item, { move, open, judges }, change) {
+export function corrections(group, item, { move, open, judges, ...ask }, change) {
   const summary = h("summary", {}, "Correct it");
   summary.dataset.at = "correct:";
   return h(
@@ -26,6 +34,7 @@ export function corrections(group, item, { move, open, judges }, change) {
     h(
       "fieldset",
       { class: "stack plain", disabled: !judges },
+      ...kind(group, ask),
       side(group, item, change),
       ...limits(group, item, change),
       move && h("button", { type: "button", onClick: move }, "Move or resize it…"),
@@ -37,11 +46,43 @@ export function corrections(group, item, { move, open, judges }, change) {
 function hasCorrection({ override }) {
   return Boolean(
     override.hinge ||
+    override.built_as ||
     override.pose ||
     override.dimensions_m ||
     override.joint_upper ||
     Object.keys(override.joints).length,
   );
+}
+
+/**
+ * What it is called, and whose body and joints it takes: a drawer's, whatever it is called.
+ * @param {CandidateGroup} group
+ * @param {Kinds} kinds
+ */
+function kind(group, { categories, categorise, buildAs }) {
+  const known = h("datalist", { id: "known-categories" });
+  known.append(...categories.map(({ name, label }) => h("option", { value: name }, label)));
+  const field = h("input", {
+    value: group.category,
+    list: "known-categories",
+    "aria-label": `Category of ${group.name}`,
+  });
+  field.addEventListener("change", () => field.value.trim() && categorise(field.value.trim()));
+  const select = h("select", { "aria-label": `How ${group.name} opens` });
+  const said = group.override.built_as ?? "";
+  select.append(h("option", { value: "", selected: !said }, "as its category"));
+  for (const [joint, text] of Object.entries(OPENS)) {
+    const set = h("optgroup", { label: text });
+    const firsts = categories.filter((one, k) => categories.findIndex(({ label }) => label === one.label) === k); // aliases after
+    for (const { name, label } of firsts.filter((one) => one.joint === joint))
+      set.append(h("option", { value: name, selected: name === said }, label));
+    select.append(set);
+  }
+  select.addEventListener("change", () => buildAs(select.value || null));
+  return [
+    h("label", {}, h("span", { class: "muted" }, "Category"), field, known),
+    h("label", {}, h("span", { class: "muted" }, "Opens and is built as"), select),
+  ];
 }
 
 /**

@@ -1,15 +1,18 @@
 /**
  * What a person says about an object, sent through the outbox: verdicts, corrections, another mesh, taking it back.
- * Says "stored" {object, job} for every answer; job is the run that follows from it.
+ * Says "stored" {object, job} for every answer, job being the run that follows from it, and "undone" when something was taken back.
  */
 
-import { uploadCandidate } from "../api.js";
-import { changeOverride, giveVerdict, undoRedo } from "../changes.js";
+import { startRun, uploadCandidate } from "../api.js";
+import { changeFront, changeMade, changeOverride, giveVerdict, undoRedo } from "../changes.js";
 import { askForText } from "../elements/ask-dialog.js";
 import { say, sayError } from "../elements/toasts.js";
+import { copiedWords } from "../lib/copied.js";
+import { withMark } from "../lib/opening-marks.js";
 import { outbox } from "../outbox.js";
 
 /** @typedef {import("../api-types").Candidate} Candidate */
+/** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
 /** @typedef {import("../api-types").Reviewed} Reviewed */
 /** @typedef {"accepted" | "rejected"} Verdict */
@@ -18,6 +21,7 @@ export const REVIEWERS = "A reviewer accepts, rejects and corrects; you can comm
 
 export class Decisions extends EventTarget {
   #objects;
+  #marking = Promise.resolve();
 
   /** @param {import("./objects.js").ReviewObjects} objects */
   constructor(objects) {
@@ -68,6 +72,84 @@ export class Decisions extends EventTarget {
     if (group && this.#may()) this.#report(outbox.send(changeOverride(this.#project, group, patch)));
   }
 
+  /**
+   * How far a leaf stands open in a frame; null takes the mark back. One after the other: each adds to those before it.
+   * @param {{ leaf: import("../api-types").Leaf, frame: number, value: number | null }} mark
+   */
+  mark({ leaf, frame, value }) {
+    const { object } = this.#objects;
+    if (!this.#may()) return;
+    this.#marking = this.#marking.then(async () => {
+      await outbox.settled;
+      const group = this.#objects.groups.find((one) => one.object === object);
+      if (!group) return;
+      const states = withMark(group.override.states, leaf, frame, value);
+      await this.#report(outbox.send(changeOverride(this.#project, group, { states })));
+    });
+  }
+
+  /**
+   * Others take over what was said of the chosen one, in one run; each can be undone at that object.
+   * @param {Partial<OverridePatch>} patch
+   * @param {number[]} to
+   */
+  async copy(patch, to) {
+    if (!this.#may()) return;
+    const others = this.#objects.groups.filter((one) => to.includes(one.object) && differs(one, patch));
+    if (!others.length) return say("They have it already");
+    let job = null;
+    try {
+      for (const [k, one] of others.entries()) {
+        const rerun = k === others.length - 1;
+        const stored = await outbox.send(changeOverride(this.#project, one, { ...patch, rerun }));
+        if (stored.group) this.#objects.stored(one.object, stored.group.version);
+        job = stored.job ?? job;
+      }
+      say(`Copied ${copiedWords(patch)} to ${others.map(({ name }) => name).join(", ")}`, { kind: "good" });
+    } catch (error) {
+      sayError(error);
+    }
+    this.dispatchEvent(new CustomEvent("stored", { detail: { object: others[0]?.object, job } }));
+    await this.#objects.load();
+  }
+
+  /** What it is; results stay until the run that follows. @param {string} category */
+  async categorise(category) {
+    const { group } = this.#objects;
+    if (!group || !this.#may()) return;
+    try {
+      await outbox.send(
+        changeFront(this.#project, group.object, { category }, undefined, { category: group.category }),
+      );
+      say(`${group.name} is a ${category} from the next run on`, { kind: "good" });
+      const job = await startRun(this.#project);
+      this.dispatchEvent(new CustomEvent("stored", { detail: { object: group.object, job } }));
+      await this.#objects.load();
+    } catch (error) {
+      sayError(error);
+    }
+  }
+
+  /** Whose body and joints it takes, and so do all of its category where that is one of a person's own. @param {string | null} template */
+  async buildAs(template) {
+    const { group, groups, categories } = this.#objects;
+    if (!group || !this.#may()) return;
+    const isOwn = !categories.some(({ name }) => name === group.category);
+    const alike = groups.filter(
+      ({ object, category }) => object === group.object || (isOwn && category === group.category),
+    );
+    for (const one of alike)
+      await this.#report(outbox.send(changeOverride(this.#project, one, { built_as: template })));
+  }
+
+  /**
+   * @param {{ run_name: string, override?: import("../api-types").OverrideData }} item that was made from the scan
+   * @param {Partial<OverridePatch>} patch
+   */
+  correctMade(item, patch) {
+    if (this.#may()) this.#report(outbox.send(changeMade(this.#project, item, patch)));
+  }
+
   /** Another draw of candidates beside those that are there. */
   more() {
     const { group } = this.#objects;
@@ -96,6 +178,7 @@ export class Decisions extends EventTarget {
       const undone = await outbox.send(undoRedo(this.#project, which, wanted));
       this.#objects.stored(object, undone.version);
       say(`${which === "undo" ? "Undone" : "Redone"}: ${undone.text}`);
+      this.dispatchEvent(new Event("undone"));
     } catch (error) {
       sayError(error);
     }
@@ -130,6 +213,12 @@ export class Decisions extends EventTarget {
       return false;
     }
   }
+}
+
+/** Whether something of it is not said of the object yet. @param {CandidateGroup} group @param {Partial<OverridePatch>} patch */
+function differs({ override }, patch) {
+  const said = new Map(Object.entries(override));
+  return Object.entries(patch).some(([key, value]) => JSON.stringify(said.get(key)) !== JSON.stringify(value));
 }
 
 /** @param {Candidate} candidate */

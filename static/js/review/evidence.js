@@ -27,7 +27,7 @@ export function placement(placement, item) {
   ];
   if (item) rows.push(["W × D × H", `${item.dimensions_m.map(centimetres).join(" × ")} cm`]);
   if (item?.warp_residual_m)
-    rows.push(["Front corners", `${(1000 * item.warp_residual_m).toFixed(1)} mm off once fitted`]);
+    rows.push(["Front corners", `${(1000 * item.warp_residual_m).toFixed(1)} mm from the scan after the fit`]);
   return h(
     "div",
     { class: "stack" },
@@ -67,9 +67,17 @@ function joints(item) {
  * @param {string[]} names of all objects
  */
 export function findingsOf(certificate, name, names) {
-  const mine = (certificate?.findings ?? []).filter(({ where }) => owner(where, names) === name);
-  if (!mine.length) return "";
-  return findingList(mine);
+  const mine = findingsAbout(certificate, name, names);
+  return mine.length ? findingList(mine) : "";
+}
+
+/**
+ * @param {Certificate | null} certificate
+ * @param {string} name
+ * @param {string[]} names of all objects
+ */
+export function findingsAbout(certificate, name, names) {
+  return (certificate?.findings ?? []).filter(({ where }) => owner(where, names) === name);
 }
 
 /**

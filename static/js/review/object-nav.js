@@ -2,30 +2,80 @@
 
 import { h } from "../dom.js";
 import { counted } from "../lib/format.js";
+import { between } from "../lib/copied.js";
+import { copyBar } from "./copy-bar.js";
+import { eye, madeList } from "./scene-tree.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 
 /**
- * @param {CandidateGroup[]} groups
- * @param {{ current: number, project: string, choose: (object: number) => void }} view
+ * @param {import("./objects.js").ReviewObjects} objects
+ * @param {(item: { name: string, run_name: string }) => void} bringBack
+ * @param {(patch: Partial<import("../api-types").OverridePatch>, to: number[]) => void} copy
  */
-export function objectNav(groups, { current, project, choose }) {
+export function objectNav(objects, bringBack, copy) {
+  const { groups, project } = objects;
+  const current = objects.madeName ? null : objects.object;
+  const inScene = new Set(objects.items.map(({ run_name }) => run_name));
   const done = groups.filter((group) => group.accepted).length;
-  const items = groups.map((group) => {
+  const items = objects.ordered.map((group) => {
     const [text, tone] = standing(group);
     const button = h("button", { type: "button", "aria-pressed": String(group.object === current), title: group.name });
     button.dataset.at = `object:${group.object}`;
     button.append(h("span", { class: "name" }, group.name), text ? h("span", { class: `chip ${tone}` }, text) : "");
-    button.addEventListener("click", () => choose(group.object));
-    return h("li", {}, button);
+    if (group.assignee) button.append(h("span", { class: "chip", title: "assigned to" }, `@${group.assignee}`));
+    const why = objects.byRisk ? objects.risks.get(group.object)?.why : "";
+    if (why) button.append(h("span", { class: "risk muted" }, why));
+    button.addEventListener("click", (event) => press(objects, group.object, event));
+    button.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;
+      event.preventDefault();
+      objects.toggleSelected(group.object);
+    });
+    return h(
+      "li",
+      { class: `with-eye ${objects.selected.has(group.object) ? "selected" : ""}` },
+      button,
+      inScene.has(group.run_name) ? eye(objects, group) : "",
+    );
   });
   return [
     h("h1", {}, "Review"),
+    copyBar(objects, copy),
     h("p", { class: "muted" }, groups.length ? `${done} of ${counted(groups.length, "object")} accepted` : ""),
+    groups.length > 1 ? order(objects) : "",
     groups.length
       ? h("ul", {}, ...items)
       : h("p", {}, "Nothing to review yet. ", h("a", { href: `/p/${project}/run` }, "Run the pipeline")),
+    madeList(objects, bringBack),
   ];
+}
+
+/** @param {import("./objects.js").ReviewObjects} objects */
+function order(objects) {
+  const select = h(
+    "select",
+    {},
+    h("option", { value: "" }, "As annotated"),
+    h("option", { value: "risk" }, "Riskiest first"),
+  );
+  select.value = objects.byRisk ? "risk" : "";
+  select.dataset.at = "order:";
+  select.addEventListener("change", () => objects.order(select.value === "risk"));
+  return h("label", { class: "row order" }, h("span", { class: "muted" }, "Order"), select);
+}
+
+/**
+ * A press chooses it; with Ctrl it is selected beside others, with Shift all from the chosen one to it are.
+ * @param {import("./objects.js").ReviewObjects} objects
+ * @param {number} object
+ * @param {MouseEvent} event
+ */
+function press(objects, object, { ctrlKey, metaKey, shiftKey }) {
+  const order = objects.ordered.map((group) => group.object);
+  if (ctrlKey || metaKey) objects.toggleSelected(object);
+  else if (shiftKey) objects.select(between(order, objects.object, object));
+  else objects.choose(object);
 }
 
 /**

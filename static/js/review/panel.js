@@ -6,6 +6,7 @@ import { cards, choice } from "./candidates.js";
 import { corrections } from "./corrections.js";
 import { REVIEWERS } from "./decisions.js";
 import { findingsOf, placement } from "./evidence.js";
+import { madePanel } from "./made-panel.js";
 
 /** @typedef {import("../api-types").Candidate} Candidate */
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
@@ -26,7 +27,8 @@ import { findingsOf, placement } from "./evidence.js";
  * @returns {(Node | string)[]}
  */
 export function panel(objects, decisions, asked, correcting) {
-  const { group, item, groups, certificate, candidate } = objects;
+  const { group, item, groups, certificate, candidate, madeName } = objects;
+  if (madeName && item) return madePanel(item, objects.judges, (patch) => decisions.correctMade(item, patch));
   if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
   const names = groups.map(({ run_name }) => run_name);
   const { judges } = objects;
@@ -38,12 +40,30 @@ export function panel(objects, decisions, asked, correcting) {
     used ?? "",
     choice(group),
     group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
+    certificate && !certificate.current ? stale(certificate) : "",
     findingsOf(certificate, group.run_name, names),
-    corrections(group, item, { move: asked.move, open: correcting, judges }, (patch) => decisions.correct(patch)),
+    corrections(
+      group,
+      item,
+      {
+        move: asked.move,
+        open: correcting,
+        judges,
+        categories: objects.categories,
+        categorise: (category) => decisions.categorise(category),
+        buildAs: (template) => decisions.buildAs(template),
+      },
+      (patch) => decisions.correct(patch),
+    ),
     rest.length ? h("h3", {}, counted(rest.length, "other candidate")) : "",
     ...rest,
     others(group, decisions, asked, judges),
   ];
+}
+
+/** @param {import("../api-types").Certificate} certificate */
+function stale({ version }) {
+  return h("p", { class: "chip warn" }, `Findings of version ${version}, before the last change`);
 }
 
 /**

@@ -1,16 +1,40 @@
 /** What the middle of the review shows, and how. Says "change" when the person wants another view or another setting of it. */
 
 import { h, segments, slider } from "../dom.js";
+import { ClipPanel } from "./clip-panel.js";
+import { heatLegend } from "./heat-legend.js";
 
-/** @typedef {"candidate" | "aligned" | "photo" | "scene" | "cloud"} Mode */
+/** @typedef {"candidate" | "compare" | "aligned" | "photo" | "scene" | "cloud"} Mode */
 
 /** @type {[Mode, string][]} */
 const MODES = [
   ["photo", "Photos"],
+  ["compare", "Compare"],
   ["candidate", "Candidate"],
   ["aligned", "Over the scan"],
   ["scene", "Scene"],
   ["cloud", "Scan"],
+];
+
+/** @type {[NonNullable<import("../api-types").ViewerShow["draw"]>, string][]} */
+const DRAWN = [
+  ["meshes", "Meshes"],
+  ["wireframe", "Wireframe"],
+  ["colliders", "Colliders"],
+  ["both", "Meshes and colliders"],
+  ["distance", "Distance to the scan"],
+  ["unobserved", "Far from any observation"],
+];
+/** @type {[NonNullable<import("../api-types").ViewerShow["look"]>, string][]} */
+const SIDES = [
+  ["run", "front of its run"],
+  ["photo", "where its photo was taken"],
+  ["front", "front"],
+  ["back", "back"],
+  ["left", "left"],
+  ["right", "right"],
+  ["top", "above"],
+  ["bottom", "below"],
 ];
 
 export class ViewBar extends EventTarget {
@@ -21,35 +45,101 @@ export class ViewBar extends EventTarget {
   moving = false;
   full = false;
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "85", "aria-label": "Opacity of the mesh" });
-  #collision = h("input", { type: "checkbox" });
+  #draw_as = h("select", { "aria-label": "What is drawn of the scene" });
+  #look = h("select", { "aria-label": "Look from" });
+  #measure = toggle("Measure", () => this.toggleMeasure());
+  /** What the tape says. */
+  #reading = h("span", { class: "chip", role: "status", hidden: true });
+  #keep = toggle("Keep as true length…", () => this.dispatchEvent(new Event("keep-length")));
+  measuring = false;
+  clip = new ClipPanel();
+  #section = toggle("Section", () => this.clip.toggle());
+  /** What colours mean, and the box that is shown. */
+  below = h("div", { class: "below" });
+  #parallel = toggle("Parallel", () => this.toggleParallel());
+  #preview = h("span", { class: "chip warn", role: "status", hidden: true });
   #scan = h("input", { type: "checkbox" });
   #reduced = false;
+  #isParallel = false;
   #movable = false;
   #modes = MODES.map(([mode, text]) => ({ mode, button: toggle(text, () => this.set(mode)) }));
   #move = toggle("Move it", () => this.move(!this.moving));
   #all = toggle("All points", () => ((this.full = !this.full), this.#say()));
   #see = slider("Opacity", this.#opacity);
-  #inScene = [this.#collision, this.#scan].map((input, k) =>
-    h("label", { class: "row" }, input, ["Colliders", "Scan"][k]),
-  );
+  #inScene = [this.#draw_as, h("label", { class: "row" }, this.#scan, "Scan")];
 
   constructor() {
     super();
-    for (const input of [this.#opacity, this.#collision, this.#scan])
-      input.addEventListener("change", () => this.#say());
+    this.#draw_as.append(...DRAWN.map(([value, text]) => h("option", { value }, text)));
+    this.#look.append(
+      h("option", { value: "" }, "Look from…"),
+      ...SIDES.map(([side, text]) => h("option", { value: side }, text)),
+    );
+    for (const input of [this.#opacity, this.#draw_as, this.#scan]) input.addEventListener("change", () => this.#say());
+    this.#look.addEventListener("change", () => {
+      if (this.#look.value) this.dispatchEvent(new CustomEvent("look", { detail: this.#look.value }));
+      this.#look.value = "";
+    });
+    this.#section.title = "Cut the scene and the scan by a box, to look inside";
+    this.clip.addEventListener("change", () => this.#say());
+    this.#parallel.title = "Seen from so far off, through a long lens, that parallel lines stay parallel";
     const modes = segments("View", ...this.#modes.map(({ button }) => button));
     const spring = h("span", { class: "spring" });
-    this.element.append(modes, spring, this.job, this.#move, this.#all, this.#see, ...this.#inScene);
+    this.element.append(
+      modes,
+      spring,
+      this.#preview,
+      this.job,
+      this.#move,
+      this.#all,
+      this.#see,
+      ...this.#inScene,
+      this.#look,
+      this.#parallel,
+      this.#section,
+      this.#measure,
+      this.#reading,
+      this.#keep,
+    );
+    this.#draw();
+  }
+
+  /** Whether the middle is the 3D view. */
+  get isSolid() {
+    return this.mode !== "photo" && this.mode !== "compare";
+  }
+
+  /** Whether what is shown has an inside. */
+  get #inside() {
+    return this.mode === "scene" || this.mode === "cloud";
+  }
+
+  /** What a comment keeps of how it is looked at. @returns {Omit<import("../api-types").ViewerLookInput, "camera" | "hidden">} */
+  get kept() {
+    const { mode, cloud, opacity, draw, parallel, clip } = this.wish;
+    return { mode, cloud, opacity, draw: draw ?? "meshes", parallel, clip };
+  }
+
+  /** As somebody looked at it. @param {import("../api-types").ViewerLookOutput} look */
+  restore({ mode, draw, cloud, opacity, parallel, clip }) {
+    this.mode = mode;
+    this.#draw_as.value = draw;
+    if (mode === "scene") this.#scan.checked = cloud;
+    this.#opacity.value = String(100 * opacity);
+    this.#isParallel = parallel;
+    this.clip.restore(clip);
     this.#draw();
   }
 
   /** What is asked of the 3D view. */
   get wish() {
     return {
-      mode: this.mode === "photo" ? /** @type {const} */ ("aligned") : this.mode,
+      mode: this.mode === "photo" || this.mode === "compare" ? /** @type {const} */ ("aligned") : this.mode,
       cloud: this.mode === "scene" ? this.#scan.checked : this.mode !== "candidate",
       opacity: Number(this.#opacity.value) / 100,
-      collision: this.#collision.checked,
+      draw: /** @type {import("../api-types").ViewerShow["draw"]} */ (this.#draw_as.value),
+      parallel: this.#isParallel,
+      clip: this.#inside ? this.clip.wish : null,
       full: this.full,
     };
   }
@@ -77,9 +167,31 @@ export class ViewBar extends EventTarget {
     this.#draw();
   }
 
-  /** @param {boolean} reduced whether the 3D view left something out */
-  told(reduced) {
+  toggleMeasure() {
+    this.measuring = !this.measuring;
+    this.#reading.hidden = !this.measuring;
+    this.dispatchEvent(new Event("measure"));
+    this.#say();
+  }
+
+  /** @param {string} text of the tape @param {boolean} whole whether it has both ends */
+  read(text, whole) {
+    this.#reading.textContent = text;
+    this.#keep.dataset.whole = String(whole);
+  }
+
+  toggleParallel() {
+    this.#isParallel = !this.#isParallel;
+    this.#say();
+  }
+
+  /** @param {import("../api-types").ViewerShown} shown whether something was left out, and what no run has seen yet */
+  told(shown) {
+    const { reduced, preview, mode } = shown;
+    this.clip.told(shown);
     this.#reduced = reduced;
+    this.#preview.hidden = mode !== "scene" || !preview.length;
+    this.#preview.textContent = `Preview: ${preview.join(", ")}; certified by the next run`;
     this.#draw();
   }
 
@@ -91,7 +203,21 @@ export class ViewBar extends EventTarget {
     this.#move.hidden = (mode !== "aligned" && mode !== "photo") || !this.#movable;
     this.#see.hidden = mode !== "aligned" && mode !== "candidate";
     for (const label of this.#inScene) label.hidden = mode !== "scene";
-    this.#all.hidden = mode === "photo" || !(this.#reduced || this.full);
+    press(this.#parallel, this.#isParallel);
+    press(this.#measure, this.measuring);
+    press(this.#section, this.clip.on);
+    this.#section.hidden = !this.#inside;
+    this.clip.element.hidden = !this.#inside || !this.clip.on;
+    const legend = mode === "scene" ? heatLegend(this.wish.draw) : null;
+    this.below.replaceChildren(...(legend ? [legend] : []), this.clip.element);
+    this.below.hidden = this.clip.element.hidden && !legend;
+    const inWorld = this.isSolid && mode !== "candidate";
+    this.#measure.hidden = !inWorld;
+    this.#reading.hidden = !this.measuring || this.#measure.hidden;
+    this.#keep.hidden = this.#reading.hidden || this.#keep.dataset.whole !== "true";
+    this.#look.hidden = this.#parallel.hidden = !inWorld;
+    if (mode !== "scene") this.#preview.hidden = true;
+    this.#all.hidden = !this.isSolid || !(this.#reduced || this.full);
   }
 
   #say() {

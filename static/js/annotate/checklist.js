@@ -1,0 +1,134 @@
+/**
+ * The objects that a project still has to click, and the fields that say what the next click makes: filled from the one of the
+ * list whose turn it is, free to be written over.
+ */
+
+import { h, renew } from "../dom.js";
+import { following, remaining } from "../lib/checklist.js";
+import { usableName } from "../lib/format.js";
+
+/** @typedef {import("../lib/checklist.js").Listed} Listed */
+
+export class Checklist {
+  #category = h("input", {
+    type: "text",
+    value: "drawer",
+    list: "categories",
+    "aria-label": "Category of the next object",
+    title: "Category of the next object",
+  });
+  #name = h("input", {
+    type: "text",
+    placeholder: "numbered",
+    "aria-label": "Name of the next object",
+    title: "Name of the next object; empty: its category and a number",
+  });
+  #lines = h("ul", { class: "plain" });
+  #count = h("summary");
+  #named = h("label", { class: "next-name", hidden: true }, h("span", { class: "muted" }, "called"), this.#name);
+  /** @type {Listed[]} */
+  #listed = [];
+  /** @type {{ name: string }[]} */
+  #objects = [];
+  /** Names of objects whose making is on its way. @type {Set<string>} */
+  #coming = new Set();
+  /** @type {string | null} whose turn it is */
+  #chosen = null;
+  /** Whether a person wants none of the list next. */
+  #free = false;
+  #drawn = ""; // masks that stream in must not take a line away that is pressed
+  fields = [this.#category, this.#named];
+  element = h("details", { class: "checklist", open: true, hidden: true }, this.#count, this.#lines);
+
+  /** What the next click makes. */
+  get next() {
+    return { category: this.category, name: usableName(this.#name.value) || undefined };
+  }
+
+  get category() {
+    return this.#category.value.trim() || "object";
+  }
+
+  set category(category) {
+    this.#category.value = category;
+  }
+
+  /** Those that nobody clicked yet. */
+  get left() {
+    return remaining(this.#listed, [...this.#objects, ...[...this.#coming].map((name) => ({ name }))]);
+  }
+
+  /** @param {Listed[]} listed */
+  set listed(listed) {
+    this.#listed = listed;
+    this.#draw();
+  }
+
+  /** Those that are there. @param {{ name: string }[]} objects */
+  set objects(objects) {
+    this.#objects = objects;
+    this.#draw();
+  }
+
+  /** An object of that name is being made, or its making ended. @param {string | undefined} name @param {boolean} coming */
+  making(name, coming) {
+    if (name && coming) this.#coming.add(name);
+    else if (name) this.#coming.delete(name);
+    if (coming) this.#fill(this.#turn);
+    this.#draw();
+  }
+
+  /** The next one of the list, after the last one none of it. */
+  step() {
+    const { left } = this;
+    const at = left.findIndex(({ name }) => name === this.#chosen);
+    this.choose(left[at + 1]?.name ?? null);
+  }
+
+  /** @param {string | null} name null: none of the list */
+  choose(name) {
+    this.#free = name === null;
+    this.#chosen = name;
+    this.#fill(this.left.find((entry) => entry.name === name) ?? null);
+    this.#draw();
+  }
+
+  /** Whose turn it is by now: another's once the chosen one is clicked. @returns {Listed | null} */
+  get #turn() {
+    const { left } = this;
+    if (this.#free) return null;
+    return left.find(({ name }) => name === this.#chosen) ?? following(this.#listed, left, this.#chosen);
+  }
+
+  #draw() {
+    const { left } = this;
+    const turn = this.#turn;
+    if ((turn?.name ?? null) !== this.#chosen) this.#fill(turn);
+    this.#chosen = turn?.name ?? null;
+    this.#named.hidden = this.element.hidden = !left.length;
+    if (!left.length) this.#name.value = "";
+    this.#count.textContent = `Still to click: ${left.length} of ${this.#listed.length}`;
+    const drawn = JSON.stringify([left, this.#chosen]);
+    if (drawn !== this.#drawn) renew(this.#lines, ...left.map((entry) => this.#line(entry)));
+    this.#drawn = drawn;
+  }
+
+  /** @param {Listed | null} entry */
+  #fill(entry) {
+    this.#name.value = entry?.name ?? "";
+    if (entry) this.category = entry.category;
+  }
+
+  /** @param {Listed} entry */
+  #line({ name, category }) {
+    const chosen = name === this.#chosen;
+    const button = h(
+      "button",
+      { type: "button", class: "quiet", "aria-pressed": String(chosen), "data-at": `listed:${name}` },
+      h("span", {}, name),
+      h("span", { class: "muted" }, category),
+    );
+    button.addEventListener("click", () => this.choose(chosen ? null : name));
+    return h("li", {}, button);
+  }
+}

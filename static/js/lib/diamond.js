@@ -1,0 +1,17 @@
+/** The diamond that marks what a person said of a frame. */
+
+/**
+ * Its closed path, to fill or to stroke.
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} x
+ * @param {number} y
+ * @param {number} half
+ */
+export function diamond(context, x, y, half) {
+  context.beginPath();
+  context.moveTo(x, y - half);
+  context.lineTo(x + half, y);
+  context.lineTo(x, y + half);
+  context.lineTo(x - half, y);
+  context.closePath();
+}

@@ -1,0 +1,22 @@
+/** What people marked of how far leaves stand open: a table of joints, each with its frames. */
+
+/** @typedef {import("../api-types").OverrideData["states"]} States */
+
+/**
+ * With one frame marked anew; null takes its mark away. Marks by a joint's name become such of its part, which keeps its name.
+ * @param {States} states
+ * @param {{ joint: string, part: string }} leaf
+ * @param {number} frame
+ * @param {number | null} state rad or m
+ * @returns {States}
+ */
+export function withMark(states, { joint, part }, frame, state) {
+  const { [joint]: byJoint = [], [part]: byPart = [], ...others } = states;
+  const before = byJoint.length ? byJoint : byPart;
+  const kept = before.filter((mark) => mark.frame !== frame);
+  const marks = (state === null ? kept : [...kept, { frame, state }]).toSorted((a, b) => a.frame - b.frame);
+  return marks.length ? { ...others, [part]: marks } : others;
+}
+
+/** Whether a person said where it stands. @param {{ value: number | null, sigma: number | null } | undefined} state */
+export const isMarked = (state) => Boolean(state && state.value !== null && state.sigma === null);

@@ -1,0 +1,20 @@
+/** What the pipeline's stages and models are called on every page, in words of the field; no DOM. */
+
+/** @type {Record<string, string>} */
+const STAGES = {
+  ingest: "Read the recording",
+  sample: "Render the sample",
+  segment: "Segment the objects",
+  generate: "Generate meshes",
+  align: "Align to the scan",
+  synthesize: "Build the articulated scene",
+  warp: "Fit to the scan",
+  export: "Export and certify",
+  vary: "Make variants",
+};
+
+/** @param {string} stage as the server calls it */
+export const stageWord = (stage) => STAGES[stage] ?? stage;
+
+/** Whose outline is over a photo. */
+export const MODELS = { placed: "Generated mesh", primitive: "Before the fit", fitted: "After the fit" };

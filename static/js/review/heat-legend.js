@@ -1,0 +1,24 @@
+/** What the colours of a scene's surfaces mean. */
+
+import { h } from "../dom.js";
+
+/** By what is drawn: its class, the ends of its scale, and what is to be known of it. @type {Record<string, [string, string, string, string]>} */
+const SCALES = {
+  distance: ["viridis", "0 mm", "30 mm from the scan", "Grey: nothing was measured within 60 mm."],
+  unobserved: ["magma", "observed", "50 cm from any observation", "What is light was made up: nobody filmed it."],
+};
+
+/** @param {string | undefined} draw */
+export function heatLegend(draw) {
+  const scale = SCALES[draw ?? ""];
+  if (!scale) return null;
+  const [colours, from, to, note] = scale;
+  return h(
+    "p",
+    { class: "heat-legend" },
+    h("span", {}, from),
+    h("span", { class: `scale ${colours}`, "aria-hidden": "true" }),
+    h("span", {}, to),
+    h("span", { class: "muted" }, note),
+  );
+}

@@ -1,0 +1,46 @@
+/** What stands in the scene beside the objects that were clicked: an eye each, and what a person left out. */
+
+import { h, icon } from "../dom.js";
+
+/** @typedef {import("../api-types").SceneItem} SceneItem */
+/** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
+
+/**
+ * An eye that hides an object in the scene, and shows it again.
+ * @param {ReviewObjects} objects
+ * @param {{ name: string, run_name: string }} item
+ */
+export function eye(objects, { name, run_name }) {
+  const hidden = objects.hidden.has(run_name);
+  const label = `${hidden ? "Show" : "Hide"} ${name} in the scene`;
+  const button = h("button", { type: "button", class: "quiet eye", "aria-label": label, title: label });
+  button.dataset.at = `eye:${run_name}`;
+  button.append(icon(hidden ? "eye-off" : "eye"));
+  button.addEventListener("click", () => objects.hide(run_name, !hidden));
+  return button;
+}
+
+/**
+ * Worktops, plinths and whatever else a run made from the scan, and what was left out of them.
+ * @param {ReviewObjects} objects
+ * @param {(item: { name: string, run_name: string }) => void} bringBack
+ */
+export function madeList(objects, bringBack) {
+  const { made, leftOut } = objects;
+  if (!made.length && !leftOut.length) return "";
+  const rows = made.map((item) => {
+    const chosen = item.run_name === objects.madeName;
+    const button = h("button", { type: "button", "aria-pressed": String(chosen), title: item.name });
+    button.dataset.at = `made:${item.run_name}`;
+    button.append(h("span", { class: "name" }, item.name));
+    button.addEventListener("click", () => objects.chooseMade(item.run_name));
+    return h("li", { class: "with-eye" }, button, eye(objects, item));
+  });
+  const gone = leftOut.map((item) => {
+    const back = h("button", { type: "button", class: "quiet" }, "Bring back");
+    back.setAttribute("aria-label", `Bring back ${item.name}`);
+    back.addEventListener("click", () => bringBack({ name: item.name, run_name: item.name }));
+    return h("li", { class: "with-eye" }, h("span", { class: "name left-out" }, item.name), back);
+  });
+  return h("section", {}, h("h2", {}, "Made from the scan"), h("ul", {}, ...rows, ...gone));
+}
