@@ -1,14 +1,15 @@
-"""What each question to the app costs on a data folder that has grown: 200 projects, one of 200 objects and 5,000 clicks.
+"""What each question to the app costs where there is much: 200 projects, one of 5,000 frames, 200 objects and 5,000 clicks.
 
     python benchmarks/app_scale.py [--projects 200] [--objects 200] [--clicks 5000] [--json benchmarks/app_scale.json]
 
 The folder is made of rows and files at once. Every GET of the app's own OpenAPI document is asked in process, then a click, its
-undo and redo: processor time (median of some), queries, bytes on the wire. The first time is kept apart, for it fills caches:
-`first_ms` after the app was started anew on a folder whose pages were opened before, `unseen_ms` on one that a run has just
-left. What the app does by itself when it starts, and between changes (it writes each project's project.json), is over before
-anything is counted. Then a real server is scrubbed (a frame and its masks) and clicked, and its processor time, what follows
-from the clicks by itself included, says how many such requests a core answers in a second of its processor time. The bars:
-100 ms and 300 kB for every answer of /api, the first ones too, and 100 requests a second a core.
+undo and redo: processor time (the median, and what 95 % of the answers stay below), queries, bytes on the wire. The first time
+is kept apart, for it fills caches: `first_ms` after the app was started anew on a folder whose pages were opened before,
+`unseen_ms` on one that a run has just left. What the app does by itself when it starts, and between changes (it writes each
+project's project.json), is over before anything is counted. Then a real server is scrubbed (a frame and its masks) and clicked,
+and its processor time, what follows from the clicks by itself included, says how many such requests a core answers in a second
+of its processor time. The bars: 100 ms, 200 ms for 95 %, and 300 kB for every answer of /api, the first ones too, and 100
+requests a second a core.
 """
 
 import argparse
@@ -39,7 +40,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(1, str(Path(__file__).resolve().parent.parent))
 
 from kept import add_options, report
-from kills import Server
+from kill_server import Server
 
 from app.db import keys
 from app.db.engine import open_engine
@@ -59,11 +60,11 @@ from tests.app.conftest import FAKE_COMMANDS
 from tests.app.nouns import candidates, finish, placement
 from tests.core.export.kitchen import CREATED, reconstruction
 
-BARS = {"cpu_ms": 100.0, "kb": 300.0, "requests_a_cpu_second": 100.0}
-FRAMES = 500  # of every recording, at 960x720
-MASKED = 500  # frames with a mask, of each object of the large project
+BARS = {"cpu_ms": 100.0, "p95_ms": 200.0, "kb": 300.0, "requests_a_cpu_second": 100.0}
+FRAMES = 5000  # of every recording, at 960x720
+MASKED, STRETCH = 1000, 50  # frames with a mask, of each object of the large project: somebody walks by, again and again
 SMALL = 14  # objects of the other projects, a kitchen's
-REPEATS = 5
+REPEATS = 20
 REST_S = 2.0
 ROUNDS = 150  # of scrubs and of clicks, when the server's processor time is taken
 LARGE = "large"
@@ -108,9 +109,9 @@ def _asked(data: Path, changes: bool) -> list[dict[str, Any]]:
 
 def table(costs: list[dict[str, Any]]) -> str:
     """The figures as Markdown."""
-    lines = ["| request | status | CPU ms | first | unseen | queries | kB |", "|---|---|---|---|---|---|---|"]
+    lines = ["| request | status | CPU ms | 95 % | first | unseen | queries | kB |", "|---|---|---|---|---|---|---|---|"]
     for cost in sorted(costs, key=lambda cost: -float(cost["cpu_ms"])):
-        cells = [cost[name] for name in ("request", "status", "cpu_ms", "first_ms", "unseen_ms", "queries", "kb")]
+        cells = [cost[name] for name in ("request", "status", "cpu_ms", "p95_ms", "first_ms", "unseen_ms", "queries", "kb")]
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
@@ -118,7 +119,7 @@ def table(costs: list[dict[str, Any]]) -> str:
 def _within(cost: dict[str, Any]) -> bool:
     """Whether an answer keeps to the bars; pictures and bundles are as large as they are, and drawn the first time."""
     said = cost["request"].split()[1].startswith("/api/")
-    quick = float(cost["cpu_ms"]) <= BARS["cpu_ms"]
+    quick = all(float(cost[name]) <= BARS[name] for name in ("cpu_ms", "p95_ms"))
     return quick and (not said or (float(cost["kb"]) <= BARS["kb"] and float(cost["first_ms"]) <= BARS["cpu_ms"]))
 
 
@@ -199,7 +200,7 @@ def _capture(rng: random.Random) -> dict[str, Any]:
             "brightness": rng.random(),
             "error_mm": rng.random(),
         }
-        for k in range(0, FRAMES, 10)
+        for k in range(0, FRAMES, FRAMES // 60)
     ]
     facts = {"format": "record3d", "sha256": "ab" * 32, "frame_count": FRAMES, "width": 960, "height": 720, "verdict": "good"}
     return {
@@ -219,8 +220,14 @@ def _masks(rng: random.Random, path: Path) -> None:
     shape = np.zeros((720, 960), bool)
     shape[300 : 300 + rng.randrange(20, 80), 400 : 400 + rng.randrange(20, 140)] = True
     bits = mask_bits(pack_mask(shape), 960)
-    seen = rng.sample(range(FRAMES), MASKED)
-    entries = [{"frame": k, "confidence": rng.random(), "area": rng.random() / 50, "mask": {**bits, "left": k}} for k in seen]
+    walks = sorted(rng.sample(range(FRAMES // STRETCH), MASKED // STRETCH))
+    sure = {
+        walk * STRETCH + k: level + rng.uniform(0, 0.03) for walk in walks for level in [rng.random()] for k in range(STRETCH)
+    }
+    entries = [
+        {"frame": k, "confidence": confidence, "area": rng.random() / 50, "mask": {**bits, "left": k % 900}}
+        for k, confidence in sure.items()
+    ]
     mask_store.write(path, entries, "geometric")
 
 
@@ -246,9 +253,18 @@ def _files(data: Path, names: list[str]) -> None:
         described = project_files(data, project).frames
         described.parent.mkdir(parents=True, exist_ok=True)
         described.write_text(json.dumps(frames))
-    for k in range(FRAMES):
-        (work.frames / "rgb" / f"{k:06d}.jpg").write_bytes(picture)
-        (work.frames / "depth" / f"{k:06d}.png").write_bytes(depth)
+    for folder, content in ((work.frames / "rgb", ("jpg", picture)), (work.frames / "depth", ("png", depth))):
+        _many(folder, *content)
+
+
+def _many(folder: Path, suffix: str, content: bytes) -> None:
+    """One file under the name of every frame."""
+    first = folder / f"{0:06d}.{suffix}"
+    first.write_bytes(content)
+    for k in range(1, FRAMES):
+        other = folder / f"{k:06d}.{suffix}"
+        other.unlink(missing_ok=True)
+        os.link(first, other)
 
 
 # One question after the other, in process
@@ -330,7 +346,15 @@ def rest(cpu_s: Callable[[], float]) -> None:
 
 def _questions(document: dict[str, Any], item: int) -> Iterator[str]:
     """Every address that can be asked, about the large project."""
-    values = {"project": LARGE, "object": item, "frame": 250, "job": 1, "version": 2, "side": "plan", "candidate": "c0"}
+    values: dict[str, Any] = {"project": LARGE, "object": item, "frame": 250, "job": 1, "version": 2, "webhook": 1}
+    values |= {
+        "side": "plan",
+        "candidate": "c0",
+        "elevation": "0",
+        "object_name": "drawer_1",
+        "folder": "pictures",
+        "picture": "0",
+    }
     wishes = {"/bundles/{version}/changes": "?since=1", "/jobs/{job}/log": "?tail=100000", "/history": "?limit=1000"}
     for path, methods in document["paths"].items():
         if "get" in methods and "{upload}" not in path:
@@ -349,6 +373,7 @@ async def _cost(asker: Asker, queries: list[str], method: str, target: str, body
         "request": f"{method} {target}",
         "status": status,
         "cpu_ms": round(statistics.median(times[1:]), 1),
+        "p95_ms": round(statistics.quantiles(times[1:], n=20)[-1], 1),
         "first_ms": round(times[0], 1),
         "queries": len(queries),
         "kb": round(len(content) / 1000, 1),

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(1, str(Path(__file__).resolve().parent.parent))
 
 from kept import add_options, report
-from kill_journey import until
+from waiting import until
 
 from app.serve import new_address
 

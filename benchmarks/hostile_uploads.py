@@ -52,6 +52,7 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
         assert upload(web, packed(good), "good.r3d").status_code == 202, "the undamaged recording is taken"
         for project in web.get("/api/projects"):
             web.delete(f"/api/projects/{project['id']}")
+            web.delete(f"/api/trash/{project['id']}")
         memory = [_memory_mb()]
         ours = set(psutil.Process().children(recursive=True))  # of whoever measures
         for number in range(count):
@@ -141,6 +142,7 @@ def left_behind(web: Running, before: set[psutil.Process]) -> str:
     for place, rows in (("projects", web.get("/api/projects")), ("uploads", web.get("/api/uploads"))):
         for row in rows:  # so that the next one is not blamed for it
             web.client.delete(f"/api/{place}/{row['id']}")
+            web.client.delete(f"/api/trash/{row['id']}")
             files.append(Path(row["id"]))
     if files or web.get("/api/jobs"):
         return f"left behind: {files[:3]}"

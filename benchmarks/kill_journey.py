@@ -5,7 +5,6 @@ import hashlib
 import io
 import json
 import random
-import time
 import zipfile
 from collections import Counter
 from collections.abc import Callable
@@ -14,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import httpx2 as httpx
+from kill_server import SetUp
+from waiting import until
 
 PIECES = 12  # that a recording is uploaded in
-HOPELESS = ("worker-died", "interrupted")  # ends of jobs that only kills explain
 
 
 class Refused(Exception):
@@ -42,12 +42,12 @@ class Change:
 class Journey:
     """One person, and everything the server said is stored."""
 
-    def __init__(self, address: str, data: Path, rng: random.Random, real: Path | None) -> None:
-        self.address, self.data, self.rng, self.real = address, data, rng, real
-        self.client = httpx.Client(timeout=60)
+    def __init__(self, server: SetUp, rng: random.Random, real: Path | None) -> None:
+        self.server, self.rng, self.real = server, rng, real
+        self.client = httpx.Client(timeout=60, follow_redirects=True)  # to the store, for a bundle
         self.recording = (real / "scan.r3d").read_bytes() if real else _any_zip()
         self.upload: tuple[str, int] | None = None  # id, acknowledged bytes
-        self.project, self.ready = "", False
+        self.project, self.ready, self.stood_in = "", False, False
         self.frames: list[dict[str, Any]] = []
         self.objects: dict[int, dict[str, Any]] = {}
         self.reviews: dict[int, dict[str, Any]] = {}  # groups, as last acknowledged
@@ -61,20 +61,15 @@ class Journey:
         self.lost: list[str] = []
 
     @property
-    def folder(self) -> Path:
-        """The project's files."""
-        return self.data / "projects" / self.project
-
-    @property
     def at(self) -> str:
         """The project's address."""
         return f"/api/projects/{self.project}"
 
     def ask(self, method: str, path: str, **options: Any) -> Any:
         """One request; raises httpx.HTTPError when the server vanished meanwhile, Refused when it says no."""
-        headers = {"X-Requested-With": "kills", **options.pop("headers", {})}
-        answer = self.client.request(method, self.address + path, headers=headers, **options)
-        if answer.status_code >= 500 and answer.status_code != 503:
+        headers = {"X-Requested-With": "kills", "Host": self.server.host, **options.pop("headers", {})}
+        answer = self.client.request(method, self.server.address_for(path) + path, headers=headers, **options)
+        if answer.status_code >= 500 and answer.status_code != 503 and not answer.history:
             self.lost.append(f"{method} {path}: {answer.status_code} {answer.text[:200]}")
         if answer.status_code >= 400:
             raise Refused(answer.status_code, answer.text[:200])
@@ -101,7 +96,7 @@ class Journey:
 
     def sign_in(self) -> None:
         """The session outlives every server."""
-        self.client.get(f"{self.address}/", params={"token": "key"})
+        self.client.get(f"{self.server.address_for('/')}/", params={"token": "key"})
 
     def act(self) -> None:
         """The next thing this person does; nothing new before what is pending was answered."""
@@ -143,7 +138,7 @@ class Journey:
             jobs = {job["id"]: job for job in self.ask("GET", f"/api/jobs?project={self.project}&limit=500")}
             self._expect("jobs", self.jobs <= set(jobs), f"{self.jobs - set(jobs)} acknowledged, not found")
             self.job_ends.update(job["state"] for job in jobs.values())
-            gave_up = [job["id"] for job in jobs.values() if (job["error"] or {}).get("kind") in HOPELESS]
+            gave_up = [f"{job['id']}: {job['error']}" for job in jobs.values() if job["state"] == "failed"]
             self._expect("jobs", not gave_up, f"{gave_up} gave up")
             return True
         return False
@@ -203,7 +198,7 @@ class Journey:
             first = {**prompts, "objects": prompts["objects"][:3]}
             self.ask("POST", f"{self.at}/prompts.json", json=first)  # by name: twice is once
             self._run()
-        else:
+        elif not self.stood_in:
             self._stand_in_for_a_first_run()
         self.objects = {item["id"]: item for item in self.ask("GET", f"{self.at}/objects?deleted=true")}
         self.reviews = {group["object"]: group for group in self.ask("GET", f"{self.at}/candidates")}
@@ -215,9 +210,11 @@ class Journey:
         clicks = [{**self._click(), "label": 1}]
         drawer = {"name": "drawer_1", "category": "drawer", "points": clicks}
         self.ask("POST", f"{self.at}/prompts.json", json={"version": 1, "objects": [drawer]})
-        finish(self.folder / "work")
         stages = ("segment", "generate", "align", "export")
-        (self.folder / "behave.json").write_text(json.dumps(dict.fromkeys(stages, "slow")))
+        with self.server.writing(self.project) as folder:
+            finish(folder / "work")
+            (folder / "behave.json").write_text(json.dumps(dict.fromkeys(stages, "slow")))
+        self.stood_in = True
 
     def _add(self) -> None:
         body = {"category": self.rng.choice(["drawer", "cabinet", "mug"]), "points": [self._click()]}
@@ -370,12 +367,3 @@ def _any_zip() -> bytes:
         archive.writestr("metadata", b"{}")
         archive.writestr("noise", random.Random(0).randbytes(40_000))
     return buffer.getvalue()
-
-
-def until(condition: Any, seconds: float) -> None:
-    """Wait for it; raises TimeoutError."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > deadline:
-            raise TimeoutError(f"not within {seconds} s")
-        time.sleep(0.05)

@@ -17,13 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from recordings import record_of
 from run import _seeds
 
 from r2c2r_core.evaluate.joints import joint_errors
 from r2c2r_core.evaluate.pose import pose_errors
-from r2c2r_core.evaluate.records import JointRecord, ObjectRecord, read_truth
+from r2c2r_core.evaluate.records import ObjectRecord, read_truth
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.overrides import NO_OVERRIDES
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
@@ -91,26 +92,6 @@ def measure_seed(workdir: Path, truth_file: Path) -> dict[str, Any]:
     rows = {true.name: object_figures(true, found, scene, true.name in with_handle) for true, found in pairs}
     return (
         {"found": len(pairs), "of": len(truths)} | scene_figures(rows, pairs) | {"seconds": round(seconds, 2), "objects": rows}
-    )
-
-
-def record_of(item: SceneObject) -> ObjectRecord:
-    """A built object as the evaluation reads it from a manifest."""
-    pose = item.world_from_object
-    joints = tuple(
-        JointRecord(
-            name=joint.name,
-            type=joint.type,
-            axis=pose.turn(joint.axis_object[None])[0],
-            origin=pose.apply(joint.origin_object[None])[0],
-            lower=joint.lower,
-            upper=joint.upper,
-            limit_source=joint.sources["limits"],
-        )
-        for joint in item.joints
-    )
-    return ObjectRecord(
-        name=item.name, category=item.category, dimensions_m=item.dimensions_m, world_from_object=pose, joints=joints
     )
 
 

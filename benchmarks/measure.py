@@ -20,7 +20,7 @@ class Cost:
     exit_code: int
     wall_s: float
     cpu_s: float  # user and system, of the process and all its children
-    peak_bytes: int  # resident memory of the whole tree, sampled five times a second
+    peak_bytes: int  # of the whole tree, sampled five times a second; a page that processes share counts once (PSS)
     largest_bytes: int  # that of its largest process, at its peak
 
 
@@ -70,7 +70,7 @@ class _Watch(threading.Thread):
             return
         for process in tree:
             try:
-                total += process.memory_info().rss
-            except psutil.NoSuchProcess:
+                total += process.memory_full_info().pss
+            except (psutil.NoSuchProcess, psutil.AccessDenied):  # it ended, or is about to
                 continue
         self.peak_bytes = max(self.peak_bytes, total)

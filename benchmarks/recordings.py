@@ -3,6 +3,7 @@
 import json
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX, read_mask
-from r2c2r_core.evaluate.records import JointRecord, ObjectRecord, read_truth
+from r2c2r_core.evaluate.records import JointRecord, MotionRecord, ObjectRecord, read_truth
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint, Prompts
+from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.segment.prompts import read_prompts
 
@@ -148,23 +150,32 @@ def _middle(prompt: ObjectPrompt, masks: dict[int, Mask | None]) -> tuple[Prompt
 
 
 def record_of(item: SceneObject) -> ObjectRecord:
-    """As the evaluation reads it."""
+    """A built object as the evaluation reads it from a manifest."""
+    pose = item.world_from_object
     joints = tuple(
         JointRecord(
             name=joint.name,
             type=joint.type,
-            axis=item.world_from_object.turn(joint.axis_object[None])[0],
-            origin=item.world_from_object.apply(joint.origin_object[None])[0],
+            axis=pose.turn(joint.axis_object[None])[0],
+            origin=pose.apply(joint.origin_object[None])[0],
             lower=joint.lower,
             upper=joint.upper,
-            limit_source="",
+            limit_source=joint.sources["limits"],
+            motion=None if joint.motion is None else _filmed(joint.motion),
         )
         for joint in item.joints
     )
     return ObjectRecord(
-        name=item.name,
-        category=item.category,
-        dimensions_m=item.dimensions_m,
-        world_from_object=item.world_from_object,
-        joints=joints,
+        name=item.name, category=item.category, dimensions_m=item.dimensions_m, world_from_object=pose, joints=joints
+    )
+
+
+def _filmed(motion: JointMotion) -> MotionRecord:
+    lengths = {} if motion.inside is None else asdict(motion.inside)
+    return MotionRecord(
+        states={frame: state.value for frame, state in motion.states.items()},
+        shown=frozenset(),
+        largest=motion.largest,
+        stop_seen=motion.stop_seen,
+        inside={key: value for key, value in lengths.items() if isinstance(value, int | float)},
     )

@@ -26,8 +26,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(1, str(Path(__file__).resolve().parent.parent))
 
 from kept import add_options, report
-from kill_journey import Journey, until
-from kills import Server
+from kill_journey import Journey
+from kill_server import Server
+from waiting import until
 
 from tests.browser.conftest import CHROMIUM, QUIET
 
@@ -46,7 +47,7 @@ def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
     """Milliseconds a frame, first pass and later ones, and the slowest answer of the API meanwhile."""
     server = Server(folder / "data", real=False)
     server.start()
-    journey = Journey(server.address, folder / "data", random.Random(0), None)
+    journey = Journey(server, random.Random(0), None)
     try:
         journey.sign_in()
         project = journey.ask("POST", "/api/projects/sample", json={})["id"]

@@ -27,6 +27,7 @@ from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
 
@@ -147,14 +148,17 @@ def try_click(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
         panel = session.find(ObjectPrompt(name=front.name, category=front.category, points=(click,))).panel()
     except R2C2RError:
         panel = None
-    if panel is None:
-        return Trial(front, click, None)
+    return Trial(front, click, None if panel is None else off_mm(front, panel))
+
+
+def off_mm(front: TrueFront, panel: FrontPanel) -> np.ndarray:
+    """By how far a panel's edges miss the truth's: left, right, bottom, top, outwards positive."""
     local = front.world_from_face.inverse @ panel.world_from_front
     sides = np.array([[sign * panel.width_m / 2, 0, 0] for sign in (-1, 1)])
     ends = np.array([[0, 0, sign * panel.height_m / 2] for sign in (-1, 1)])
     (left, right), (bottom, top) = local.apply(sides)[:, 0], local.apply(ends)[:, 2]
     half = np.array([front.width_m, front.width_m, front.height_m, front.height_m]) / 2
-    return Trial(front, click, 1000 * (np.array([-left, right, -bottom, top]) - half))
+    return np.asarray(1000 * (np.array([-left, right, -bottom, top]) - half))
 
 
 def _figures(trials: list[Trial]) -> dict[str, Any]:

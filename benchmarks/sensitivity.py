@@ -11,7 +11,9 @@ are the same; several processes may share the work, by rooms or by recordings. -
 docs/sensitivity.md again.
 
 loss: mean error of the sizes in percent + 100 (1 - mean mask IoU) + 100 (1 - share of right joints), of the objects moved; an
-object that is lost counts as an error of 100 % without mask and joint.
+object that is lost counts as an error of 100 % without mask and joint. Where fronts were filmed while they open, + 100 (1 -
+share of frames with the right state); where proposals are made (a room of --rooms is segment or segment.proposals), + 100 (1 -
+their F1).
 """
 
 import argparse
@@ -116,7 +118,8 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
     end = time.monotonic() + 60 * options.minutes
     for number, folder in enumerate(options.recordings):
         share = (end - time.monotonic()) / (len(options.recordings) - number)
-        _measure_case(open_case(folder, work, options.frames, options.objects), options, time.monotonic() + share)
+        proposes = "segment.proposals".startswith(tuple(options.rooms.split(",")))
+        _measure_case(open_case(folder, work, options.frames, options.objects, proposes), options, time.monotonic() + share)
 
 
 def _measure_case(case: Case, options: argparse.Namespace, end: float) -> None:

@@ -18,6 +18,7 @@ from r2c2r_core.errors import R2C2RError
 from r2c2r_core.evaluate.extents import extent_errors
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX
 from r2c2r_core.evaluate.joints import joint_errors
+from r2c2r_core.evaluate.motions import joint_scores
 from r2c2r_core.evaluate.records import ObjectRecord, read_truth
 from r2c2r_core.generate.stage import GenerateConfig, generate_candidates
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
@@ -26,6 +27,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, Overrides
 from r2c2r_core.model.mesh import CandidateSet
+from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
@@ -37,6 +39,8 @@ from r2c2r_core.tuning import path_of, tuning
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes
 
 SAME_M, SAME_IOU = 0.0005, 0.995  # what follows is not computed again for less
+PROPOSED_IOU = 0.5
+SHARES = ("mask_iou", "joints", "states", "proposals")
 
 Reads = set[tuple[str, str]]  # module, number
 
@@ -114,6 +118,7 @@ class Case:
     truth: dict[str, ObjectRecord]
     true_masks: TrueMask
     folder: Path  # where nothing is left
+    proposes: bool = False  # whether proposals are made, too
     made: dict[str, Any] = field(default_factory=dict)
     read: dict[str, Reads] = field(default_factory=dict)
 
@@ -121,12 +126,12 @@ class Case:
     def steps(self) -> list[str]:
         """In their order."""
         each = [f"{stage}/{name}" for stage in ("segment", "generate", "align") for name in self.prompts]
-        return ["open", *each, "synthesize", "warp"]
+        return ["open", *(["propose"] if self.proposes else []), *each, "synthesize", "warp"]
 
     def needs(self, step: str) -> list[str]:
         """The steps that it is made from."""
         stage, _, name = step.partition("/")
-        if stage == "segment":
+        if stage in ("segment", "propose"):
             return ["open"]
         if stage == "generate":
             return [f"segment/{name}"]
@@ -152,6 +157,8 @@ class Case:
             centres = np.stack([frame.world_from_camera.translation for frame in self.capture.frames])
             scene, planes = prepare_scene(self.capture, self.folder), find_planes(self.capture.surface, centres)
             return Session(scene, planes, SegmentConfig(), self.folder)
+        if stage == "propose":
+            return list(made["open"].propose())[-1][1]
         if stage == "segment":
             return track_object(made["open"], self.prompts[name])
         if stage == "generate":
@@ -171,7 +178,8 @@ class Case:
             watch, started = Watch(), time.monotonic()
             with tuning(watch):
                 self.made[step] = self.compute(step, self.made)
-            self.read[step] = watch.read | (self.made["open"].reading() if step.startswith("segment/") else set())
+            runs = self.made["open"].reading() if step.startswith(("segment/", "propose")) else set()
+            self.read[step] = watch.read | runs
             print(f"{step}: {time.monotonic() - started:.1f} s", file=sys.stderr, flush=True)
 
     def chosen(self, moved: Reads) -> frozenset[str]:
@@ -195,7 +203,7 @@ class Case:
                 made["open"] = self.made["open"].without(changed)
             for step in self.steps[1:]:
                 stage, _, name = step.partition("/")
-                again = self.read[step] & changed or (stage == "segment" and self.read["open"] & changed)
+                again = self.read[step] & changed or (stage in ("segment", "propose") and self.read["open"] & changed)
                 if (name and name not in objects) or not (again or new.intersection(self.needs(step))):
                     continue
                 made[step] = self.compute(step, made)
@@ -209,26 +217,47 @@ class Case:
         """Means over these objects, and the loss."""
         scene = made["warp"] if not isinstance(made["warp"], str) else made["synthesize"]
         built = {} if isinstance(scene, str) else {item.name: item for item in scene.objects}
-        sizes, joints, masks = [], [], []
+        sizes, joints, masks, states = [], [], [], []
         for name in sorted(objects):
             item, track = built.get(name), made[f"segment/{name}"]
             record = None if item is None else record_of(item)
             sizes.append(100.0 if record is None else min(_value(extent_errors(self.truth[name], record), "extents"), 100.0))
             joints.append(0.0 if record is None else _right_joints(self.truth[name], record))
+            states += [score.shown_right / max(score.shown, 1) for score in joint_scores(self.truth[name], record)]
             masks.append(0.0 if isinstance(track, str) else self._iou(name, track))
         figures = {
             "extents_percent": float(np.mean(sizes)),
             "mask_iou": float(np.mean(masks)),
             "joints": float(np.mean(joints)),
         }
-        figures["loss"] = figures["extents_percent"] + 100 * (2 - figures["mask_iou"] - figures["joints"])
+        figures |= {"states": float(np.mean(states))} if states else {}
+        figures |= {"proposals": self._proposed(made["propose"])} if self.proposes else {}
+        figures["loss"] = figures["extents_percent"] + sum(100 * (1 - figures[key]) for key in SHARES if key in figures)
         return {key: round(value, 4) for key, value in figures.items()}
+
+    def _proposed(self, proposals: Any) -> float:
+        """F1: of what is true and seen, and of what is proposed, what overlaps the other in the proposal's frame."""
+        if isinstance(proposals, str):
+            return 0.0
+        found = [self._meant(proposal) for proposal in proposals]
+        seen = [name for name in self.truth if any(self._shown(name, frame.index) for frame in self.capture.frames)]
+        return 2 * len(set(found) - {None}) / max(len(found) + len(seen), 1)
+
+    def _meant(self, proposal: Proposal) -> str | None:
+        """The true object whose mask a proposal's own is in its frame, at an IoU of a half."""
+        outline, frame = unpack_mask(proposal.outline), proposal.click.frame
+        shown = {name: mask for name in self.truth if (mask := self.true_masks(name, frame)) is not None}
+        return next((name for name, mask in shown.items() if mask_iou(mask, outline) >= PROPOSED_IOU), None)
+
+    def _shown(self, name: str, frame: int) -> bool:
+        mask = self.true_masks(name, frame)
+        return mask is not None and np.count_nonzero(mask) >= MIN_TRUTH_PX
 
     def _iou(self, name: str, track: MaskTrack) -> float:
         overlaps = []
         for frame in self.capture.frames[::3]:
             true = self.true_masks(name, frame.index)
-            if true is None or np.count_nonzero(true) < MIN_TRUTH_PX:
+            if true is None or not self._shown(name, frame.index):
                 continue
             found = track.masks.get(frame.index)
             overlaps.append(0.0 if found is None else mask_iou(true, unpack_mask(found)))
@@ -279,7 +308,7 @@ def _front_sizes(track: MaskTrack) -> list[float]:
     return front + ([] if track.box is None else [*track.box.dimensions_m, *track.box.world_from_object.translation])
 
 
-def open_case(folder: Path, work: Path, frames: int, objects: int) -> Case:
+def open_case(folder: Path, work: Path, frames: int, objects: int, proposes: bool) -> Case:
     """A recording, read and settled."""
     capture = read_capture(recording_in(folder), work / folder.name / "frames", IngestConfig(most_frames=frames))
     categories: dict[str, ObjectPrompt] = {}
@@ -288,7 +317,7 @@ def open_case(folder: Path, work: Path, frames: int, objects: int) -> Case:
     kinds = sorted(categories.values(), key=lambda prompt: (_rank(prompt, categories.values()), prompt.name))
     prompts = {prompt.name: prompt for prompt in kinds[:objects]}
     truth = {item.name: item for item in read_truth(folder / "truth.json", capture.world_from_capture)}
-    case = Case(folder.name, capture, prompts, truth, true_masks(folder), work / folder.name / "cache")
+    case = Case(folder.name, capture, prompts, truth, true_masks(folder), work / folder.name / "cache", proposes)
     case.settle()
     return case
 

@@ -1,0 +1,194 @@
+"""A server that is started again whenever it was killed, always at the same address."""
+
+import contextlib
+import hashlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+import httpx2 as httpx
+import psutil
+from waiting import until
+
+ROOT = Path(__file__).resolve().parent.parent
+SERVER = """
+import json, sys, uvicorn
+from pathlib import Path
+from app.main import create_app
+from app.settings import Settings
+from app.jobs.plans import Commands
+data, port, real = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "real"
+if real:
+    commands = Commands()
+else:
+    from tests.app.conftest import FAKE_COMMANDS as commands
+usual = {"launch_token": "key", "min_free_bytes": 0, "job_memory_bytes": 0, "import_roots": (data.parent,)}
+settings = Settings(data_dir=data, **usual, **json.loads(sys.argv[4]))
+uvicorn.run(create_app(settings, commands=commands), host="127.0.0.1", port=port, log_level="critical")
+"""
+
+
+class SetUp(Protocol):
+    """What is hit: all that answers one person, and computes for them."""
+
+    real: bool
+    kinds: tuple[str, ...]  # what of it can be hit
+    hits: Counter[str]
+
+    @property
+    def runs(self) -> bool:
+        """Whether somebody answers."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether everything runs."""
+
+    @property
+    def host(self) -> str:
+        """What a browser calls it."""
+
+    def address_for(self, path: str) -> str:
+        """The address of who answers for the path."""
+
+    def start(self) -> None:
+        """Start what does not run, and wait until it answers."""
+
+    def kill(self, what: str) -> None:
+        """Hit a part."""
+
+    def writing(self, project: str) -> contextlib.AbstractContextManager[Path]:
+        """The project's folder, to write into what a job would have made."""
+
+    def digests(self, project: str, stage: str) -> dict[str, str]:
+        """What is stored of a stage: the content of each noun."""
+
+    def twice(self) -> list[str]:
+        """What was done twice, as far as that can be seen."""
+
+    def stop(self) -> None:
+        """The end."""
+
+
+class Server:
+    """One on a data folder."""
+
+    kinds: tuple[str, ...] = ("server", "server and workers", "a job's process", "the live segmenter")
+
+    def __init__(self, data: Path, real: bool) -> None:
+        self.data, self.real, self.port = data, real, 0
+        self.process: subprocess.Popen | None = None
+        self.hits: Counter[str] = Counter()
+        self.settings: dict[str, Any] = {}
+
+    @property
+    def runs(self) -> bool:
+        """Whether its process is there."""
+        return self.process is not None and self.process.poll() is None
+
+    @property
+    def whole(self) -> bool:
+        """Whether everything runs."""
+        return self.runs
+
+    @property
+    def address(self) -> str:
+        """Where it answers."""
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def host(self) -> str:
+        """What a browser calls it."""
+        return f"127.0.0.1:{self.port}"
+
+    def address_for(self, path: str) -> str:
+        """Its own."""
+        return self.address
+
+    def environment(self) -> dict[str, str]:
+        """What its processes are told."""
+        return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+    def start(self) -> None:
+        """Start it and wait until it answers."""
+        if not self.port:
+            with socket.create_server(("127.0.0.1", 0)) as free:
+                self.port = free.getsockname()[1]
+        words = [sys.executable, "-c", SERVER, str(self.data), str(self.port), "real" if self.real else "fake"]
+        self.process = subprocess.Popen([*words, json.dumps(self.settings)], env=self.environment(), cwd=ROOT)
+        until(lambda: self._answers(), 120)
+
+    def workers(self, *names: str) -> list[psutil.Process]:
+        """Its running workers whose command line holds one of the names."""
+        if self.process is None or self.process.poll() is not None:
+            return []
+        with contextlib.suppress(psutil.Error):
+            found = psutil.Process(self.process.pid).children(recursive=True)
+            return [child for child in found if not names or any(name in " ".join(_words(child)) for name in names)]
+        return []
+
+    def kill(self, what: str) -> None:
+        """SIGKILL, and wait until what was hit is gone; the server when the wanted one does not run."""
+        assert self.process is not None
+        hit = []
+        if what == "a job's process":
+            hit = self.workers("worker", "ingest", "sample")
+        elif what == "the live segmenter":
+            hit = self.workers("live")
+        elif what == "server and workers":
+            hit = self.workers()
+        if not hit:
+            what = "server"
+        self.hits[what] += 1
+        kill_all(hit)
+        if what.startswith("server"):
+            self.process.kill()
+            self.process.wait()
+
+    def digests(self, project: str, stage: str) -> dict[str, str]:
+        """What is stored of a stage: the content of each noun."""
+        found = {}
+        for path in sorted((self.data / "projects" / project / "work" / "nouns" / stage).glob("*.noun")):
+            with contextlib.suppress(FileNotFoundError):
+                found[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+        return found
+
+    @contextlib.contextmanager
+    def writing(self, project: str) -> Iterator[Path]:
+        """The project's folder, to write into what a job would have made."""
+        yield self.data / "projects" / project
+
+    def twice(self) -> list[str]:
+        """What was done twice, as far as that can be seen."""
+        return []
+
+    def stop(self) -> None:
+        """The end."""
+        if self.process is not None:
+            self.process.terminate()
+            self.process.wait()
+
+    def _answers(self) -> bool:
+        with contextlib.suppress(httpx.HTTPError):
+            return httpx.get(f"{self.address}/api/health").status_code == 200
+        return False
+
+
+def kill_all(processes: list[psutil.Process]) -> None:
+    """SIGKILL to each that is still there."""
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, signal.SIGKILL)
+
+
+def _words(process: psutil.Process) -> list[str]:
+    try:
+        return [Path(word).name for word in process.cmdline()]
+    except psutil.Error:
+        return []

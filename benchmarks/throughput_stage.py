@@ -1,0 +1,76 @@
+"""A stage that sleeps as long as the real one took, and stores as much: `throughput_stage.py LENGTHS FAKE WORKDIR …`.
+
+LENGTHS is a JSON file: seconds, files and bytes of each stage, and of one that goes object by object the seconds that it takes
+before them ("shared") and that any process takes to begin ("start"). FAKE is the tests' stand-in, which writes what the app
+reads.
+"""
+
+import json
+import os
+import runpy
+import sys
+import time
+from pathlib import Path
+
+SAID_S = 0.25  # between two words of progress, as the stages say them
+
+
+def main() -> None:
+    """Sleep, store, and end as the stand-in does; with --only as r2c2r_core.worker does."""
+    lengths, fake, workdir = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
+    stage = sys.argv[sys.argv.index("--until") + 1] if "--until" in sys.argv else "ingest"
+    length = json.loads(lengths.read_text())[stage]
+    folder = workdir / "nouns" / stage
+    folder.mkdir(parents=True, exist_ok=True)
+    if "--only" in sys.argv:
+        some_objects(length, stage, folder, sys.argv[sys.argv.index("--only") + 1 :])
+        return
+    names = range(length["files"])
+    if "shared" in length and all((folder / f"{name}.noun").exists() for name in objects()):
+        sleep(stage, length["start"])
+        names = range(0)
+    else:
+        sleep(stage, length["seconds"])
+    for number in names:
+        store(folder, str(number), length["bytes"] // length["files"])
+    sys.argv = [fake, *sys.argv[3:]]
+    runpy.run_path(fake, run_name="__main__")
+
+
+def some_objects(length: dict[str, float], stage: str, folder: Path, names: list[str]) -> None:
+    """These, or with none what they share."""
+    known = objects()
+    each = (length["seconds"] - length["shared"]) / len(known)
+    sleep(stage, length["start"] + each * len(names) if names else length["shared"])
+    for name in names:
+        store(folder, name, int(length["bytes"]) // len(known))
+    say(done=stage, failures={}, left=[name for name in known if not (folder / f"{name}.noun").exists()])
+
+
+def objects() -> list[str]:
+    """Of the job's request."""
+    request = Path(sys.argv[len(sys.argv) - sys.argv[::-1].index("--request")])
+    return [item["name"] for item in json.loads(request.with_name("prompts.json").read_text())["objects"]]
+
+
+def sleep(stage: str, seconds: float) -> None:
+    """Saying how far it is."""
+    began = time.monotonic()
+    while (left := began + seconds - time.monotonic()) > 0:
+        say(stage=stage, fraction=1 - left / seconds, text="a kitchen")
+        time.sleep(min(SAID_S, left))
+
+
+def store(folder: Path, name: str, size: int) -> None:
+    """A noun of so many bytes that nothing else has."""
+    (folder / f"{name}.noun").write_bytes(os.urandom(size))
+
+
+def say(**words: object) -> None:
+    """To whoever started it."""
+    sys.stdout.write(json.dumps(words) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
