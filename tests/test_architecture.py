@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import re
 import subprocess
 import sys
 import tomllib
@@ -28,6 +29,43 @@ def test_stages_never_import_each_other() -> None:
                     assert f"r2c2r_core.{other}" not in path.read_text(), f"{path} imports {other}"
 
 
+def test_no_module_of_the_core_and_the_app_imports_itself_by_way_of_others() -> None:
+    """A circle is said by its members; imports inside functions and for types count."""
+    try:
+        TopologicalSorter(import_graph(ROOT, "r2c2r_core", "app")).prepare()
+    except CycleError as problem:
+        pytest.fail(" imports ".join(reversed(problem.args[1])))
+
+
+def test_a_circle_of_imports_is_found_across_packages(tmp_path: Path) -> None:
+    for name, code in {
+        "core/__init__.py": "",
+        "core/a.py": "def f():\n    from app import b\n",
+        "app/__init__.py": "",
+        "app/b.py": "from core.c import x\n",
+        "core/c.py": "from . import a\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(code)
+    with pytest.raises(CycleError):
+        TopologicalSorter(import_graph(tmp_path, "core", "app")).prepare()
+    (tmp_path / "core" / "c.py").write_text("x = 1\n")
+    TopologicalSorter(import_graph(tmp_path, "core", "app")).prepare()
+
+
+def import_graph(root: Path, *packages: str) -> dict[str, set[str]]:
+    """By module of these packages: the modules of them that it imports."""
+    paths = {path: path.relative_to(root).with_suffix("").parts for name in packages for path in (root / name).rglob("*.py")}
+    modules = {".".join(parts[:-1] if parts[-1] == "__init__" else parts): path for path, parts in paths.items()}
+    graph = {}
+    for name, path in modules.items():
+        package = name if path.stem == "__init__" else name.rpartition(".")[0]
+        found = _imported(ast.parse(path.read_text()), package) & modules.keys()
+        members = {other.rpartition(".")[0] for other in found}  # `from package import module` names the package too
+        graph[name] = {other for other in found if other not in members or "__init__" not in modules[other].name} - {name}
+    return graph
+
+
 SEGMENT = ROOT / "r2c2r_core" / "segment"
 
 
@@ -35,6 +73,15 @@ SEGMENT = ROOT / "r2c2r_core" / "segment"
 def test_a_room_of_segment_has_at_most_five_import_levels(room: Path) -> None:
     levels = import_levels(room)
     assert max(levels.values()) <= 5, {name: level for name, level in levels.items() if level > 5}
+
+
+def test_every_room_of_segment_stands_in_its_table_above_the_rooms_that_use_it() -> None:
+    listed = re.findall(r"^\| (\w+) +\|", (SEGMENT / "__init__.py").read_text(), re.MULTILINE)[1:]
+    assert sorted(listed) == sorted(path.parent.name for path in SEGMENT.glob("*/__init__.py"))
+    for place, room in enumerate(listed):
+        named = {name for path in (SEGMENT / room).rglob("*.py") for name in _imported(ast.parse(path.read_text()), "")}
+        above = {name.split(".")[2] for name in named if name.startswith("r2c2r_core.segment.")} & set(listed)
+        assert above <= {room, *listed[:place]}, f"{room} imports {above - set(listed[:place])}"
 
 
 def test_import_levels_are_counted_through_functions_and_relative_imports(tmp_path: Path) -> None:
@@ -96,7 +143,8 @@ for name in ("torch", "transformers", "torchvision", "timm"):
 import r2c2r_core, app
 for package in (r2c2r_core, app):
     for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
-        if "probes" not in found.name:  # programs of their own: they import what they probe
+        # probes are programs of their own: they import what they probe; an extra's own package subclasses what the extra brings
+        if "probes" not in found.name and not found.name.startswith("r2c2r_core.gym."):
             importlib.import_module(found.name)
 """
     done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)

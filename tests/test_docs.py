@@ -1,5 +1,6 @@
 """The documentation builds from the checkout, without the network and without a warning, and says what the code is."""
 
+import html
 import importlib.util
 import os
 import re
@@ -62,6 +63,17 @@ def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> No
         assert f'href="{page.relative_to(site)}"' in start, page
         loaded = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(https?://[^\"]+)\"", page.read_text())
         assert loaded == [], page
+
+
+def test_files_of_the_checkout_stand_in_their_pages(site: Path) -> None:
+    """A marker that is misspelt is printed as it stands, without a warning: every page has what it includes."""
+    for page in (ROOT / "docs").rglob("*.md"):
+        built = re.sub(r"<[^>]*>", "", (site / page.relative_to(ROOT / "docs").with_suffix(".html")).read_text())
+        assert re.search(r"8 *&lt; *-|8 *< *-", built) is None, f"{page} shows a marker instead of a file"
+        for name in re.findall(r'^--8<-- "([^":]+\.py)"$', page.read_text(), re.MULTILINE):
+            first = (ROOT / name).read_text().partition("\n")[0]
+            assert html.unescape(built).count(first) == 1, f"{page} lacks {name}"
+    assert "def main" in re.sub(r"<[^>]*>", "", (site / "how-to" / "python.html").read_text())
 
 
 def test_the_reference_has_the_docstrings(site: Path) -> None:

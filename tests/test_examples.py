@@ -1,21 +1,18 @@
 """Every file of examples/ runs, on a sample so small that its pictures say little."""
 
 import runpy
-import socket
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-import uvicorn
 
 from app.main import create_app
 from app.settings import Settings
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.synthetic.stage import SamplePaths, write_sample
 from tests.app.conftest import FAKE_COMMANDS
+from tests.app.served import served
 from tests.core.export.conftest import write_folder
 from tests.core.export.kitchen import kitchen
 
@@ -73,23 +70,32 @@ def test_a_bundle_opens_in_mujoco(run: Run, tmp_path: Path) -> None:
         assert float(reached) > 0.95 * float(upper), line
 
 
+def test_a_bundle_opens_beside_robots_of_others_or_it_is_said_what_is_missing(run: Run, tmp_path: Path) -> None:
+    folder = write_folder(kitchen(), tmp_path / "bundle")
+    said = [
+        run("bundle_in_isaac_lab", folder, "drawer_1"),
+        run("bundle_in_maniskill", folder),
+        run("bundle_in_robosuite", folder),
+    ]
+    for lines in said:
+        assert lines.startswith("not run: ") or "drawer_1_slide: 0.4" in lines, lines
+    with pytest.raises(SystemExit, match="there is no such object"):
+        run("bundle_in_isaac_lab", folder, "fridge")
+
+
+def test_opening_is_learnt(run: Run, tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'r2c2r[gym]'")
+    said = run("learn_to_open", write_folder(kitchen(), tmp_path / "bundle"), "drawer_1_slide", 3, 3).splitlines()
+    assert said[0] == "before: 0 of 3"
+    assert int(said[1].split(": ")[1][0]) >= 2, said
+
+
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
     """A server on a free port whose workers obey the tests; the address it would print."""
-    with socket.socket() as listening:
-        listening.bind(("127.0.0.1", 0))
-        port = listening.getsockname()[1]
-        settings = Settings(data_dir=tmp_path, host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0)
-        app = create_app(settings, commands=FAKE_COMMANDS)
-        server = uvicorn.Server(uvicorn.Config(app, log_level="warning"))
-        thread = threading.Thread(target=server.run, args=([listening],))
-        thread.start()
-        while not server.started:
-            assert thread.is_alive()
-            time.sleep(0.01)  # uvicorn tells of its start by this flag alone
+    settings = Settings(data_dir=tmp_path, host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0)
+    with served(create_app(settings, commands=FAKE_COMMANDS)) as port:
         yield f"http://127.0.0.1:{port}/?token={settings.launch_token}"
-        server.should_exit = True
-        thread.join()
 
 
 def test_the_api_is_driven(run: Run, address: str) -> None:

@@ -1,6 +1,7 @@
 """Packages of other people, installed as their metadata and files on the path: used by the code of the command line."""
 
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,22 +10,27 @@ import pytest
 
 from r2c2r_core import cli, plugins
 from r2c2r_core.align.protocol import MATCHERS
-from r2c2r_core.errors import InputError
+from r2c2r_core.errors import BackendUnavailable, CaptureError, InputError
 from r2c2r_core.export.lint import lint
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.support import supported
-from r2c2r_core.export.writers.meshes import write_meshes
 from r2c2r_core.export.writers.table import FORMATS, formats, write_formats
-from r2c2r_core.generate.stage import GENERATORS
+from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates
+from r2c2r_core.geometry.meshes import is_watertight
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.kitchen.names import category_of, named
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.registry import Registry
 from r2c2r_core.segment.stage import SEGMENTERS
 from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.fixtures.spec import Order
 from r2c2r_core.synthesize.fixtures.table import fixture_of
-from tests.core.export.conftest import write_folder
+from tests.core.export.conftest import write_folder, write_meshes
 from tests.core.export.kitchen import kitchen
+from tests.core.generate import scenes
 
 Install = Callable[..., Path]
 
@@ -54,6 +60,11 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
     plugins.forget()
 
 
+@pytest.fixture(scope="module")
+def bottle_scene() -> tuple[Capture, MaskTrack]:
+    return scenes.bottle_scene()
+
+
 READER = """
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.readers.protocol import Part, Reader
@@ -66,7 +77,14 @@ READER = Reader(name="Sonar", parts=(Part("pings.sonar", r"pings\\.sonar"),), op
 BACKEND = """
 from r2c2r_core.registry import Backend
 
-LINE = Backend(name="oracle", target="pathlib:PurePosixPath", summary="knows", licence="MIT")
+LINE = Backend(name="oracle", target="delphi:Oracle", summary="knows", licence="MIT")
+
+class Oracle:
+    def describe(self, image, mask): ...
+    def match(self, first, second): ...
+    def match_many(self, first, others): ...
+    def make(self, evidence, candidate_id, seed): ...
+    def open(self, capture, cache, config, *, progress): ...
 """
 FIXTURE = """
 from dataclasses import replace
@@ -98,6 +116,30 @@ COUNT = Format(
 """
 
 
+OWN_PACKAGE = Path(__file__).resolve().parent.parent / "examples" / "own_package"
+
+
+def own_entry(group: str) -> tuple[str, str, str]:
+    """Module, entry point and code of the example package, as its pyproject.toml says."""
+    ((name, target),) = tomllib.loads((OWN_PACKAGE / "pyproject.toml").read_text())["project"]["entry-points"][group].items()
+    module = target.partition(":")[0]
+    return module, f"{name} = {target}", (OWN_PACKAGE / f"{module}.py").read_text()
+
+
+def write_numpy_scan(scan: Path, frames: int) -> list[Rigid3]:
+    """A wall 2 m away with a box 0.4 m before it, from places 0.1 m apart; the cameras' poses."""
+    scan.mkdir()
+    towards_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    camera = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 36.0], [0.0, 0.0, 1.0]])
+    poses = [Rigid3(towards_y, np.array([0.1 * k, 0.0, 1.2])) for k in range(frames)]
+    for k, pose in enumerate(poses):
+        depth = np.full((72, 96), 2.0, np.float32)
+        depth[24:48, 30 - 5 * k : 60 - 5 * k] = 1.6  # 0.1 m are 5 px of 80 at 1.6 m
+        rgb = np.random.default_rng(k).integers(0, 255, (72, 96, 3), np.uint8)
+        np.savez(scan / f"frame_{k}.npz", rgb=rgb, depth_m=depth, camera=camera, world_from_camera=pose.matrix)
+    return poses
+
+
 def doctors_lines(capsys: pytest.CaptureFixture[str]) -> str:
     cli.main(["doctor"])
     return capsys.readouterr().out
@@ -117,6 +159,36 @@ def test_a_recording_format_of_another_package_is_recognised(
     assert "plug-in sonar" in doctors_lines(capsys)
 
 
+def test_a_recording_of_another_packages_format_is_read(install: Install, tmp_path: Path) -> None:
+    install(own_entry("r2c2r.readers")[0], "r2c2r.readers", *own_entry("r2c2r.readers")[1:])
+    poses = write_numpy_scan(tmp_path / "scan", frames=3)
+    capture = read_capture(tmp_path / "scan", tmp_path / "frames", IngestConfig())
+    assert (capture.format, len(capture.frames)) == ("NumPy frames", 3)
+    for frame, pose in zip(capture.frames, poses, strict=True):
+        stood = (capture.world_from_capture @ pose).matrix
+        np.testing.assert_allclose(frame.world_from_camera.matrix, stood, atol=5e-3)  # 5 mm: poses may be refined
+        depth = capture.images.depth(frame.index).metres
+        assert depth[36, 80] == pytest.approx(2.0, abs=1e-3)  # the store's step is 0.25 mm
+        assert depth[36, 40] == pytest.approx(1.6, abs=1e-3)
+    (tmp_path / "scan" / "frame_1.npz").write_bytes(b"PK")
+    with pytest.raises(CaptureError, match=r"frame_1\.npz"):
+        read_capture(tmp_path / "scan", tmp_path / "other", IngestConfig())
+
+
+def test_a_generator_of_another_package_makes_the_candidates(install: Install, bottle_scene: tuple[Capture, MaskTrack]) -> None:
+    module, entry, code = own_entry("r2c2r.generators")
+    install(module, "r2c2r.generators", entry, code)
+    found = generate_candidates(*bottle_scene, "convex-hull", GenerateConfig(count=2, pool_frames=6))
+    assert [asset.candidate_id for asset in found.candidates] == ["c0", "c1"]
+    for asset in found.candidates:
+        assert asset.generator == "convex-hull"
+        assert is_watertight(asset.mesh.vertices, asset.mesh.faces)
+        assert asset.world_from_mesh is not None
+        stood = asset.world_from_mesh.apply(asset.mesh.vertices)
+        np.testing.assert_allclose((stood.max(axis=0) + stood.min(axis=0)) / 2, (0.0, 0.0, 1.04), atol=0.03)
+    assert found.chosen_id in ("c0", "c1")
+
+
 @pytest.mark.parametrize(
     ("group", "table"), [("r2c2r.segmenters", SEGMENTERS), ("r2c2r.generators", GENERATORS), ("r2c2r.matchers", MATCHERS)]
 )
@@ -127,9 +199,41 @@ def test_a_backend_of_another_package_can_be_chosen_by_name(
     with pytest.raises(InputError):
         table.get("oracle")
     install("delphi", group, "oracle = delphi:LINE", BACKEND)
-    assert type(table.load("oracle")).__name__ == "PurePosixPath"
+    assert type(table.load("oracle")).__name__ == "Oracle"
     assert table.default == default
     assert f"{table.seam} oracle" in doctors_lines(capsys)
+
+
+@pytest.mark.parametrize(
+    ("group", "table", "method", "protocol"),
+    [
+        ("r2c2r.segmenters", SEGMENTERS, "open", "r2c2r_core.segment.protocol.Segmenter"),
+        ("r2c2r.generators", GENERATORS, "make", "r2c2r_core.generate.protocol.MeshGenerator"),
+        ("r2c2r.matchers", MATCHERS, "match_many", "r2c2r_core.align.protocol.Matcher"),
+    ],
+)
+def test_a_backend_that_lacks_a_method_is_refused_with_a_line_that_says_which(
+    install: Install, group: str, table: Registry, method: str, protocol: str
+) -> None:
+    install("delphi", group, "oracle = delphi:LINE", BACKEND.replace(f"def {method}(", "def forgotten("))
+    with pytest.raises(BackendUnavailable) as caught:
+        table.load("oracle")
+    said = f"{table.seam} 'oracle' is not available: delphi:Oracle: it has no {method}"
+    assert str(caught.value) == f"{said}; a class with the methods of {protocol} is expected"
+
+
+def test_a_backend_whose_class_is_gone_or_unfinished_is_refused(install: Install) -> None:
+    unfinished = "\nfrom r2c2r_core.align.protocol import Matcher\n" + BACKEND.replace(
+        "class Oracle:", "class Oracle(Matcher):"
+    )
+    install("delphi", "r2c2r.matchers", "oracle = delphi:LINE", unfinished.replace("def match(", "def forgotten("))
+    with pytest.raises(BackendUnavailable, match="delphi:Oracle: it has no match;"):
+        MATCHERS.load("oracle")
+    install("dodona", "r2c2r.generators", "oracle = dodona:LINE", BACKEND.replace("class Oracle", "class Oak"))
+    (Path(sys.modules["delphi"].__file__ or "")).write_text("")
+    del sys.modules["delphi"]
+    with pytest.raises(BackendUnavailable, match="delphi:Oracle: there is none; "):
+        GENERATORS.load("oracle")
 
 
 def test_a_kind_of_furniture_of_another_package_is_named_and_built(install: Install) -> None:
@@ -199,7 +303,9 @@ def test_a_format_that_cannot_be_written_is_left_out(
 ) -> None:
     install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT.replace("    Path(folder", "    1 / 0; Path(folder"))
     plan = supported(plan_bundle(kitchen()))
-    write_meshes(plan, tmp_path, 64)
-    write_formats(plan, tmp_path)
-    assert {path.name for path in tmp_path.glob("scene.*")} == {entry.file for entry in FORMATS}
+    write_meshes(plan, tmp_path)
+    write_formats(plan, tmp_path, formats())
+    written = {path.name for path in tmp_path.iterdir()}
+    assert {entry.file for entry in FORMATS} <= written
+    assert "scene.count" not in written
     assert "scene.count is left out of the bundle: ZeroDivisionError: division by zero" in caplog.text

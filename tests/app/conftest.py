@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -21,6 +22,8 @@ from app.services import launch_keys
 from app.services.context import Context
 from app.settings import Settings
 from app.viewer.client import Viewer
+from tests.app import postgres
+from tests.app.postgres import PostgresServer
 
 FAKES = Path(__file__).parent / "fakes"
 ORIGIN = "http://127.0.0.1:8000"
@@ -38,6 +41,7 @@ FAKE_COMMANDS = Commands(
     worker=fake("worker", BARE),
     ingest=fake("ingest", BARE),
     sample=fake("sample", BARE),
+    vary=fake("vary", BARE),
     live=fake("live"),
 )
 
@@ -107,10 +111,12 @@ def running(
         "min_free_bytes": 0,
         "job_memory_bytes": 0,
         "kill_grace_s": 0.5,
+        "beat_s": 3600.0,  # no signs of life among the statements that a test counts
         "user": "tester",
         "import_roots": (data_dir.parent,),
     }
-    settings = Settings(data_dir=data_dir, **{**given, **options})
+    rows = {"postgres": _POSTGRES[-1].of_folder(data_dir)} if _POSTGRES else {}
+    settings = Settings(data_dir=data_dir, **{**given, **rows, **options})
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
         client.get(f"/?token={settings.launch_token}")
@@ -119,6 +125,7 @@ def running(
         assert blocked == [], "everybody waited for the database"
 
 
+_POSTGRES: list[PostgresServer] = []  # that of the test which runs, when it runs on one
 ASKED_ON_THE_LOOP: list[tuple[URL, str]] = []
 """The database, and what asked it on the thread of an event loop, where everybody waits for the answer."""
 _COUNTED: dict[URL, list[str]] = {}  # the statements that a database is asked, while a test counts them
@@ -138,7 +145,7 @@ def statements(engine: Engine) -> Iterator[list[str]]:
 
 @contextmanager
 def commits(engine: Engine) -> Iterator[list[Connection]]:
-    """The transactions that are committed meanwhile, by any thread."""
+    """The transactions that are committed meanwhile, by any thread but those that run jobs: they give signs of life."""
     _COMMITTED[engine.url] = []
     try:
         yield _COMMITTED[engine.url]
@@ -165,7 +172,8 @@ def _note_statement(connection: Connection, _cursor: object, statement: str, *_:
 
 @event.listens_for(Engine, "commit")
 def _note_commit(connection: Connection) -> None:
-    if (counted := _COMMITTED.get(connection.engine.url)) is not None:
+    counted = _COMMITTED.get(connection.engine.url)
+    if counted is not None and not threading.current_thread().name.startswith("jobs-"):
         counted.append(connection)
 
 
@@ -180,6 +188,36 @@ def _note_where_asked(connection: Connection) -> None:
     with suppress(RuntimeError):  # no loop runs on this thread, as it should be
         asyncio.get_running_loop()
         ASKED_ON_THE_LOOP.append((connection.engine.url, "".join(traceback.format_stack(limit=12))))
+
+
+ONE_APP = frozenset({"shared", "made"})  # of a module: what they start serves all of its tests, from a file
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """What starts the app runs with both databases, unless it chooses its own."""
+    starts = "start" in metafunc.fixturenames or hasattr(metafunc.module, "running")
+    if starts and not ONE_APP.intersection(metafunc.fixturenames) and not any(metafunc.definition.iter_markers("own_database")):
+        metafunc.parametrize("rows_in", ["sqlite", "postgres"], indirect=True)
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[PostgresServer]:
+    with postgres.server() as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def rows_in(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Where the apps of this test keep their rows; commands it runs are told those of the folder that `start` uses."""
+    if getattr(request, "param", "sqlite") == "sqlite":
+        yield
+        return
+    found: PostgresServer = request.getfixturevalue("postgres_server")
+    monkeypatch.setenv("R2C2R_DATABASE", found.of_folder(tmp_path / "data"))
+    _POSTGRES.append(found)
+    yield
+    _POSTGRES.clear()
+    found.drop_all()
 
 
 @pytest.fixture

@@ -28,8 +28,14 @@ def finished_kitchen(web: Running, certificate: Certificate, *bundles: Path) -> 
 
 def keep_nouns(work: Path, certificate: Certificate) -> None:
     """The nouns a run leaves behind."""
+    Workspace(work).save("ingest", "scene", reconstruction().capture, {"key": "k", "seconds": 1.0})
+    keep_results(work, certificate)
+
+
+def keep_results(work: Path, certificate: Certificate) -> None:
+    """The same but for the recording, which stays what it is."""
     run, space = reconstruction(), Workspace(work)
-    nouns: list[tuple[str, str, Any]] = [("ingest", "scene", run.capture), ("warp", "scene", run.scene)]
+    nouns: list[tuple[str, str, Any]] = [("warp", "scene", run.scene)]
     nouns += [("segment", track.name, track) for track in run.tracks]
     nouns += [("generate", found.object_name, found) for found in run.candidates]
     nouns += [("align", placed.object_name, placed) for placed in run.placements]

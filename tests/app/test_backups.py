@@ -18,6 +18,7 @@ from r2c2r_core.cli import main
 from tests.app.conftest import Running
 
 Start = Callable[..., Any]
+pytestmark = pytest.mark.own_database
 
 
 @pytest.fixture

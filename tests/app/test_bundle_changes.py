@@ -38,7 +38,9 @@ def test_what_a_person_would_see_is_said_with_both_values() -> None:
 
 def test_a_bundle_of_some_formats_has_those_scenes_and_the_proof(tmp_path: Path) -> None:
     whole = tmp_path / "whole.zip"
-    names = {"scene.urdf", "scene.xml", "scene.usda", "scene.glb", "manifest.json", "report.html", "meshes/a/a.obj"}
+    scenes = {"scene.urdf", "scene.srdf", "scene.xml", "scene.usda", "scene.usdz", "scene.glb", "package.xml", "ros/scene.urdf"}
+    assets = {f"assets/a/a{suffix}" for suffix in (".urdf", ".xml", ".usda", ".glb")}
+    names = {*scenes, *assets, "manifest.json", "report.html", "meshes/a/a.obj"}
     with zipfile.ZipFile(whole, "w") as archive:
         for name in sorted(names):
             archive.writestr(name, "{}" if name == "manifest.json" else name)
@@ -46,6 +48,10 @@ def test_a_bundle_of_some_formats_has_those_scenes_and_the_proof(tmp_path: Path)
     def members(*formats: str) -> set[str]:
         return set(zipfile.ZipFile(io.BytesIO(_with_formats(whole, frozenset(formats)))).namelist())
 
-    assert members("urdf") == {"scene.urdf", "manifest.json", "report.html", "meshes/a/a.obj"}
-    assert members("glb") == {"scene.glb", "manifest.json", "report.html"}
-    assert members("urdf", "mjcf", "usd", "glb") == names
+    proof = {"manifest.json", "report.html"}
+    assert members("urdf") == {"scene.urdf", "scene.srdf", "assets/a/a.urdf", "meshes/a/a.obj", *proof}
+    assert members("mjcf") == {"scene.xml", "assets/a/a.xml", "meshes/a/a.obj", *proof}
+    assert members("usd") == {"scene.usda", "scene.usdz", "assets/a/a.usda", "meshes/a/a.obj", *proof}
+    assert members("ros") == {"package.xml", "ros/scene.urdf", "meshes/a/a.obj", *proof}
+    assert members("glb") == {"scene.glb", *proof}  # an asset's names its textures in meshes/
+    assert members("urdf", "mjcf", "usd", "glb", "ros") == names

@@ -23,7 +23,7 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.pipeline import DISPUTED
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.runs.orthomosaic import joined
+from r2c2r_core.segment.mosaics.orthomosaic import joined
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
 from tests.app.conftest import FAKE_COMMANDS, Running, fake

@@ -100,7 +100,7 @@ def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pyte
     refused = web.client.post("/api/projects/upload?filename=a.r3d", content=b"PK\3\4abc")
     assert (refused.status_code, refused.json()["kind"]) == (507, "no-space")
     assert [p["id"] for p in web.get("/api/projects")] == [project]
-    monkeypatch.setattr("app.jobs.runner.Worker", full)
+    monkeypatch.setattr("app.jobs.compute.Worker", full)
     job = web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "failed")
     assert job["error"]["kind"] == "no-space"
     assert len(web.get(f"/api/projects/{project}/objects")) == 2

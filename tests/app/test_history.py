@@ -143,9 +143,8 @@ def whole(session: Session, scope: history.Scope) -> Any:
     flat = history.snapshot(session, session.get_one(SceneObject, 1), scope)
     if scope == "prompts":
         points = [{"id": int(key.split()[1]), **value} for key, value in flat.items() if key.startswith("point ")]
-        fields = {
-            key: value for key, value in flat.items() if " " not in key and key not in ("front", "crop")
-        }  # nobody drew then
+        newer = ("front", "crop", "assignee")  # nobody drew or assigned then
+        fields = {key: value for key, value in flat.items() if " " not in key and key not in newer}
         return fields | {"points": points}
     corrected = {key.split()[1]: value for key, value in flat.items() if key.startswith("override ")}
     return {"override": corrected, "verdicts": [{"candidate": k.split()[1], **v} for k, v in flat.items() if k[0] == "v"]}

@@ -121,6 +121,7 @@ def test_a_recording_is_taken_from_a_path_and_stays_there(web: Running, tmp_path
     project = web.post("/api/projects/import", {"path": str(folder)}, 202)
     web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "ready")
     web.delete(f"/api/projects/{project['id']}")
+    web.delete(f"/api/trash/{project['id']}")
     assert (folder / "frame.txt").exists()
 
 
@@ -159,6 +160,7 @@ def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and
     told = web.get(f"/api/jobs/{project['job']['id']}")["no_retry"]  # before anybody asks for it
     assert ("refused" in told, web.post(f"/api/jobs/{project['job']['id']}/retry", status=409)["message"]) == (True, told)
     web.delete(f"/api/projects/{project['id']}")
+    web.delete(f"/api/trash/{project['id']}")
     assert left_behind(web) == []
 
 
@@ -174,7 +176,9 @@ def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) ->
     project = web.sample()
     folder = web.settings.data_dir / "projects" / project
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
-    assert web.delete(f"/api/projects/{project}")["freed_bytes"] >= size > 0
+    web.delete(f"/api/projects/{project}")
+    assert folder.exists()
+    assert web.delete(f"/api/trash/{project}")["freed_bytes"] >= size > 0
     assert not folder.exists()
     web.get(f"/api/projects/{project}", 404)
     assert web.get("/api/jobs") == []
@@ -203,7 +207,7 @@ def break_off(web: Running, method: str, path: str, content: bytes, query: str =
     told = [{"type": "http.request", "body": content, "more_body": True}, {"type": "http.disconnect"}]
     said: list[Any] = []
     sent = {
-        "host": "127.0.0.1",
+        "host": "127.0.0.1:8000",  # the session's cookie is named after its port
         "cookie": f"{COOKIE}={web.client.cookies[COOKIE]}",
         "x-requested-with": "tests",
         **(headers or {}),

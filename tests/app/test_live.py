@@ -1,4 +1,5 @@
 import base64
+import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
+from app.services import prompts
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
@@ -57,6 +59,27 @@ def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: C
         assert (lane["frames"], lane["complete"], lane["source"]) == ([0, 3, 7], True, "live")
         (shown,) = [m for m in web.get(f"/api/projects/{project}/masks/7") if m["object"] == made["id"]]
         assert shown["mask"] == masks[2]["mask"]
+
+
+def test_the_end_of_masks_is_told_last_however_the_threads_meet(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = web.sample()
+    prompts_tell, ended = prompts._tell, threading.Event()
+
+    def tell_late(context: Any, shape: Any) -> Any:
+        if shape.segment == "done":
+            ended.set()
+        elif shape.points:
+            ended.wait(0.5)  # what was read before the end is told after it, if it can be
+        return prompts_tell(context, shape)
+
+    monkeypatch.setattr(prompts, "_tell", tell_late)
+    with listening(web, project) as socket:
+        made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+        web.until(ended.is_set)
+        web.post(f"/api/projects/{project}/comments", {"text": "after it"}, 201)
+        seen, _ = until(socket, type="comments")
+    told = [m["object"]["segment"] for m in seen if m["type"] == "object" and m["object"]["id"] == made["id"]]
+    assert told[-1] == "done"
 
 
 def test_a_newer_click_supersedes_the_masks_of_the_older(web: Running) -> None:

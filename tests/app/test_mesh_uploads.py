@@ -16,7 +16,7 @@ from tests.app.test_states import step
 
 
 @pytest.fixture(scope="module")
-def reviewed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reviewed]:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reviewed]:
     """A project whose drawer_1 is finished."""
     with running(tmp_path_factory.mktemp("meshes") / "data") as web:
         project = web.sample()
@@ -41,8 +41,8 @@ def left_behind(web: Running, project: str) -> list[Path]:
     return [path for folder in folders for path in folder.rglob("*") if path.is_file() or not any(path.iterdir())]
 
 
-def test_it_is_kept_under_a_name_of_its_own(reviewed: Reviewed) -> None:
-    web, project, number = reviewed
+def test_it_is_kept_under_a_name_of_its_own(shared: Reviewed) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     names = [
         send(web, address(project, number), b"glTF", 201, "../../m%C3%BCg.glb")["group"]["override"]["candidate"] for _ in "ab"
@@ -62,34 +62,32 @@ def test_it_is_kept_under_a_name_of_its_own(reviewed: Reviewed) -> None:
         ("x.glb", b"unreadable", "x.glb: no triangles found"),
     ],
 )
-def test_what_is_no_usable_mesh_is_refused_and_leaves_nothing(
-    reviewed: Reviewed, name: str, content: bytes, words: str
-) -> None:
-    web, project, number = reviewed
+def test_what_is_no_usable_mesh_is_refused_and_leaves_nothing(shared: Reviewed, name: str, content: bytes, words: str) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     refused = send(web, address(project, number), content, 422, name)
     assert (refused["kind"], words in refused["message"]) == ("override", True)
     assert left_behind(web, project) == before
 
 
-def test_one_that_is_too_large_leaves_nothing(reviewed: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
-    web, project, number = reviewed
+def test_one_that_is_too_large_leaves_nothing(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     monkeypatch.setattr(mesh_uploads, "MOST_BYTES", 100)
     assert send(web, address(project, number), (bytes(60) for _ in range(3)), 413)["kind"] == "too-large"
     assert left_behind(web, project) == before
 
 
-def test_one_whose_sender_leaves_leaves_nothing(reviewed: Reviewed) -> None:
-    web, project, number = reviewed
+def test_one_whose_sender_leaves_leaves_nothing(shared: Reviewed) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     said = break_off(web, "POST", address(project, number), b"half", query="filename=mine.glb")
     assert said[0]["status"] == 422
     assert left_behind(web, project) == before
 
 
-def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(reviewed: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
-    web, project, number = reviewed
+def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     at = f"/api/projects/{project}/objects/{number}"
     seen = web.get(f"{at}/candidates")["version"]
@@ -111,8 +109,8 @@ def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(reviewed: Revi
     assert send(web, f"{at}/candidates", b"glTF", 201, version=now)["group"]["version"] > now
 
 
-def test_an_approved_project_takes_none(reviewed: Reviewed) -> None:
-    web, project, number = reviewed
+def test_an_approved_project_takes_none(shared: Reviewed) -> None:
+    web, project, number = shared
     before = left_behind(web, project)
     for to in ("ready", "in review", "approved"):
         step(web, project, to, "it is time")

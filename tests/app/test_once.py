@@ -12,15 +12,30 @@ from sqlmodel import select
 from app.db import once
 from app.db.engine import reading, writing
 from app.db.once import Sending
-from app.db.tables import Comment, Event, Job, Override, Point, Project, ProjectMember, SceneObject, SentChange, Verdict
+from app.db.tables import (
+    Comment,
+    Event,
+    Job,
+    Override,
+    Point,
+    Project,
+    ProjectMember,
+    SceneObject,
+    SentChange,
+    TrueLength,
+    Verdict,
+)
 from app.errors import Conflict
 from app.routes.once import COVERED
-from app.services import prompts, sending
+from app.services import accounts, prompts, sending
 from app.settings import Settings
 from app.viewer.client import Viewer
 from tests.app.conftest import Running, commits, fake
 from tests.app.nouns import finish
+from tests.app.test_honeypots import write_truth
+from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
+from tests.app.test_uploads import begin, send
 
 CLICK = {"frame": 3, "x": 20.0, "y": 20.0, "label": 1}
 
@@ -157,6 +172,8 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
     assert _kept(web) == 0
     keyed(web, "POST", f"{at}/objects/1/points", "k2", CLICK)
     web.delete(at)
+    assert _kept(web) == 1  # in the trash a project is whole
+    web.delete(at.replace("/projects/", "/trash/"))
     assert _kept(web) == 0
 
 
@@ -179,8 +196,9 @@ def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Calla
     assert tried == covered(web)
 
 
-CHANGES_NOTHING_STORED = {"openLive", "segmentObject", "cancelSegment", "cancelJob"} | {
+CHANGES_NOTHING_STORED = {"openLive", "segmentObject", "cancelSegment", "cancelJob", "deleteVariants"} | {
     "openViewer", "showInViewer", "setJoints", "placeInViewer",
+    "assignProject", "markSeen",  # nobody has an account here
 }  # fmt: skip
 
 
@@ -194,6 +212,7 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     (folder / "elsewhere" / "frame.txt").touch()
     yield "sampleProject", "POST", "/api/projects/sample", {}
     yield "importProject", "POST", "/api/projects/import", {"path": str(folder / "elsewhere")}
+    yield "duplicateProject", "POST", f"{at}/duplicate", None
     yield "createObject", "POST", f"{at}/objects", {"category": "mug", "points": [CLICK]}
     yield "editObject", "PATCH", on, {"colour": 5}
     yield "addPoint", "POST", f"{on}/points", CLICK
@@ -217,15 +236,32 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     yield "restoreProposals", "POST", f"{at}/proposals/restore", None
     yield "giveVerdict", "POST", f"{on}/verdicts", {"candidate": "c1", "verdict": "accepted", "rerun": False}
     yield "setOverride", "PATCH", f"{on}/override", {"hinge": "left", "rerun": False}
+    yield "correctMade", "PATCH", f"{at}/scene/drawer_1/override", {"joint_upper": 0.3, "rerun": False}
     yield "uploadCandidate", "POST", f"{on}/candidates?filename=mine.glb&rerun=false", b"glTF"
     yield "addComment", "POST", f"{at}/comments", {"text": "look"}
     yield "changeComment", "PATCH", f"{at}/comments/1", {"resolved": True}
+    points = [[0.0, 0.0, 0.9], [0.6, 0.0, 0.9]]
+    yield "addLength", "POST", f"{at}/lengths", {"metres": 0.6, "points_world": points}
+    yield "removeLength", "DELETE", f"{at}/lengths/1", None
     yield "setMembers", "PUT", f"{at}/members", {"members_only": True}
+    yield "makeVariants", "POST", f"{at}/variants", {"version": 1, "count": 2}
+    web.until(lambda: web.get(f"{at}/variants")["sets"] != [])
+    yield "deleteVariants", "DELETE", f"{at}/variants/v1-n2-s0", None
+    objects = [{"name": "left_door", "category": "cabinet"}]
+    listed = web.post("/api/templates", {"name": "narrow", "objects": objects}, 201)["id"]
+    yield "setChecklist", "PUT", f"{at}/checklist", {"template": listed}
+    yield "askOpinion", "POST", f"{at}/opinions", {"name": None}
+    yield "assignProject", "PUT", f"{at}/assignee", {"name": None}
+    yield "markSeen", "PUT", f"{at}/news", {"event": 1}
     yield "openViewer", "POST", f"{at}/viewer", None
     yield "showInViewer", "POST", f"{at}/viewer/show", {"mode": "cloud"}
     yield "setJoints", "POST", f"{at}/viewer/joints", {"values": {"door": 0.5}}
     yield "placeInViewer", "POST", f"{at}/viewer/place", {"pose": None}
     yield "readAgain", "PUT", f"{at}/reading", {"register_depth": True}
+    yield "giveRecording", "PUT", *_missing_recording(web, at)
+    write_truth(web.settings.data_dir / "projects" / project / "source")
+    accounts.add(web.context.engine, "alice", "annotator", "correct horse battery")
+    yield "slipHoneypot", "POST", f"{at}/honeypot", {"person": "alice", "name": "Flat 7"}
     held = behave(web, project, segment="hang")
     yield "runProject", "POST", f"{at}/run", {}
     web.until(lambda: (held / "hanging").exists())
@@ -235,6 +271,16 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     yield "retryJob", "POST", f"/api/jobs/{job}/retry", None
     yield "stepReview", "POST", f"{at}/review", {"from_state": "draft", "to": "ready", "reason": "go"}
     yield "deleteObject", "DELETE", on, None
+
+
+def _missing_recording(web: Running, at: str) -> tuple[str, dict[str, str]]:
+    """A project that came without its recording, which has arrived as an upload."""
+    web.until(lambda: web.get(at)["status"] == "ready")
+    said = web.client.get(f"/media/{at.removeprefix('/api/projects/')}/project.zip").content
+    lacks = web.post("/api/projects/upload?filename=x.zip", content=said, status=202)["id"]
+    sent = begin(web)
+    send(web.client, sent, 0, R3D)
+    return f"/api/projects/{lacks}/recording", {"upload": sent}
 
 
 def covered(web: Running) -> set[str]:
@@ -252,7 +298,8 @@ def stored(web: Running) -> Any:
     """What people gave, and what was queued: all that a change may change, once no import is about to add something."""
     busy = ("queued", "running")
     web.until(lambda: not [job for job in web.get("/api/jobs") if job["kind"] != "run" and job["state"] in busy])
-    tables = (Project.id, Project.members_only, ProjectMember, Job.id, SceneObject, Point, Override, Verdict, Comment, Event)
+    people = (Project.id, Project.members_only, ProjectMember, Job.id, Comment, Event)
+    tables = (*people, SceneObject, Point, Override, Verdict, TrueLength)
     with reading(web.context.engine) as session:
         rows = [sorted(repr(row) for row in session.exec(select(table))) for table in tables]
     return rows, sorted(path.name for path in web.settings.data_dir.glob("projects/*/uploads/*/*"))

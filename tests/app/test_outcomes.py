@@ -16,7 +16,7 @@ from tests.app.test_jobs import run
 
 def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A server killed meanwhile leaves the former ones: whoever has them open still reads all of them."""
-    monkeypatch.setattr(outcomes, "adopt_bundle", lambda *_: None)
+    monkeypatch.setattr(outcomes, "keep_bundle", lambda *_: None)
     files = project_files(tmp_path, "p")
     (tmp_path / "rows").mkdir()
     asked = files.request(1).with_name("prompts.json")
@@ -27,12 +27,13 @@ def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypat
     engine = open_engine(tmp_path / "rows" / "r.db")
     with files.finished_prompts.open() as former, writing(engine) as session:
         project = Project(id="p", name="p", status="ready", created=0.0, updated=0.0, source_name="s")
-        outcomes.run_done(session, Job(id=1, project_id="p", kind="run", state="done", created=0.0), project, files)
+        outcomes.run_files(session, Job(id=1, project_id="p", kind="run", state="done", created=0.0), project, files)
         assert json.load(former)["objects"] == ["former"]
     assert json.loads(files.finished_prompts.read_text())["objects"] == []
     engine.dispose()
 
 
+@pytest.mark.own_database
 def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project, digest = web.sample(), outcomes._sha256
     looked: list[Path] = []

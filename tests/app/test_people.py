@@ -15,10 +15,13 @@ from app.services import accounts
 from tests.app.conftest import COOKIE, ORIGIN, SOCKETS, Running
 from tests.app.people import PASSWORD, browser, signed_in, with_accounts
 
-REVIEWER = {"uploadCandidate", "giveVerdict", "setOverride"}
+REVIEWER = {"uploadCandidate", "giveVerdict", "setOverride", "correctMade"}
 ADMIN = {
     "importProject",
     "deleteProject",
+    "listTrash",
+    "restoreProject",
+    "deleteForGood",
     "browse",
     "listAccounts",
     "addAccount",
@@ -29,6 +32,11 @@ ADMIN = {
     "adoptUnknown",
     "leaveUnknown",
     "discardUnknown",
+    "listSeats",
+    "drainSeat",
+    "listHoneypots",
+    "slipHoneypot",
+    "scoreHoneypot",
 }
 OPEN = {"health", "signIn"}
 

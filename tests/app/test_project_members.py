@@ -139,7 +139,7 @@ def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
         assert kept.of["root"].delete(f"/api/projects/{kept.project}").status_code == 200
         while (message := carol.receive_json())["type"] != "gone":
             pass
-        assert (message["project"], message["why"]) == (kept.project, "was deleted")
+        assert (message["project"], message["why"]) == (kept.project, "was put into the trash")
 
 
 def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,6 +62,13 @@ def test_an_object_clicked_by_hand_takes_its_proposal(web: Running) -> None:
     assert [item["category"] for item in left] == ["drawer", "drawer"]
 
 
+def test_those_like_an_object_are_confirmed_under_its_category(web: Running) -> None:
+    project = web.sample()
+    ids = [item["id"] for item in proposed(web, project)[:2]]
+    made = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": ids, "category": "pull_out"}, 201)
+    assert [(item["name"], item["category"]) for item in made] == [("pull_out_1", "pull_out"), ("pull_out_2", "pull_out")]
+
+
 def test_dismissals_outlive_the_server_and_can_be_taken_back(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()

@@ -1,13 +1,15 @@
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from app.serve import register_finished
+from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
-from tests.app.nouns import finish
+from tests.app.nouns import finish, scene
 from tests.app.test_jobs import run
 
 
@@ -159,6 +161,21 @@ def test_corrections_are_checked_kept_and_cleared(reviewed: Reviewed) -> None:
     assert web.patch(address, {"hinge": "diagonal"}, 422)["kind"] == "invalid"
 
 
+def test_frames_marked_closed_or_open_reach_the_run_and_are_undone(reviewed: Reviewed) -> None:
+    """A run reads the marks from the same overrides.json as one without the app."""
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    marks = {"left": [{"frame": 3, "state": 0.0}, {"frame": 20, "state": 1.2}]}
+    said = web.patch(f"{address}/override", {"states": marks})
+    assert said["text"].endswith("openings marked in 2 frames")
+    web.job(said["job"]["id"], "done")
+    assert overrides(web, project) == {"states": marks}
+    for wrong in ({"left": [{"frame": -1, "state": 0.0}]}, {"left": [{"frame": 0, "state": 90.0}]}):
+        assert web.patch(f"{address}/override", {"states": wrong}, 422)["kind"] == "invalid", wrong
+    web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
+    assert web.get(f"{address}/override")["states"] == {}
+
+
 def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     scene = web.get(f"/api/projects/{project}/scene")
@@ -204,6 +221,7 @@ def test_a_finished_workspace_becomes_a_project_once(start: Callable[..., Any], 
         assert web.get(f"/api/projects/{project}/objects")[0]["segment"] == "done"
         assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
         web.delete(f"/api/projects/{project}")
+        web.delete(f"/api/trash/{project}")
     assert work.exists()  # outside the data folder: not ours to delete
 
 
@@ -303,3 +321,26 @@ def test_a_rename_keeps_masks_candidates_verdicts_and_the_scenes_object_until_th
     web.job(run(web, project), "done")
     finish(web.settings.data_dir / "projects" / project / "work", "cutlery")
     assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "cutlery")]
+
+
+def test_what_nobody_clicked_is_corrected_by_its_name_left_out_and_brought_back(reviewed: Reviewed) -> None:
+    web, project, _ = reviewed
+    made = scene("drawer_1")
+    (drawer,) = made.objects
+    work = web.settings.data_dir / "projects" / project / "work"
+    objects = (drawer, replace(drawer, name="counter_1", category="counter", joints=(), links=drawer.links[:1]))
+    Workspace(work).save("warp", "scene", replace(made, objects=objects), {"key": "k2", "seconds": 1.0})
+    found = {item["run_name"]: item for item in web.get(f"/api/projects/{project}/scene")["items"]}
+    assert found["counter_1"]["object"] is None
+    url = f"/api/projects/{project}/scene/counter_1/override"
+    sized = web.patch(url, {"dimensions_m": [3.0, 0.6, 0.04], "colour": [0.1, 0.2, 0.3], "rerun": False})
+    assert sized["text"].startswith("counter_1: size 300.0")
+    web.patch(url, {"left_out": True, "rerun": False})
+    told = web.get(f"/api/projects/{project}/scene")
+    assert [item["name"] for item in told["left_out"]] == ["counter_1"]
+    assert web.patch(url, {"left_out": None, "rerun": False})["text"] == "counter_1: brought back"
+    assert web.get(f"/api/projects/{project}/scene")["left_out"] == []
+    (counter,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "counter_1"]
+    assert web.get(f"/api/projects/{project}/objects/{counter['id']}/override")["dimensions_m"] == [3.0, 0.6, 0.04]
+    web.patch(f"/api/projects/{project}/scene/absent/override", {"left_out": True}, 404)
+    web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"built_as": "frobnicator", "rerun": False}, 422)

@@ -1,9 +1,11 @@
 """What a question costs does not depend on how much there is: counted in queries and bytes, for those need no clock."""
 
 import json
+import re
 from typing import Any
 
 import pytest
+from sqlalchemy.event import listen, remove
 from sqlmodel import select
 
 from app import schemas
@@ -29,7 +31,16 @@ MOST_BYTES = 40_000  # on the wire, at that size: 300 kB at 200 objects and 5,00
 
 def questions(web: Running, project: str, item: int) -> list[str]:
     """Every address of the API that can be asked about the project."""
-    values = {"project": project, "object": item, "frame": 3, "job": 1, "version": 1}
+    values = {
+        "project": project,
+        "object": item,
+        "frame": 3,
+        "job": 1,
+        "version": 1,
+        "webhook": 1,
+        "template": 1,
+        "other": project,
+    }
     paths = web.app.openapi()["paths"]
     asked = [path for path, methods in paths.items() if "get" in methods and path.startswith("/api/")]
     return [path.format(**values) + ("?since=1" * path.endswith("changes")) for path in asked if "{upload}" not in path]
@@ -101,6 +112,31 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
     assert {path: size for path, (_, size) in after.items() if size > MOST_BYTES} == {}
 
 
+def test_no_question_reads_what_events_replaced_nor_the_events_to_say_what_stands(finished: tuple[Running, str, int]) -> None:
+    """A list of objects says what can be undone, the history who did what: neither reads a state, neither replays."""
+    web, project, item = finished
+    grow(web, project)
+    with writing(web.context.engine) as session:
+        stored = session.exec(select(Event.before, Event.after)).all()
+    assert sum(before is not None or after is not None for before, after in stored) > OBJECTS  # there is something to read
+    web.context.descriptions.stop()
+    loaded: list[Event] = []
+    listen(Event, "load", count := lambda event, _: loaded.append(event))
+    try:
+        for path in questions(web, project, item):
+            loaded.clear()
+            with statements(web.context.engine) as queries:
+                web.client.get(path)
+            whole = [ONE_WORD.sub("", query) for query in queries]
+            bodies = [query for query in whole if re.search(r'events\."?(before|after)\b', query)]
+            last = path.endswith("/review")  # the project's last change of state is said with its reason
+            assert len(bodies) <= last, f"{path} asked {bodies}"
+            assert (len(loaded) > last) == path.endswith("/history"), f"{path} loaded {len(loaded)} events"
+    finally:
+        remove(Event, "load", count)
+
+
+ONE_WORD = re.compile(r"JSON_EXTRACT\([^)]*\)|events\.(before|after) ->> ")  # of a state, as SQLite and Postgres ask for it
 QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # once something waits, its place among all that do is looked up
 
 
@@ -160,6 +196,7 @@ MOST_OF_A_CLICK = 16  # statements, the transactions' begins aside; a row is wri
 
 def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
+    web.context.descriptions.stop()  # it writes of the projects that grow makes, meanwhile
 
     def click() -> int:
         point = {"frame": 3, "x": 1.5, "y": 1.5, "label": 0}

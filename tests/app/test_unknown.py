@@ -15,19 +15,26 @@ from starlette.testclient import TestClient
 
 from app.db.description import describe, read_description
 from app.db.engine import opened, reading, writing
-from app.db.tables import Job, Override, Project, Verdict
+from app.db.tables import Comment, Job, Override, Project, TrueLength, Verdict
 from app.errors import DatabaseUnusable
 from app.files import project_files
 from app.services import accounts, leftovers
-from app.services.adopting import adopt_all
+from app.services.adopting import adopt, adopt_all
 from r2c2r_core.errors import InputError
 from tests.app.conftest import ORIGIN, Running, statements
 
 Start = Callable[..., Any]
+VIEW = {
+    "mode": "scene",
+    "draw": "wireframe",
+    "opacity": 0.5,
+    "hidden": ["mug_1"],
+    "clip": {"low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 1.0]},
+}
 
 
 def worked_on(web: Running) -> str:
-    """A project with a click, a correction, a verdict, a comment, a deleted object and a bundle."""
+    """A project with a click, a correction, a verdict, comments, true lengths, a deleted object and a bundle."""
     project = web.sample()
     base = f"/api/projects/{project}"
     drawer, mug = web.get(f"{base}/objects")
@@ -38,6 +45,10 @@ def worked_on(web: Running) -> str:
         verdict = {"candidate": "c0", "verdict": "accepted", "reason": "fits", "who": "tester", "at": 5.0}
         session.add(Verdict(object_id=drawer["id"], **verdict))
     web.post(f"{base}/comments", {"text": "the left one", "object": mug["id"]})
+    web.post(f"{base}/comments", {"text": "behind it", "point_world": [0.1, 0.2, 0.3], "view": VIEW})
+    for item in (drawer, mug):
+        web.post(f"{base}/lengths", {"object": item["id"], "side": "width", "metres": 0.505}, 201)
+    web.post(f"{base}/lengths", {"points_world": [[0, 0, 0], [0, 1.0, 0]], "metres": 1.01, "text": "worktop"}, 201)
     web.patch(base, {"name": "Aunt Ida's kitchen"})
     web.delete(f"{base}/objects/{mug['id']}")
     return project
@@ -53,13 +64,16 @@ def known(web: Running, project: str) -> Any:
     with reading(web.context.engine) as session:
         verdicts = [row.model_dump(exclude={"id"}) for row in session.exec(select(Verdict))]
         overrides = [row.model_dump(exclude={"id"}) for row in session.exec(select(Override).order_by(col(Override.object_id)))]
-    comments = [{key: row[key] for key in ("text", "who", "at", "resolved_at")} for row in web.get(f"{base}/comments")]
+    comments, lengths = web.get(f"{base}/comments"), web.get(f"{base}/lengths")
+    for row in (*comments, *lengths["lengths"]):
+        row.pop("id")
     return {
         **{key: shown[key] for key in ("name", "status", "created", "counts", "review_state", "segmenter", "result")},
         "objects": objects,
         "verdicts": verdicts,
         "overrides": [row for row in overrides if row["data"]],
         "comments": comments,
+        "lengths": lengths,
         "bundles": web.get(f"{base}/bundles"),
         "certificate": web.get(f"{base}/certificate")["passed"],
         "frames": web.get(f"{base}/frames"),
@@ -71,6 +85,7 @@ def lose(data: Path) -> None:
         path.unlink()
 
 
+@pytest.mark.own_database
 def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -89,6 +104,7 @@ def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tm
         assert [item["name"] for item in web.get(f"{base}/objects")] == ["drawer_1", "mug_1"]
 
 
+@pytest.mark.own_database
 def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -98,6 +114,7 @@ def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted
         project = worked_on(web)
         drawer = web.get(f"/api/projects/{old}/objects")[0]["id"]
         web.post(f"/api/projects/{old}/objects/{drawer}/points?infer=false", {"frame": 3, "x": 1.5, "y": 2.5, "label": 0})
+        lengths = web.post(f"/api/projects/{old}/lengths", {"object": drawer, "side": "width", "metres": 0.5}, 201)["lengths"]
         before, clicks = known(web, project), web.get(f"/api/projects/{old}")["counts"]["points"]
     lose(data)
     shutil.copy(tmp_path / "yesterday.db", data / "r2c2r.db")
@@ -116,11 +133,14 @@ def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted
         assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks - 1
         web.post(f"/api/unknown/{newer['entry']}/adopt")
         assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks
+        (length,) = web.get(f"/api/projects/{old}/lengths")["lengths"]
+        assert {**length, "id": 0} == {**lengths[0], "id": 0}
         web.post(f"/api/projects/{old}/undo", {"scope": "prompts", "object": drawer})  # and that can be undone
         assert web.get(f"/api/projects/{old}")["counts"]["points"] == clicks - 1
         assert web.get("/api/unknown") == []
 
 
+@pytest.mark.own_database
 def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
 
@@ -202,6 +222,7 @@ def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_
     assert {path.name for path in folder.iterdir()} == {"project"}
 
 
+@pytest.mark.own_database
 def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -228,6 +249,7 @@ def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told
         assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [1]
 
 
+@pytest.mark.own_database
 def test_a_recording_that_was_never_read_is_read_after_it_is_adopted(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -259,6 +281,37 @@ def test_every_change_reaches_the_folder_and_the_file_is_read_back_as_it_was_wri
         assert row is not None
         assert describe(session, row, files) == read_description(files.description)
     assert json.loads(files.description.read_text())["project"]["source_path"] == "source/scan.r3d"
+
+
+def test_a_file_of_a_version_that_told_of_no_true_lengths_is_written_anew_at_the_next_start(start: Start) -> None:
+    with start() as web:
+        project = web.sample()
+        web.post(f"/api/projects/{project}/lengths", {"points_world": [[0, 0, 0], [0, 1, 0]], "metres": 1.01}, 201)
+    path = project_files(web.settings.data_dir, project).description
+    said = json.loads(path.read_text())
+    (length,) = said.pop("true_lengths")
+    assert (length["metres"], length["points_world"], length["scale"]) == (1.01, [[0, 0, 0], [0, 1, 0]], 1.0)
+    path.write_text(json.dumps(said))
+    with start():
+        pass
+    assert json.loads(path.read_text()) == {**said, "true_lengths": [length]}
+
+
+def test_what_was_said_and_measured_is_adopted_once(web: Running) -> None:
+    project = worked_on(web)
+    before = known(web, project)
+    context = web.context
+    with writing(context.engine) as session:
+        row = session.get(Project, project)
+        assert row is not None
+        description = describe(session, row, context.files(row))
+        for told in (*session.exec(select(Comment)), *session.exec(select(TrueLength).where(TrueLength.metres > 1.0))):
+            session.delete(told)
+        session.flush()
+        adopt(session, web.settings.data_dir, description, "tester")
+    after = known(web, project)
+    assert after["comments"] == before["comments"]
+    assert sorted(after["lengths"]["lengths"], key=lambda row: row["at"]) == before["lengths"]["lengths"]
 
 
 def test_a_change_that_is_not_committed_is_not_told(web: Running) -> None:

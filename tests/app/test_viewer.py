@@ -240,7 +240,7 @@ def test_the_real_viewer_shows_the_scan_a_candidate_the_placement_and_a_scene_th
     assert "500 of 500 points" in web.post(show, {"mode": "cloud"})["text"]
     assert "c1" in web.post(show, {"mode": "candidate", "object": drawer, "candidate": "c1"})["text"]
     assert "1 placed mesh" in web.post(show, {"mode": "aligned", "opacity": 0.5})["text"]
-    scene = web.post(show, {"mode": "scene", "collision": True})
+    scene = web.post(show, {"mode": "scene", "draw": "colliders"})
     assert scene["joints"] == [{"name": "drawer_1_slide", "lower": 0.0, "upper": 0.4, "value": 0.0}]
     moved = web.post(f"/api/projects/{project}/viewer/joints", {"values": {"drawer_1_slide": 9.0}})
     assert moved["joints"][0]["value"] == 0.4  # clamped

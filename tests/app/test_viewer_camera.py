@@ -5,9 +5,12 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 
+from app.viewer.camera import USUAL_FOV
 from app.viewer.scene import View
+from r2c2r_core.errors import InputError
 from r2c2r_core.workspace import Workspace
 from tests.app.nouns import finish
 
@@ -52,3 +55,33 @@ def test_the_first_view_is_of_the_whole_scene_not_of_the_object_that_happens_to_
     first = after(view, **chosen)
     assert after(view, **chosen, look="object") != first
     assert after(view, **chosen, look="scene") == first
+
+
+def test_it_stands_where_a_photo_was_taken_or_where_a_comment_was_made(view: View) -> None:
+    assert after(view, mode="cloud", look="photo", frame=3) == (0.0, 0.0, 0.0)  # as the recording has it
+    camera = view.server.get_clients()[0].camera
+    assert camera.look_at == (0.0, 0.0, 2.0)
+    assert camera.fov == pytest.approx(2 * np.arctan(80 / 150))  # held on its side: what is upright is the photo's width
+    kept = {"position": [1.0, 2.0, 3.0], "target": [0.0, 0.0, 1.0]}
+    assert after(view, mode="cloud", camera=kept) == (1.0, 2.0, 3.0)
+    assert view.lens.pose == ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0])
+    assert camera.fov == USUAL_FOV
+    assert after(view, mode="cloud") == MOVED
+    with pytest.raises(InputError, match="no frame 99"):
+        after(view, mode="cloud", look="photo", frame=99)
+
+
+def test_a_page_that_opened_while_the_camera_was_turned_is_turned_too(view: View) -> None:
+    """viser moves the cameras of pages that have told theirs; one still drawing its first view keeps where it began."""
+    server: Any = view.server
+    server.initial_camera = SimpleNamespace(position=(3.0, 3.0, 3.0), look_at=(0.0, 0.0, 0.0), fov=USUAL_FOV, near=0.01)
+    view.show({"mode": "cloud"})
+    late = SimpleNamespace(position=server.initial_camera.position, look_at=(0.0, 0.0, 0.0), fov=USUAL_FOV, near=0.01)
+    view.show({"mode": "cloud", "look": "front"})
+    assert late.position != server.initial_camera.position
+    meet = server.on_client_connect.call_args.args[0]
+    meet(SimpleNamespace(camera=late))
+    assert late.position == server.initial_camera.position
+    late.position = MOVED  # a person's own place after a lost connection
+    meet(SimpleNamespace(camera=late))
+    assert late.position == MOVED

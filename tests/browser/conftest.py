@@ -1,22 +1,18 @@
 """A served app and a real Chromium."""
 
 import os
-import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from app.serve import new_address
+from tests.browser.serving import PATIENCE_MS, printed_again, served
+from tests.browser.together import Server
 
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 
-PATIENCE_MS = 180_000  # a busy machine that draws 3D in software; nothing waits longer than what it waits for takes
 expect.set_options(timeout=PATIENCE_MS)
 
 QUIET = [  # without these Chromium looks for servers of its maker; a software GL draws the 3D view
@@ -58,31 +54,6 @@ def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[
         yield found
 
 
-_folders: dict[str, Path] = {}  # of running servers, by their addresses
-
-
-def printed_again(address: str) -> str:
-    """Another printed address of the same server: each opens one browser."""
-    return new_address(_folders[address.split("?")[0]])
-
-
-@contextmanager
-def served(data: Path) -> Iterator[str]:
-    """The app on a free port over a data folder; the address it prints."""
-    serve = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(data)!r}))"
-    code = f"from pathlib import Path; from app.serve import serve; {serve}"
-    server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    line = server.stdout.readline()
-    found = re.search(r"(http://\S+?/)\S*", line)
-    assert found, line
-    _folders[found.group(1)] = data
-    yield found.group()
-    server.terminate()
-    server.wait(timeout=60)
-    server.stdout.close()
-
-
 @pytest.fixture(scope="module")  # its event loop must not outlive the browser tests: others start loops of their own
 def browser() -> Iterator[Browser]:
     with sync_playwright() as playwright:
@@ -103,3 +74,18 @@ def page(browser: Browser, address: str) -> Iterator[Page]:
     yield opened
     context.close()
     assert thrown == []
+
+
+@pytest.fixture
+def live() -> str:
+    """The live segmenter among tests/app/fakes that `server` runs; a module with another one says so."""
+    return "live"
+
+
+@pytest.fixture
+def server(tmp_path: Path, live: str) -> Iterator[Server]:
+    """An app of one test's own, with stand-ins for its slow parts and accounts of Ann, Bea and Cleo."""
+    data = tmp_path / "data"
+    data.mkdir()
+    with Server(data, live=live) as running:
+        yield running

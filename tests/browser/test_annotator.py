@@ -1,27 +1,12 @@
 """Who may not decide sees no button that would be refused, and can comment."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser, expect
 
-from app.db.engine import open_engine
-from app.services import accounts
 from tests.app.nouns import finish
 from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
-from tests.browser.together import PASSWORD, Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    made = Server(tmp_path)
-    engine = open_engine(tmp_path / "r2c2r.db")
-    accounts.add(engine, "cleo", "annotator", PASSWORD)
-    engine.dispose()
-    with made as running:
-        yield running
+from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -35,7 +20,7 @@ def test_an_annotator_is_told_that_a_reviewer_decides(browser: Browser, server: 
     for name in ("Accept", "Reject", "More candidates", "Upload a mesh…"):
         expect(page.get_by_role("button", name=name, exact=True).first).to_be_disabled()
     page.get_by_text("Correct it").click()
-    expect(page.get_by_role("combobox").first).to_be_disabled()
+    expect(page.locator(".review > aside").get_by_role("combobox").first).to_be_disabled()
     expect(page.get_by_role("button", name="Comment", exact=True)).to_be_enabled()
     page.keyboard.press("y")
     expect(page.locator(".toast", has_text="A reviewer accepts")).to_be_visible()

@@ -1,6 +1,5 @@
 """Two clicks on one thing are said beside both objects as soon as their masks are there, and no more once that is mended."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,12 +8,6 @@ from playwright.sync_api import Browser, expect
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

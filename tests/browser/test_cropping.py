@@ -1,22 +1,15 @@
 """A thing's crop box: begun around its points, a side dragged and one moved by keys, in prompts.json, undone, taken away."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.app.nouns import finish
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def crop(page: Page) -> dict[str, Any] | None:
@@ -45,8 +38,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(browser: Browser, ser
     assert crop(page) is None  # nothing is stored before something is set
     right = page.get_by_role("slider", name="Right side of the crop box")
     before = int(right.get_attribute("aria-valuenow") or 0)
-    box = right.bounding_box()
-    assert box is not None
+    box = box_of(right)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()

@@ -1,8 +1,5 @@
 """Two names clicked on one panel show a mask each, and the page says whose front gave way; taken back, it is whole again."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
@@ -18,9 +15,8 @@ PIXEL = """(canvas, at) => {
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path, live="panels") as running:
-        yield running
+def live() -> str:
+    return "panels"
 
 
 def alike(page: Page, one: tuple[float, float], other: tuple[float, float]) -> bool:

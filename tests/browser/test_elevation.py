@@ -1,13 +1,13 @@
 """Fronts drawn, split, typed, merged and taken back on a plane of the scan, by mouse and by keyboard, and kept."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
+from tests.browser.test_pages import serious
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
@@ -15,16 +15,9 @@ MARGIN_PX = 16  # around the plane where it is fitted
 SIZE_M = (2.4, 0.9)  # of the plane that the stand-in draws, with seams every 60 cm
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
-
-
 def at(page: Page, x: float, y: float) -> tuple[float, float]:
     """Where a position of the plane, metres from its top left corner, is on the screen."""
-    box = page.locator("r2c2r-elevation-canvas canvas").bounding_box()
-    assert box is not None
+    box = box_of(page.locator("r2c2r-elevation-canvas canvas"))
     room = box["width"] - 2 * MARGIN_PX, box["height"] - 2 * MARGIN_PX
     scale = min(room[0] / SIZE_M[0], room[1] / SIZE_M[1])
     left = box["x"] + MARGIN_PX + (room[0] - SIZE_M[0] * scale) / 2
@@ -215,6 +208,48 @@ def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(br
     context.close()
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_handle_and_hinge_of_one_front_are_copied_to_the_others(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
+    )
+    page = signed_in(context, server, "ann")
+    sample(page)
+    page.get_by_role("link", name="Elevation").click()
+    expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
+    drag(page, (0.02, 0.1), (0.6, 0.8))
+    expect(fronts(page)).to_have_count(1)
+    for count in (2, 3):
+        page.keyboard.press("r")
+        expect(fronts(page)).to_have_count(count)
+    page.mouse.move(*at(page, 1.7, 0.4))
+    page.keyboard.press("k")
+    page.mouse.move(*at(page, 1.24, 0.5))
+    page.keyboard.press("j")
+    expect(page.get_by_role("combobox", name="Hinge")).to_have_value("left")
+    copy = page.get_by_role("button", name="Copy handle and hinge")
+    expect(copy).to_be_hidden()
+    page.mouse.click(*at(page, 0.3, 0.4))
+    for across in (0.9, 1.5):
+        page.keyboard.down("Shift")
+        page.mouse.click(*at(page, across, 0.4))
+        page.keyboard.up("Shift")
+    expect(copy).to_be_visible()
+    picture(page, f"copy-handle-{theme}")
+    assert serious(page, "elevation") == []
+    page.keyboard.press("c")
+    expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
+    first, *others = (entry["front"] for entry in stored(page))
+    for front in others:
+        assert front["hinge"] == "left"
+        for side in ("bottom_m", "top_m"):
+            assert front["handle"][side] == pytest.approx(first["handle"][side], abs=0.01)
+    page.keyboard.press("Control+z")  # one gesture
+    expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
+    assert [entry["front"]["hinge"] for entry in stored(page)] == [None, None, "left"]
+    context.close()
+
+
 def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) -> None:
     context = browser.new_context(viewport={"width": 420, "height": 800})
     page = signed_in(context, server, "ann")
@@ -223,7 +258,6 @@ def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) 
     expect(page.locator(".planes li")).to_have_count(1)
     assert page.evaluate("document.documentElement.scrollWidth") <= 420
     for name in ("Keyboard and mouse help", "Dark or light"):
-        box = page.get_by_role("button", name=name).bounding_box()
-        assert box is not None
+        box = box_of(page.get_by_role("button", name=name))
         assert box["x"] + box["width"] <= 420
     context.close()

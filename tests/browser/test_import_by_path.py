@@ -1,20 +1,11 @@
 """A recording on the server's machine: a refused path stays with its reason, one from a folder that was allowed comes in."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser, expect
 
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    (tmp_path / "data").mkdir()
-    with Server(tmp_path / "data") as running:
-        yield running
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -23,8 +14,7 @@ def test_a_refused_path_stays_and_says_what_allows_it(browser: Browser, server: 
     page = signed_in(context, server, "ann")
     page.get_by_role("button", name="From this machine…").click()
     field = page.get_by_label("Path on this machine")
-    box = field.bounding_box()
-    assert box is not None
+    box = box_of(field)
     assert box["width"] > 480  # some 60 characters
     field.fill("/usr/share/kitchen.r3d")
     field.press("Enter")

@@ -1,20 +1,11 @@
 """The log of a job says what it did, also before its processes wrote anything."""
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def test_a_running_and_a_cancelled_job_have_a_log(browser: Browser, server: Server) -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from tests.browser.serving import box_of
+
 PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: the journey leaves a screenshot of every page there
 LONG_MS = 600_000  # the pipeline on two busy cores
 
@@ -28,8 +30,7 @@ def click_of(sample: Path, category: str) -> tuple[int, float, float]:
 def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
     """Click a pixel of the stored frame (480 x 360), wherever it is drawn."""
     canvas = page.locator("r2c2r-frame-canvas canvas")
-    box = canvas.bounding_box()
-    assert box
+    box = box_of(canvas)
     scale = min(box["width"] / 480, box["height"] / 360)
     left, top = (box["width"] - 480 * scale) / 2, (box["height"] - 360 * scale) / 2
     canvas.click(position={"x": left + x * scale, "y": top + y * scale}, button=button)  # type: ignore[arg-type]
@@ -82,7 +83,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     # Run with live progress
     page.get_by_role("link", name="Run", exact=True).click()
     page.get_by_role("button", name="Run", exact=True).click()
-    expect(page.locator("r2c2r-job")).to_contain_text("segment")
+    expect(page.locator("r2c2r-job")).to_contain_text("Segment")
     picture(page, "4-running")
     page.get_by_role("heading", name="Result").wait_for(timeout=LONG_MS)
     expect(page.get_by_role("row", name=re.compile("top_drawer"))).to_contain_text("Slides out, opens")
@@ -94,7 +95,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
 
     # Review: the viewer shows through our own origin; accept
     page.get_by_role("link", name="Review").first.click()
-    expect(page.locator("iframe")).to_have_attribute("src", re.compile(r"^/viewer/\w"))
+    expect(page.locator("iframe")).to_have_attribute("src", re.compile(r"^/viewer/[\w-]"))
     expect(page.frame_locator("iframe").locator("canvas").first).to_be_visible(timeout=60_000)
     expect(page.get_by_label("top_drawer", exact=False).first).to_be_attached()
     page.get_by_role("button", name="Open all").wait_for(timeout=60_000)

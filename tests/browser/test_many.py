@@ -1,7 +1,6 @@
 """Lists of many objects and projects are searched, ordered, and keep their heads in sight."""
 
-from collections.abc import Iterator
-from pathlib import Path
+import re
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
@@ -9,12 +8,6 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.test_journey import picture
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def post(page: Page, path: str, body: dict[str, str]) -> None:
@@ -35,7 +28,7 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(browser: Browse
         post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": category})
     page.goto(f"{project}/annotate")
     expect(rows(page)).to_have_count(16)
-    page.locator(".objects-pane").evaluate("pane => pane.scrollTo(0, 600)")
+    page.locator(".objects-pane .scrolled").evaluate("pane => pane.scrollTo(0, 600)")
     expect(page.get_by_role("button", name="New object")).to_be_in_viewport()
     page.get_by_label("Find objects").fill("wall")
     expect(rows(page)).to_have_count(7)
@@ -45,6 +38,63 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(browser: Browse
     picture(page, f"many-objects-{theme}")
     page.get_by_label("Find objects").fill("")
     expect(rows(page)).to_have_count(16)
+    context.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_sixty_objects_are_grouped_locked_and_changed_together(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    for number in range(58):
+        category = ("wall_cabinet", "bottle", "mug", "chair")[number % 4]
+        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": category})
+    page.goto(f"{project}/annotate")
+    expect(rows(page)).to_have_count(60)
+    painted = "rows => rows.filter(row => row.querySelector('.head').checkVisibility({ contentVisibilityAuto: true })).length"
+    assert rows(page).evaluate_all(painted) < 30  # those in sight
+
+    first = page.locator(".object-list .pick").first
+    first.evaluate("button => button.stays = true")
+    page.get_by_role("button", name="Hide mug_1", exact=True).focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Show mug_1", exact=True)).to_be_focused()
+    assert first.evaluate("button => button.stays")  # no other line was made anew
+    stops = "rows => rows.filter(row => row.querySelector('.pick').tabIndex === 0).length"
+    assert rows(page).evaluate_all(stops) == 1
+    page.keyboard.press("ArrowDown")
+    expect(page.get_by_role("button", name="Hide wall_cabinet_1", exact=True)).to_be_focused()
+
+    page.get_by_label("Order of the objects").select_option("category")
+    expect(page.locator(".object-list h2").first).to_have_text(re.compile(r"^bottle \d+"))
+    page.locator(".objects-pane .scrolled").evaluate("pane => pane.scrollTo(0, 300)")
+    expect(page.get_by_role("heading", name=re.compile("^bottle "))).to_be_in_viewport()  # the group that is looked at
+    expect(page.get_by_role("heading", name="Objects", exact=True)).to_be_in_viewport()
+
+    page.get_by_role("button", name=re.compile(", bottle_2$")).click()
+    page.get_by_role("button", name="bottle_4", exact=True).click(modifiers=["Shift"])
+    expect(page.get_by_label("Selected objects")).to_contain_text("3 objects")
+    page.get_by_label("Name for all, numbered").fill("jar")
+    page.get_by_label("Name for all, numbered").press("Enter")
+    for number in (1, 2, 3):
+        expect(page.get_by_role("button", name=f"jar_{number}", exact=True)).to_be_visible()
+    page.get_by_label("Category for all").fill("sink")
+    page.get_by_label("Category for all").press("Enter")
+    expect(page.get_by_role("heading", name="sink 3")).to_be_visible()
+    page.get_by_label("Selected objects").get_by_role("button", name="Lock").click()
+    picture(page, f"sixty-objects-{theme}")
+    page.get_by_label("Selected objects").get_by_role("button", name="Delete").click()
+    expect(page.locator(".toast", has_text="jar_1 is locked")).to_be_visible()
+    page.get_by_label("Which objects").select_option("locked")
+    expect(page.locator(".object-list .pick")).to_have_count(3)
+    page.reload()  # a lock is kept
+    page.get_by_label("Which objects").select_option("locked")
+    expect(page.locator(".object-list .pick")).to_have_count(3)
+    page.get_by_role("button", name="jar_1", exact=True).click()
+    page.keyboard.press("Shift+L")
+    expect(page.get_by_label("Name of jar_1")).to_be_visible()
+    page.get_by_role("button", name="Delete jar_1").click()
+    expect(page.locator(".toast", has_text="Deleted jar_1")).to_be_visible()
     context.close()
 
 

@@ -1,20 +1,12 @@
 """A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed too."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser, expect
 
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -37,8 +29,7 @@ def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
     expect(state).to_have_text("opening, 40° ± 6°")
     expect(page.locator(".opening .chip.at_least")).to_have_text("86°: ≥ at least")
     picture(page, f"opening-{theme}")
-    box = lane.bounding_box()
-    assert box is not None
+    box = box_of(lane)
     lane.click(position={"x": 0.9 * box["width"], "y": box["height"] / 2})  # its last third is the last frame
     expect(state).to_have_text("open, 86° ± 2°")
     expect(page.locator("r2c2r-film-strip .transport output")).to_contain_text("frame 7")

@@ -8,15 +8,42 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.serve import register_finished
 from tests.app.nouns import finish
-from tests.browser.conftest import PATIENCE_MS, printed_again, served
+from tests.browser.serving import PATIENCE_MS, printed_again, served
 
 REPORT = {
     "certificate": {"passed": True, "findings": [{"rule": "r", "severity": "warning", "where": "drawer_1", "message": "m"}]}
+}
+OPENED = {
+    "kind": "joint",
+    "name": "drawer_1_joint",
+    "method": "pinch",
+    "passed": True,
+    "grip_n": 20.0,
+    "opened": 0.9,
+    "why": "",
+}
+PLACE = {"x_m": 1.9, "y_m": 0.6, "lift_m": 0.1, "joints": ["drawer_1_joint"]}
+ROBOTS = {
+    "gripper": {"joints": 1, "joints_opened": 1, "grips": [OPENED | {"film": "drawer_1_joint"}]},
+    "arm": {"arm": {"name": "Franka Panda"}, "joints": 1, "joints_opened": 1, "places": [PLACE], "grips": [OPENED]},
+}
+MAP = '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30"><rect width="40" height="30" fill="#888"/></svg>'
+VARIANTS = {
+    "count": 2,
+    "seed": 0,
+    "sha256": "ab" * 32,
+    "size": 3,
+    "created": 1.0,
+    "rejected": {"a thing meets something": 1},
+    "checked": 2,
+    "failed": ["00001"],
 }
 PROMPTS = {
     "version": 1,
@@ -37,9 +64,16 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, st
     (data / "prompts.json").write_text(json.dumps(PROMPTS))
     with zipfile.ZipFile(work / "bundle.zip", "w") as archive:
         archive.writestr("manifest.json", json.dumps({"stages": []}))
-        archive.writestr("report.json", json.dumps(REPORT))
+        archive.writestr("scene.xml", "<mujoco/>")
+        archive.writestr("report.json", json.dumps(REPORT | ROBOTS))
+        archive.writestr("gripper/drawer_1_joint.jpg", cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes())
+        archive.writestr("arm/standing.svg", MAP)
     scan = work.parent / "scan.r3d"
     project = register_finished(data, name="kitchen", source=scan, prompts=data / "prompts.json", workdir=work)
+    variants = data / "projects" / project / "variants" / "v1-n2-s0"
+    variants.mkdir(parents=True)
+    (variants / "facts.json").write_text(json.dumps(VARIANTS))
+    (variants / "wall.jpg").write_bytes(cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes())
     with served(data) as address:
         yield address, project
 
@@ -72,6 +106,10 @@ def test_no_page_has_a_serious_finding(browser: Browser, finished: tuple[str, st
             page.goto(f"{base}/p/{project}{name}")
             page.locator("h1, h2").first.wait_for()
             found += serious(page, name or "overview")
+            if name == "/review":
+                for key, shown in (("r", "candidates side by side"), ("3", "scene"), ("z", "section")):
+                    page.keyboard.press(key)
+                    found += serious(page, shown)
         page.evaluate("document.body.append(document.createElement('button'))")
         assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
     assert found == []
@@ -86,6 +124,25 @@ def test_what_our_pages_load_first_is_small(browser: Browser, finished: tuple[st
     page.get_by_role("link", name="kitchen").wait_for()
     assert 0 < sum(sizes.values()) < FIRST_LOAD_BYTES, sizes
     page.close()
+
+
+def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(browser: Browser, finished: tuple[str, str]) -> None:
+    address, project = finished
+    with signed_in(browser, address, permissions=["clipboard-read", "clipboard-write"]) as page:
+        page.goto(f"{address.split('/?')[0]}/p/{project}/download")
+        page.locator("summary", has_text="PyBullet").focus()
+        page.keyboard.press("Enter")
+        expect(page.get_by_text("pip install pybullet")).to_be_visible()
+        expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # one is open at a time
+        page.get_by_role("button", name="Copy the lines for PyBullet").focus()
+        page.keyboard.press("Enter")
+        expect(page.get_by_text("Copied")).to_be_visible()
+        assert page.evaluate("navigator.clipboard.readText()").startswith("import pybullet")
+        expect(page.get_by_text("x 1.9, y 0.6 m, lifted 0.1 m: drawer_1_joint")).to_be_visible()
+        for name in ("A parallel gripper at drawer_1_joint", "The floor plan with the places where it may stand"):
+            picture = page.get_by_role("img", name=name)
+            picture.scroll_into_view_if_needed()
+            page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
 
 
 def serious(page: Page, where: str) -> list[str]:

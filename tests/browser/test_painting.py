@@ -1,20 +1,13 @@
 """A mask painted, kept and said not to be there in one frame, taken back, and in prompts.json."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
-import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.browser.serving import box_of
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def said(page: Page) -> list[dict[str, Any]]:
@@ -36,8 +29,7 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, serve
     page.keyboard.press("1")
     page.keyboard.press("b")
     expect(page.get_by_role("button", name="Brush")).to_have_attribute("aria-pressed", "true")
-    box = canvas.bounding_box()
-    assert box is not None
+    box = box_of(canvas)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x - 60, y)
     page.mouse.down()
@@ -65,8 +57,7 @@ def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(browser: Browser
     page.get_by_role("link", name="Annotate").click()
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     page.keyboard.press("1")
-    box = page.locator("r2c2r-frame-canvas canvas").bounding_box()
-    assert box is not None
+    box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     saved = page.locator(".stage-tools .chip").nth(1)
 

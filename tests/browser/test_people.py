@@ -1,24 +1,30 @@
 """Accounts, from the admin's page to the one they are about."""
 
 import contextlib
+import json
 import re
 import shutil
+import threading
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, expect
 
 from app.files import project_files
-from tests.browser.conftest import printed_again, served
+from tests.browser.serving import printed_again, served
 from tests.browser.test_journey import picture
+from tests.browser.test_scene_tools import ask
 from tests.browser.together import Server, signed_in
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with Server(tmp_path_factory.mktemp("people")) as running:
-        yield running
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("R2C2R_WEBHOOKS_TO", "127.0.0.0/8")
+        with Server(tmp_path_factory.mktemp("people")) as running:
+            yield running
 
 
 def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser, server: Server) -> None:
@@ -26,10 +32,10 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser,
     ann = signed_in(contexts[0], server, "ann")
     ann.get_by_role("link", name="People").click()
     ann.get_by_label("Name").fill("carl")
-    ann.get_by_label("Password, from 10 characters", exact=True).fill("carl123456")
+    ann.get_by_label("Password, at least 10 characters", exact=True).fill("carl123456")
     ann.get_by_role("button", name="Add").click()
     expect(ann.locator(".toast", has_text="own name with little beside it")).to_be_visible()
-    ann.get_by_label("Password, from 10 characters", exact=True).fill("a password of carl")
+    ann.get_by_label("Password, at least 10 characters", exact=True).fill("a password of carl")
     ann.get_by_role("button", name="Add").click()
     expect(ann.locator(".toast", has_text="carl may sign in now")).to_be_visible()
 
@@ -85,6 +91,59 @@ def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are
     context.close()
 
 
+def test_webhooks_are_added_tried_and_removed_by_keyboard(browser: Browser, server: Server) -> None:
+    heard: list[str] = []
+
+    class Listening(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            heard.append(json.loads(self.rfile.read(int(self.headers["content-length"])))["event"])
+            self.send_response(503 if len(heard) == 1 else 204)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            """Nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Listening) as listening:
+        threading.Thread(target=listening.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{listening.server_port}/r2c2r"
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        ann = signed_in(context, server, "ann")
+        ann.keyboard.press("Control+k")
+        ann.keyboard.type("Webhooks")
+        ann.keyboard.press("Enter")
+        expect(ann.get_by_role("heading", name="Webhooks")).to_be_visible()
+        ann.get_by_label("Address").focus()
+        ann.keyboard.type(url)
+        ann.keyboard.press("Enter")
+        secret = ann.get_by_label("Secret", exact=True)
+        expect(secret).to_be_focused()
+        assert len(secret.input_value()) > 30
+        for _ in range(2):
+            ann.keyboard.press("Tab")
+        expect(ann.get_by_role("button", name="I have it")).to_be_focused()
+        ann.keyboard.press("Enter")
+        expect(secret).to_be_hidden()
+
+        test = ann.get_by_role("button", name=f"Send a test to {url}")
+        answers = ann.get_by_role("region", name="Answers")
+        for answer in ("503 given up", "204 delivered"):
+            test.focus()
+            ann.keyboard.press("Enter")
+            expect(answers.get_by_role("row", name=f"test {answer}")).to_be_visible()
+        expect(test).to_be_focused()  # the list was drawn anew meanwhile
+        expect(ann.get_by_role("row", name=url)).to_contain_text("204, delivered just now")
+        picture(ann, "25-webhooks")
+        ann.get_by_role("button", name=f"Answers of {url}").press("Enter")
+        expect(answers).to_be_hidden()
+
+        ann.once("dialog", lambda dialog: dialog.accept())
+        ann.get_by_role("button", name=f"Remove {url}").press("Enter")
+        expect(ann.get_by_text("None yet.")).to_be_visible()
+        assert heard == ["test", "test"]
+        context.close()
+        listening.shutdown()
+
+
 def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, server: Server) -> None:
     contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
@@ -107,6 +166,12 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
     name.fill("zoe")
     name.press("Enter")
     expect(ann.locator(".toast", has_text="there is no account zoe")).to_be_visible()
+    name.press("Control+a")
+    panel.get_by_role("group").evaluate("choices => (choices.dataset.before = '')")
+    ask(ann, "PATCH", f"/api/projects/{ann.url.split('/p/')[1]}", {"tags": ["north"]})
+    expect(panel.locator("[data-before]")).to_have_count(0)  # drawn anew by what others did
+    ann.keyboard.insert_text("al")
+    expect(name).to_have_value("al")
     name.fill("bea")
     name.press("Enter")
     expect(panel.get_by_role("listitem")).to_have_text(re.compile("bea"))
@@ -142,8 +207,9 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: 
     while not (files.description.exists() and "mug_1" in files.description.read_text()):  # written a little after it is so
         ann.wait_for_timeout(50)
     shutil.copytree(files.root, server.data / "unknown" / project)
-    address = f"{server.address}/api/projects/{project}"
-    assert ann.request.delete(address, headers={"X-Requested-With": "tests", "Origin": server.address}).ok
+    for place in ("projects", "trash"):
+        address = f"{server.address}/api/{place}/{project}"
+        assert ann.request.delete(address, headers={"X-Requested-With": "tests", "Origin": server.address}).ok
 
     ann.goto(server.address)
     aside = ann.get_by_role("region", name="Set aside")

@@ -1,21 +1,17 @@
 """The object over its photos in Review: outlined, filling the picture, with the comments that were pinned on it."""
 
-from collections.abc import Iterator
-from pathlib import Path
+import re
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.app.nouns import finish
+from tests.app.test_photos import FILMED, drawer, store
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
+from tests.browser.test_pages import serious
 from tests.browser.test_together import pick, ready, sample, say
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -24,22 +20,14 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(browser: Browser
     page = signed_in(context, server, "ann")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")
-    page.goto(f"{project}/annotate?frame=3")
-    ready(page)
-    pick(page, "drawer_1")
-    page.keyboard.press("g")
-    expect(page.locator(".object-list .current")).to_contain_text("3 frames")
-    number = page.evaluate("new URLSearchParams(location.search).get('object')")
+    number = segmented(page, project)
     page.goto(f"{project}/review?object={number}")
     expect(page.get_by_role("button", name="Outline")).to_have_attribute("aria-pressed", "true")
     sheet = page.locator("r2c2r-photo-check .sheet")
-    near = sheet.bounding_box()
+    near = box_of(sheet)
     page.get_by_role("button", name="Photo", exact=True).click()
-    whole = sheet.bounding_box()
-    room = page.locator("r2c2r-photo-check .pictures").bounding_box()
-    assert near is not None
-    assert whole is not None
-    assert room is not None
+    whole = box_of(sheet)
+    room = box_of(page.locator("r2c2r-photo-check .pictures"))
     assert near["width"] > 2 * whole["width"]  # the drawer is a twelfth of the photo
     assert whole["width"] <= room["width"] + 1
     assert whole["height"] <= room["height"] + 1
@@ -48,9 +36,125 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(browser: Browser
     say(page, "Comment", "a scratch")
     pin = page.locator("r2c2r-photo-check .pin")
     expect(pin).to_have_count(1)
-    shown = pin.bounding_box()
-    assert shown is not None
+    drawn = pin.element_handle()
+    page.keyboard.press("c")
+    say(page, "Comment", "and a dent")
+    expect(page.get_by_role("button", name="and a dent", exact=True)).to_be_visible()
+    assert drawn.evaluate("pin => pin.isConnected")  # whoever points at it goes on reading it
+    shown = box_of(pin)
     assert shown["x"] + shown["width"] / 2 == pytest.approx(at[0], abs=2)
     assert shown["y"] + shown["height"] / 2 == pytest.approx(at[1], abs=2)
     picture(page, f"photo-check-{theme}")
     context.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
+    browser: Browser, server: Server, theme: str
+) -> None:
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
+    )
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    work = server.data / "projects" / project.split("/p/")[1] / "work"
+    finish(work)
+    store(work, drawer(FILMED), FILMED)
+    number = segmented(page, project)
+    page.goto(f"{project}/review?object={number}")
+
+    # what was measured, and what is not known
+    said = page.locator(".opening-marks output")
+    plot = page.get_by_role("img", name="Opening over the frames: up to 25 cm, at least; marked in 0")
+    expect(plot).to_be_visible()
+    seek(page, 3)
+    expect(said).to_have_text("open, 25 cm ± 4 mm")
+    expect(page.locator(".opening-marks .chip.measured")).to_be_visible()
+    seek(page, 7)
+    expect(said).to_have_text("not known in this photo")
+    picture(page, f"opening-marks-measured-{theme}")
+
+    # by keyboard: opened, marked, undone, redone
+    drawn = page.locator("r2c2r-photo-check img.over").last
+    before = drawn.get_attribute("src")
+    for _ in range(3):
+        page.keyboard.press("=")
+    expect(page.get_by_role("button", name="Open here: 3 cm")).to_be_visible()
+    expect(page.locator("r2c2r-photo-check line")).to_have_count(12)
+    picture(page, f"opening-marks-turned-{theme}")
+    page.keyboard.press("Shift+o")
+    expect(said).to_have_text("opening, 3 cm")
+    expect(page.locator(".opening-marks .chip.person")).to_be_visible()
+    expect(page.get_by_role("img", name="marked in 1")).to_be_visible()
+    assert drawn.get_attribute("src") != before  # the leaf over the photo is drawn anew
+    picture(page, f"opening-marks-{theme}")
+    assert serious(page, "a marked leaf") == []
+    page.keyboard.press("Control+z")
+    expect(said).to_have_text("not known in this photo")
+    expect(drawn).to_have_attribute("src", before or "")
+    page.keyboard.press("Control+Shift+z")
+    expect(said).to_have_text("opening, 3 cm")
+
+    # dragged by its edge: a drawer comes out towards the top of this picture
+    hold = box_of(page.locator("r2c2r-photo-check .hold"))
+    x, y = hold["x"] + hold["width"] / 2, hold["y"] + hold["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 40, steps=4)
+    expect(page.locator("r2c2r-photo-check line")).to_have_count(12)
+    page.mouse.up()
+    expect(said).to_have_text(re.compile(r"^open(ing)?, (?!3 )\d+ cm$"))
+
+    # closed in every frame, one key after the other; removed again
+    for frame in (0, 3, 7):
+        seek(page, frame)
+        page.keyboard.press("Shift+c")
+    expect(page.get_by_role("img", name="marked in 3")).to_be_visible()
+    expect(said).to_have_text("closed")
+    expect(page.locator(".opening-marks .chip.person")).to_be_visible()
+    page.get_by_role("button", name="Remove this mark").click()
+    expect(page.get_by_role("img", name="marked in 2")).to_be_visible()
+    stored = page.request.get(f"{server.address}/api/projects/{project.split('/p/')[1]}/objects/{number}/override").json()
+    assert stored["states"] == {"front": [{"frame": 0, "state": 0.0}, {"frame": 3, "state": 0.0}]}
+
+    # the lane of the annotate page says so too
+    page.goto(f"{project}/annotate?frame=3&object={number}")
+    ready(page)
+    expect(page.locator(".opening .state")).to_have_text("closed, set by a person")
+    context.close()
+
+
+def test_who_annotates_sees_marks_and_makes_none(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    ann = signed_in(context, server, "ann")
+    project = sample(ann)
+    work = server.data / "projects" / project.split("/p/")[1] / "work"
+    finish(work)
+    store(work, drawer(FILMED), FILMED)
+    segmented(ann, project)
+    other = browser.new_context(viewport={"width": 1280, "height": 720})
+    cleo = signed_in(other, server, "cleo")
+    cleo.goto(f"{project}/review")
+    cleo.get_by_role("button", name="Photos").click()
+    expect(cleo.get_by_role("button", name="Closed here")).to_be_disabled()
+    expect(cleo.get_by_role("slider", name="How far it stands open in this photo")).to_be_disabled()
+    expect(cleo.locator("r2c2r-photo-check .hold")).to_have_count(0)
+    cleo.keyboard.press("Shift+c")
+    expect(cleo.locator("r2c2r-toasts")).to_contain_text("you can comment")
+    context.close()
+    other.close()
+
+
+def segmented(page: Page, project: str) -> str:
+    """The number of the drawer, once its masks are there."""
+    page.goto(f"{project}/annotate?frame=3")
+    ready(page)
+    pick(page, "drawer_1")
+    page.keyboard.press("g")
+    expect(page.locator(".object-list .current")).to_contain_text("3 frames")
+    return str(page.evaluate("new URLSearchParams(location.search).get('object')"))
+
+
+def seek(page: Page, frame: int) -> None:
+    page.get_by_role("button", name=f"Photo {frame}", exact=True).click()
+    expect(page.locator("r2c2r-photo-check .legend")).to_contain_text(f"Frame {frame},")

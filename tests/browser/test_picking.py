@@ -1,11 +1,8 @@
 """A click on a mask chooses its object instead of making a second one there; Space held moves the picture."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 from playwright.sync_api import Browser, expect
 
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, on_canvas, ready, rows, sample
 from tests.browser.together import Server, signed_in
@@ -14,12 +11,6 @@ PIXELS = """(canvas) => {
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   return data.reduce((sum, value, k) => (sum * 31 + value * k) % 1e9, 0);
 }"""
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_for(browser: Browser, server: Server) -> None:
@@ -63,8 +54,7 @@ def test_space_held_moves_the_picture_and_tapped_plays(browser: Browser, server:
     canvas = page.locator("r2c2r-frame-canvas canvas").first
     before = canvas.evaluate(PIXELS)
     start, end = on_canvas(page, 40, 60), on_canvas(page, 90, 90)
-    box = canvas.bounding_box()
-    assert box is not None
+    box = box_of(canvas)
     page.mouse.move(box["x"] + start["x"], box["y"] + start["y"])
     page.keyboard.down("Space")
     page.mouse.down()

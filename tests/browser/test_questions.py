@@ -1,7 +1,5 @@
 """Edges that hardly show are asked about in the elevation, and one key answers each."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,12 +9,6 @@ from tests.browser.test_elevation import fronts, stored
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    with Server(tmp_path) as running:
-        yield running
 
 
 def clicked_cabinet(page: Page) -> None:

@@ -9,7 +9,9 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.app.nouns import finish
+from tests.browser.serving import box_of
 from tests.browser.test_journey import picture
+from tests.browser.test_pages import serious
 from tests.browser.together import Server, signed_in
 
 FRAME = (160, 120)
@@ -46,8 +48,7 @@ def tap_frame(page: Page, x: float, y: float) -> None:
 
 def on_canvas(page: Page, x: float, y: float) -> dict[str, float]:
     """Where a pixel of the stored frame is drawn."""
-    box = page.locator("r2c2r-frame-canvas canvas").bounding_box()
-    assert box
+    box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
     left, top = (box["width"] - FRAME[0] * scale) / 2, (box["height"] - FRAME[1] * scale) / 2
     return {"x": left + x * scale, "y": top + y * scale}
@@ -247,8 +248,7 @@ def test_a_tablet_reaches_everything_by_touch(browser: Browser, server: Server) 
     picture(ann, "19-tablet")
     drawer.get_by_role("button", name="Close").tap()
     expect(drawer).to_be_hidden()
-    lane = ann.get_by_role("img", name=re.compile("^drawer_2: seen")).bounding_box()
-    assert lane
+    lane = box_of(ann.get_by_role("img", name=re.compile("^drawer_2: seen")))
     ann.touchscreen.tap(lane["x"] + lane["width"] - 3, lane["y"] + lane["height"] / 2)
     expect(ann.locator("r2c2r-film-strip output")).to_contain_text("frame 7 ")
     context.close()
@@ -269,3 +269,61 @@ def move(page: Page, step: str, reason: str = "") -> None:
     page.get_by_role("button", name=step, exact=True).click()
     if reason:
         say(page, step, reason)
+
+
+def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_on_the_overview(
+    browser: Browser, server: Server
+) -> None:
+    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True) for _ in range(2)]  # for axe
+    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    address = sample(ann)
+    inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
+    bea.goto(address)
+    expect(bea.get_by_label("Assigned to")).to_have_value("")
+    ann.get_by_label("Assigned to").select_option("bea")
+    expect(ann.locator(".toast", has_text="Assigned to bea")).to_be_visible()
+    expect(bea.get_by_label("Assigned to")).to_have_value("bea")  # by itself
+    expect(inbox).to_have_text("Inbox 1")
+
+    # a comment names Bea: by keyboard, from the list that the sign opens
+    ann.goto(f"{address}/annotate?frame=3")
+    ann.get_by_role("button", name="Pin a comment").click()
+    click_frame(ann, 40, 40)
+    ann.get_by_role("dialog").get_by_role("textbox").press_sequentially("one drawer or two, @b")
+    expect(ann.get_by_role("option", name="bea")).to_have_attribute("aria-selected", "true")
+    assert serious(ann, "the dialog with names") == []
+    ann.keyboard.press("Enter")
+    ann.keyboard.press("Control+Enter")
+    expect(ann.locator("r2c2r-comments")).to_contain_text("one drawer or two, @bea")
+
+    # Bea was at the overview: she is told there, until she says that she read it
+    news = bea.get_by_role("region", name="Since you were last here")
+    expect(news).to_contain_text("ann 2 changes")
+    bea.reload()
+    expect(news).to_contain_text("commented: one drawer or two, @bea")
+    expect(bea.get_by_label("Assigned to")).to_have_value("bea")
+    leave, commands = (box_of(bea.get_by_role("button", name=name)) for name in ("Sign out", "Commands Ctrl K"))
+    assert leave["x"] + leave["width"] <= commands["x"]
+    picture(bea, "41-news")
+    assert serious(bea, "overview with news") == []
+    news.get_by_role("button", name="Mark as read").press("Enter")
+    expect(news).to_be_hidden()
+
+    expect(inbox).to_have_text("Inbox 2")
+    inbox.press("Enter")
+    expect(bea.get_by_role("region", name="Assigned to you: draft").get_by_role("link")).to_have_attribute(
+        "href", address.removeprefix(address.split("/p/")[0])
+    )
+    picture(bea, "42-inbox")
+    bea.set_viewport_size({"width": 390, "height": 800})
+    assert bea.evaluate("document.documentElement.scrollWidth") <= 390
+    bea.set_viewport_size({"width": 1280, "height": 720})
+    assert serious(bea, "inbox") == []
+    bea.get_by_role("link", name="one drawer or two, @bea").press("Enter")
+    expect(bea).to_have_url(re.compile(r"/annotate\?frame=3"))
+    bea.go_back()
+    bea.get_by_role("button", name="Resolve: one drawer or two, @bea").press("Enter")
+    expect(bea.get_by_role("region", name="Comments that name you")).to_be_hidden()
+    expect(inbox).to_have_text("Inbox 1")
+    for context in contexts:
+        context.close()

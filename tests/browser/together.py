@@ -10,15 +10,15 @@ from playwright.sync_api import BrowserContext, Page
 
 from app.db.engine import open_engine
 from app.services import accounts
-from tests.browser.conftest import PATIENCE_MS
+from tests.browser.serving import PATIENCE_MS
 
 ROOT = Path(__file__).parents[2]
 PASSWORD = "correct horse battery"
-PEOPLE = {"ann": "admin", "bea": "reviewer"}
+PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
 
 
 class Server:
-    """The app on a port of its own, to be stopped and started again on the same data; Ann and Bea have accounts."""
+    """The app on a port of its own, to be stopped and started again on the same data; Ann, Bea and Cleo have accounts."""
 
     def __init__(self, data: Path, live: str = "live") -> None:
         self.data, self.port, self.live = data, free_port(), live

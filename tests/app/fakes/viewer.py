@@ -62,5 +62,9 @@ for line in sys.stdin:
         answer = {"mode": "scene", "text": "moved", "joints": joints}
     if command["cmd"] == "place":
         answer = {"pose": command["pose"]}
+    if command["cmd"] == "picked":
+        answer = {"number": 1, "name": "drawer_1", "point": [0.0, 0.0, 1.0]}
+    if command["cmd"] == "camera":
+        answer = {"position": [0.0, -2.0, 1.5], "target": [0.0, 0.0, 1.0]}
     sys.stdout.write(json.dumps({"id": command["id"], "ok": answer}) + "\n")
     sys.stdout.flush()

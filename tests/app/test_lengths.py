@@ -1,0 +1,82 @@
+"""True lengths: kept beside what the scan says, and the scale that follows, with which the recording is read again."""
+
+import json
+
+import pytest
+
+from app.services.lengths import best_scale
+from tests.app.conftest import Running
+from tests.app.nouns import finish
+
+
+@pytest.fixture
+def measured(web: Running) -> tuple[Running, str, int]:
+    """A project with a finished drawer of 0.5 x 0.6 x 0.2 m."""
+    project = web.sample()
+    finish(web.settings.data_dir / "projects" / project / "work")
+    number = next(one["id"] for one in web.get(f"/api/projects/{project}/objects") if one["name"] == "drawer_1")
+    return web, project, number
+
+
+def test_a_length_is_kept_beside_what_the_scan_says_and_says_by_how_much_to_rescale(measured: tuple[Running, str, int]) -> None:
+    web, project, number = measured
+    at = f"/api/projects/{project}/lengths"
+    assert web.get(at) == {"lengths": [], "scale": 1.0, "scale_wanted": None, "mean_error": None, "mean_error_scaled": None}
+    found = web.post(at, {"object": number, "side": "width", "metres": 0.505}, 201)
+    (length,) = found["lengths"]
+    assert (length["text"], length["measured_m"]) == ("width of drawer_1", 0.5)
+    assert length["error_m"] == pytest.approx(-0.005)
+    assert found["scale_wanted"] == pytest.approx(1.01)
+    found = web.post(at, {"points_world": [[0, 0, 0], [0, 1.0, 0]], "metres": 1.01, "text": "worktop"}, 201)
+    assert [one["text"] for one in found["lengths"]] == ["width of drawer_1", "worktop"]
+    assert found["mean_error"] == pytest.approx(0.01, rel=0.02)
+    assert found["mean_error_scaled"] == pytest.approx(0.0, abs=1e-6)
+    left = web.delete(f"{at}/{length['id']}")
+    assert [one["text"] for one in left["lengths"]] == ["worktop"]
+    web.delete(f"{at}/{length['id']}", 404)
+    texts = [entry["text"] for entry in web.get(f"/api/projects/{project}/history")]
+    assert "measured: width of drawer_1 is 505 mm" in texts
+    assert "removed: width of drawer_1 is 505 mm" in texts
+
+
+def test_points_lie_where_the_rescaled_recording_has_them(measured: tuple[Running, str, int]) -> None:
+    web, project, _ = measured
+    at = f"/api/projects/{project}/lengths"
+    web.post(at, {"points_world": [[0, 0, 0], [0, 1.0, 0]], "metres": 1.02}, 201)
+    answer = web.client.put(f"/api/projects/{project}/reading", json={"scale": 1.02})
+    assert answer.status_code == 202, answer.text
+    assert answer.json()["scale"] == 1.02
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
+    requests = sorted(web.settings.data_dir.rglob("request.json"), key=lambda path: int(path.parent.name))
+    assert json.loads(requests[-1].read_text())["config"] == {"ingest": {"scale": 1.02}}
+    found = web.get(at)
+    assert found["lengths"][0]["measured_m"] == pytest.approx(1.02)
+    assert found["lengths"][0]["points_world"][1] == pytest.approx([0, 1.02, 0])
+    assert found["scale_wanted"] == pytest.approx(1.02)
+    assert "every length multiplied by 1.0200" in [entry["text"] for entry in web.get(f"/api/projects/{project}/history")]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"metres": 0.5},
+        {"metres": 0.5, "side": "width"},
+        {"metres": 0.0, "points_world": [[0, 0, 0], [1, 0, 0]]},
+        {"metres": 0.5, "object": 1, "side": "width", "points_world": [[0, 0, 0], [1, 0, 0]]},
+        {"metres": 0.5, "points_world": [[0, 0, 0]]},
+    ],
+)
+def test_a_length_is_of_a_side_or_between_two_points(web: Running, wrong: dict) -> None:
+    web.post(f"/api/projects/{web.sample()}/lengths", wrong, 422)
+
+
+def test_a_length_of_an_object_that_is_not_there_is_refused_whatever_it_is_called(web: Running) -> None:
+    at = f"/api/projects/{web.sample()}/lengths"
+    for text in ("", "worktop"):
+        refused = web.post(at, {"object": 10**9, "side": "width", "metres": 0.5, "text": text}, 404)
+        assert refused["kind"] == "not-found"
+
+
+def test_the_scale_comes_nearest_to_every_length_relative_to_it() -> None:
+    assert best_scale([(0.99, 1.0), (1.98, 2.0)]) == pytest.approx(1 / 0.99)
+    assert 1.0 < best_scale([(1.0, 1.0), (0.98, 1.0)]) < 1.02

@@ -1,0 +1,236 @@
+"""Two machines whose data folders are caches of one store: what one keeps the other fetches, whatever the store is."""
+
+import os
+import threading
+import urllib.request
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from app.errors import NotFound, Unavailable
+from app.store.mirror import UNUSED_S, Lost, Mirror
+from app.store.objects import Objects, open_objects
+from r2c2r_core.errors import InputError
+from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
+
+pytestmark = pytest.mark.own_database
+LONG = timedelta(days=1)
+
+if not REQUIRED:
+    pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
+
+
+@pytest.fixture(scope="module")
+def s3() -> Iterator[ObjectServer]:
+    with object_server() as found:
+        yield found
+
+
+@pytest.fixture(params=["memory", "folder", "s3"])
+def objects(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Objects:
+    if request.param == "memory":
+        import obstore
+
+        return Objects(obstore.store.MemoryStore())
+    if request.param == "folder":
+        return open_objects(f"file://{tmp_path / 'store'}")
+    for name, value in request.getfixturevalue("s3").environment.items():
+        monkeypatch.setenv(name, value)
+    return open_objects(f"s3://{BUCKET}/{tmp_path.name}")
+
+
+def machines(objects: Objects, tmp_path: Path) -> tuple[Mirror, Mirror]:
+    return Mirror(objects, tmp_path / "a"), Mirror(objects, tmp_path / "b")
+
+
+def write(folder: Path, path: str, content: str) -> Path:
+    file = folder / "projects" / "p" / path
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(content)
+    return file
+
+
+def read_all(folder: Path) -> dict[str, str]:
+    root = folder / "projects" / "p"
+    return {path.relative_to(root).as_posix(): path.read_text() for path in root.rglob("*") if path.is_file()}
+
+
+def test_what_one_machine_keeps_another_fetches_with_its_time(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "work/nouns/a.noun", "noun")
+    scan = write(tmp_path / "a", "source/scan.r3d", "scan")
+    os.utime(scan, ns=(1, 1_234_567_890_123_456_789))
+    write(tmp_path / "a", "previews/1.jpg", "drawn")
+    write(tmp_path / "a", "work/.half.tmp", "half")
+    here.keep("p")
+    there.fetch("p")
+    assert read_all(tmp_path / "b") == {"work/nouns/a.noun": "noun"}
+    there.fetch("p", recording=True)
+    assert read_all(tmp_path / "b") == {"work/nouns/a.noun": "noun", "source/scan.r3d": "scan"}
+    assert (tmp_path / "b/projects/p/source/scan.r3d").stat().st_mtime_ns == 1_234_567_890_123_456_789
+    assert there.size("p") == len("nounscan")
+
+
+def test_changes_and_deletions_cross_and_nothing_fetched_in_part_is_taken_for_deleted(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "source/scan.r3d", "scan")
+    gone = write(tmp_path / "a", "facts.json", "old")
+    here.keep("p")
+    there.fetch("p")
+    write(tmp_path / "b", "masks/1", "mask")
+    there.keep("p")  # of a folder without the recording
+    gone.unlink()
+    write(tmp_path / "a", "work/x", "x")
+    here.keep("p")
+    there.fetch("p", recording=True)
+    here.fetch("p")
+    assert read_all(tmp_path / "a") == {"source/scan.r3d": "scan", "masks/1": "mask", "work/x": "x"} == read_all(tmp_path / "b")
+
+
+def test_of_many_that_keep_at_once_nobody_loses_anything(objects: Objects, tmp_path: Path) -> None:
+    mirrors = [Mirror(objects, tmp_path / str(number)) for number in range(6)]
+    for number in range(6):
+        write(tmp_path / str(number), f"masks/{number}", str(number))
+    threads = [threading.Thread(target=mirror.keep, args=("p",)) for mirror in mirrors]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    last = Mirror(objects, tmp_path / "last")
+    last.fetch("p")
+    assert read_all(tmp_path / "last") == {f"masks/{number}": str(number) for number in range(6)}
+
+
+def test_who_kept_while_others_did_fetches_what_they_kept(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "masks/1", "1")
+    write(tmp_path / "b", "masks/2", "2")
+    here.keep("p")
+    there.keep("p")
+    there.fetch("p")
+    assert read_all(tmp_path / "b") == {"masks/1": "1", "masks/2": "2"}
+
+
+def test_who_lost_a_job_keeps_nothing_it_made_and_still_what_pages_wrote(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "project.json", "{}")
+    here.keep("p")
+    here.hold("p", "first")
+    write(tmp_path / "a", "work/nouns/old.noun", "kept in time")
+    here.keep("p")
+    there.hold("p", "second")  # the first was silent for long
+    there.fetch("p")
+    write(tmp_path / "b", "work/nouns/x.noun", "by the second")
+    there.keep("p")
+    write(tmp_path / "a", "work/nouns/x.noun", "by the first, late")
+    write(tmp_path / "a", "work/nouns/y.noun", "by the first, late")
+    write(tmp_path / "a", "masks/1.json", "drawn meanwhile")
+    (tmp_path / "a/projects/p" / "work/nouns/old.noun").unlink()
+    with pytest.raises(Lost, match="another machine goes on"):
+        here.keep("p")
+    here.keep("p")
+    here.fetch("p")
+    there.fetch("p")
+    made = {"work/nouns/old.noun": "kept in time", "work/nouns/x.noun": "by the second"}
+    assert (
+        read_all(tmp_path / "a")
+        == read_all(tmp_path / "b")
+        == {"project.json": "{}", "masks/1.json": "drawn meanwhile", **made}
+    )
+    here.hold("p", "third")
+    write(tmp_path / "a", "work/nouns/z.noun", "by its next job")
+    here.keep("p")
+
+
+def test_a_machine_makes_a_part_for_who_holds_the_project(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "project.json", "{}")
+    here.keep("p")
+    here.hold("p", "first")
+    there.hold("p", "first", taken=True)
+    write(tmp_path / "b", "work/part.noun", "part")
+    there.keep("p")
+    here.hold("p", "second")
+    write(tmp_path / "b", "work/part.noun", "late")
+    with pytest.raises(Lost):
+        there.keep("p")
+
+
+def test_a_project_deleted_for_good_leaves_nothing_and_does_not_come_back(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "work/x", "x")
+    here.keep("p")
+    there.fetch("p")
+    assert not there.was_deleted("p")
+    here.delete("p")
+    assert there.was_deleted("p")
+    write(tmp_path / "b", "work/y", "y")
+    with pytest.raises(NotFound, match="deleted"):
+        there.keep("p")
+    there.tidy(frozenset())
+    assert not (tmp_path / "b/projects/p").exists()
+    assert objects.has("projects/p/manifest.json") is False
+
+
+def test_room_is_made_by_what_the_store_holds_and_not_by_what_is_in_use(
+    objects: Objects, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cache = Mirror(objects, tmp_path / "a", quota_bytes=3)
+    write(tmp_path / "a", "work/x", "four")
+    cache.keep("p")
+    cache.fetch("p")
+    cache.tidy(frozenset())
+    assert read_all(tmp_path / "a") == {"work/x": "four"}  # a page may be reading
+    monkeypatch.setattr("app.store.mirror.UNUSED_S", -1.0)
+    cache.tidy(frozenset({"p"}))
+    assert read_all(tmp_path / "a") == {"work/x": "four"}
+    write(tmp_path / "a", "masks/1", "not kept yet")
+    cache.tidy(frozenset())
+    assert not (tmp_path / "a/projects/p").exists()
+    monkeypatch.setattr("app.store.mirror.UNUSED_S", UNUSED_S)
+    cache.fetch("p")
+    assert read_all(tmp_path / "a") == {"work/x": "four", "masks/1": "not kept yet"}
+
+
+def test_a_log_is_shown_while_it_is_written(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    here.keep_log("p", write(tmp_path / "a", "logs/job-1.log", "one line"))
+    log = tmp_path / "b/projects/p/logs/job-1.log"
+    there.fetch_log("p", log)
+    assert log.read_text() == "one line"
+
+
+def test_other_bytes_than_were_kept_are_refused(objects: Objects, tmp_path: Path) -> None:
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "work/x", "x")
+    here.keep("p")
+    (name,) = (name for name in objects.old("projects/p/files/", -LONG))
+    objects.put(name, write(tmp_path / "c", "x", "y"))
+    with pytest.raises(Unavailable, match="other bytes"):
+        there.fetch("p")
+    assert read_all(tmp_path / "b") == {}
+
+
+def test_a_browser_takes_a_kept_file_from_the_store_under_its_name(
+    s3: ObjectServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in s3.environment.items():
+        monkeypatch.setenv(name, value)
+    mirror = Mirror(open_objects(f"s3://{BUCKET}/{tmp_path.name}"), tmp_path / "a")
+    bundle = write(tmp_path / "a", "bundles/v1.zip", "bundle")
+    assert mirror.link("p", bundle, "Kitchen-v1.zip") is None  # not kept yet
+    mirror.keep("p")
+    link = mirror.link("p", bundle, "Kitchen-v1.zip")
+    assert link is not None
+    assert link.partition("?")[0].endswith("/Kitchen-v1.zip")
+    with urllib.request.urlopen(link) as answer:
+        assert answer.read() == b"bundle"
+
+
+@pytest.mark.parametrize("address", ["nonsense", "ftp://host/x", "s3://"])
+def test_an_address_that_is_none_is_refused_in_one_line(address: str) -> None:
+    with pytest.raises(InputError, match="R2C2R_STORE") as refused:
+        open_objects(address)
+    assert "\n" not in str(refused.value)

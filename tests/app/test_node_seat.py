@@ -1,0 +1,156 @@
+"""The node's side of a step, without Ray: fetched, started, heard, kept; and the process group that ends with who began it."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.jobs.ray_order import Order
+from app.jobs.ray_seat import Heard, NodeSeat
+from app.jobs.seats import version
+from app.process import Line, python_module
+from app.settings import Settings
+from app.store.opening import open_store
+from tests.app.object_server import REQUIRED
+
+pytestmark = pytest.mark.own_database
+SAYS = """
+import json, pathlib, sys
+print("not JSON", flush=True)
+print(json.dumps({"stage": "segment", "fraction": 0.5, "text": "half"}), flush=True)
+pathlib.Path(sys.argv[1], "made.noun").write_text("made")
+print(json.dumps({"done": "segment"}), flush=True)
+"""
+WAITS = 'import time; print(\'{"stage": "segment"}\', flush=True); time.sleep(600)'
+
+
+@pytest.fixture
+def order(tmp_path: Path) -> Order:
+    """Of a project that the store has."""
+    if not REQUIRED:
+        pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
+    data, store = tmp_path / "web", f"file://{tmp_path / 'store'}"
+    work = data / "projects/p/work"
+    work.mkdir(parents=True)
+    (work / "before.noun").write_text("before")
+    kept = open_store(Settings(data_dir=data, store=store))
+    kept.hold("p", "holder")
+    kept.keep("p")
+    return Order(
+        version=version(),
+        job=1,
+        project="p",
+        holder="holder",
+        stage="segment",
+        command=(sys.executable, "-c", SAYS, str(work)),
+        data_dir=str(data),
+        store=store,
+        cache_gb="",
+        cpus=1,
+        gpu=False,
+        memory_bytes=0,
+        grace_s=5.0,
+    )
+
+
+def heard_to_the_end(seat: NodeSeat) -> Heard:
+    lines, log = list[Line](), b""
+    while True:
+        heard = seat.hear()
+        lines, log = lines + heard.lines, log + heard.log
+        if heard.status is not None:
+            return Heard(lines, log, heard.status)
+
+
+def test_what_a_node_made_is_in_the_store_when_its_last_word_is_heard(order: Order, tmp_path: Path) -> None:
+    seat = NodeSeat(order)
+    assert seat.start() is None
+    heard = heard_to_the_end(seat)
+    assert [*heard.lines][-1] == {"done": "segment"}
+    assert (heard.log, heard.status) == (b"not JSON\n", 0)
+    assert (tmp_path / "web/ray/0/projects/p" / "work/before.noun").read_text() == "before"
+    there = open_store(Settings(data_dir=tmp_path / "other", store=order.store))
+    there.fetch("p")
+    assert (tmp_path / "other/projects/p" / "work/made.noun").read_text() == "made"
+
+
+def test_two_steps_on_a_node_have_a_cache_each(order: Order, tmp_path: Path) -> None:
+    first, second = NodeSeat(order), NodeSeat(order)
+    assert (first.start(), second.start()) == (None, None)
+    assert heard_to_the_end(first).status == heard_to_the_end(second).status == 0
+    assert {path.name for path in (tmp_path / "web/ray").iterdir()} == {"0", "1"}
+    third = NodeSeat(order)
+    assert third.start() is None
+    heard_to_the_end(third)
+    assert not (tmp_path / "web/ray/2").exists()
+
+
+def test_a_step_whose_job_was_lost_meanwhile_keeps_nothing(order: Order, tmp_path: Path) -> None:
+    seat = NodeSeat(order)
+    assert seat.start() is None
+    other = open_store(Settings(data_dir=tmp_path / "other", store=order.store))
+    other.hold("p", "another")
+    heard = heard_to_the_end(seat)
+    assert heard.lines[-1]["error"]["kind"] == "Lost"
+    other.fetch("p")
+    assert not (tmp_path / "other/projects/p" / "work/made.noun").exists()
+
+
+def test_a_step_is_asked_to_stop(order: Order) -> None:
+    seat = NodeSeat(replace(order, command=(sys.executable, "-c", WAITS)))
+    assert seat.start() is None
+    while not seat.hear().lines:
+        pass
+    seat.ask_to_stop()
+    assert heard_to_the_end(seat).status == -15
+
+
+def test_another_version_is_refused(order: Order) -> None:
+    wrong = NodeSeat(replace(order, version="9.9")).start()
+    assert wrong is not None
+    assert wrong["error"]["message"] == f"this is r2c2r 9.9, and the Ray node's is {version()}"
+
+
+def test_a_process_group_ends_with_who_began_it() -> None:
+    script = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); " + WAITS
+    tethered = subprocess.Popen(
+        [*python_module("app.tethered"), sys.executable, "-c", script],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+    assert tethered.stdin is not None
+    assert tethered.stdout is not None
+    tethered.stdout.readline()
+    group = psutil.Process(tethered.pid).children(recursive=True)
+    assert len(group) == 2
+    tethered.stdin.close()
+    tethered.wait(timeout=60)
+    until(lambda: not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in group))
+    tethered.stdout.close()
+
+
+@pytest.mark.parametrize(("code", "status"), [("raise SystemExit(3)", 3), ("import os; os.kill(os.getpid(), 9)", -9)])
+def test_it_ends_as_its_program_does_and_hands_on_what_it_is_told(code: str, status: int) -> None:
+    echo = "import sys; sys.stdout.write(sys.stdin.readline()); sys.stdout.flush(); "
+    with subprocess.Popen(
+        [*python_module("app.tethered"), sys.executable, "-c", echo + code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as tethered:
+        assert tethered.stdin is not None
+        assert tethered.stdout is not None
+        tethered.stdin.write(b"said\n")
+        tethered.stdin.flush()
+        assert tethered.stdout.read() == b"said\n"
+        assert tethered.wait() == status
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)

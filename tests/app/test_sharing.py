@@ -1,0 +1,293 @@
+"""The objects of a stage at several seats: each once, together what one seat makes, and what becomes of them when one ends."""
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from sqlmodel import select
+
+from app.db.engine import reading
+from app.db.tables import Job, Part
+from app.jobs.parts import TRIES, PartRows, fair_share
+from tests.app.conftest import Running, running
+from tests.app.object_server import REQUIRED
+from tests.app.postgres import PostgresServer
+from tests.app.test_jobs import behave, run
+
+SHARED = {"segment": "objects", "generate": "objects"}
+NAMES = ("drawer_1", "mug_1")  # of the sample
+FREE = {"sharing_costs_s": 0.0}  # so that two objects are worth it
+QUICK = {"beat_s": 0.3, "beats_missed_s": 6.0}  # longer than a seat is silent between two of its signs of life
+
+
+def held(web: Running, *names: str) -> tuple[str, Path]:
+    """A project whose stages go by objects, each of these held where it is computed; and its folder."""
+    project = web.sample()
+    folder = behave(web, project, **SHARED)
+    for name in names:
+        (folder / f"hold-{name}").touch()
+    return project, folder
+
+
+def both_at_work(web: Running, folder: Path) -> None:
+    """Wait until both objects are being computed, at the same time."""
+    web.until(lambda: all((folder / f"at-{name}.part").exists() for name in NAMES))
+
+
+def computed(folder: Path) -> list[tuple[str, str, str]]:
+    """Each computation of an object: its stage, the object, and whether it was a part."""
+    return [tuple(line.split()[:3]) for line in (folder / "parts.txt").read_text().splitlines()]  # type: ignore[misc]
+
+
+def stored(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.noun")}
+
+
+def process_at(folder: Path, name: str) -> psutil.Process:
+    return psutil.Process(int((folder / f"at-{name}.part").read_text()))
+
+
+def gone(process: psutil.Process) -> bool:
+    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
+
+
+def parts(web: Running) -> list[Part]:
+    with reading(web.context.engine) as session:
+        return list(session.exec(select(Part)))
+
+
+def test_two_seats_share_the_objects_of_one_job_and_make_what_one_makes(tmp_path: Path) -> None:
+    with running(tmp_path / "two", heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, *NAMES)
+        job = run(web, project)
+        both_at_work(web, folder)
+        for name in NAMES:
+            (folder / f"hold-{name}").unlink()
+        assert web.job(job, "done", "failed")["state"] == "done"
+        assert sorted(computed(folder)) == sorted((stage, name, "part") for stage in SHARED for name in NAMES)
+        assert parts(web) == []
+        shared = stored(folder / "work")
+        log = web.client.get(f"/api/jobs/{job}/log").text
+    with running(tmp_path / "one", heavy_jobs=1, **FREE) as web:
+        project, folder = held(web)
+        assert web.job(run(web, project), "done", "failed")["state"] == "done"
+        assert sorted(computed(folder)) == sorted((stage, name, "whole") for stage in SHARED for name in NAMES)
+        assert stored(folder / "work") == shared
+    for name in NAMES:
+        assert log.count(f"a warning about {name}") == len(SHARED)
+        assert f"segment of {name} at " in log
+
+
+def test_how_many_objects_are_done_is_said(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, "mug_1")
+        job = run(web, project)
+        web.until(lambda: web.get(f"/api/jobs/{job}")["message"] == "1 of 2 objects")
+        found = web.get(f"/api/jobs/{job}")
+        assert (found["stage"], found["state"]) == ("segment", "running")
+        assert found["stage_fraction"] == 0.5
+        (folder / "hold-mug_1").unlink()
+        assert web.job(job, "done", "failed")["state"] == "done"
+        said = [event["fraction"] for event in web.get(f"/api/jobs/{job}/events") if event["stage"] == "segment"]
+        assert said == sorted(said)
+
+
+def test_a_seat_whose_process_is_killed_costs_a_try(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, *NAMES)
+        job = run(web, project)
+        both_at_work(web, folder)
+        (folder / "hold-mug_1").unlink()
+        killed = process_at(folder, "drawer_1")
+        (folder / "at-drawer_1.part").unlink()
+        killed.kill()
+        web.until((folder / "at-drawer_1.part").exists)
+        (folder / "hold-drawer_1").unlink()
+        assert web.job(job, "done", "failed")["state"] == "done"
+        segmented = [(name, how) for stage, name, how in computed(folder) if stage == "segment"]
+        assert sorted(segmented) == [("drawer_1", "part"), ("drawer_1", "part"), ("mug_1", "part")]
+
+
+def test_an_object_that_kills_every_process_is_left_to_the_stage(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, "drawer_1")
+        job = run(web, project)
+        for _ in range(TRIES):
+            web.until((folder / "at-drawer_1.part").exists)
+            killed = process_at(folder, "drawer_1")
+            (folder / "at-drawer_1.part").unlink()
+            killed.kill()
+        web.until((folder / "at-drawer_1.part").exists)
+        (folder / "hold-drawer_1").unlink()
+        assert web.job(job, "done", "failed")["state"] == "done"
+        assert ("segment", "drawer_1", "whole") in computed(folder)
+
+
+def test_cancelling_stops_every_seat(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, *NAMES)
+        job = run(web, project)
+        both_at_work(web, folder)
+        processes = [process_at(folder, name) for name in NAMES]
+        web.post(f"/api/jobs/{job}/cancel")
+        assert web.job(job, "cancelled", "done", "failed")["state"] == "cancelled"
+        assert all(gone(process) for process in processes)  # before it is said
+        assert parts(web) == []
+
+
+def test_an_object_that_fails_ends_the_job_with_its_line(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web)
+        (folder / "bad.txt").write_text("mug_1")
+        found = web.job(run(web, project), "done", "failed")
+        assert (found["state"], found["error"]["message"]) == ("failed", "no frame shows mug_1")
+        assert ("segment", "mug_1", "whole") in computed(folder)
+        assert parts(web) == []
+
+
+def test_objects_that_take_no_longer_than_a_process_to_begin_are_not_shared(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2) as web:  # two objects without a model are a second or two of work
+        project, folder = held(web)
+        assert web.job(run(web, project), "done", "failed")["state"] == "done"
+        assert {how for _, _, how in computed(folder)} == {"whole"}
+
+
+def test_a_single_object_is_not_shared(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        project, folder = held(web)
+        stored_before = folder / "work/nouns/segment/drawer_1.noun"
+        stored_before.parent.mkdir(parents=True)
+        stored_before.write_text("segment of drawer_1")
+        assert web.job(run(web, project), "done", "failed")["state"] == "done"
+        segmented = [(name, how) for stage, name, how in computed(folder) if stage == "segment"]
+        assert segmented == [("mug_1", "whole")]
+
+
+def test_seats_with_jobs_of_their_own_are_not_counted_on(tmp_path: Path) -> None:
+    with running(tmp_path, heavy_jobs=2, **FREE) as web:
+        projects = [web.sample() for _ in range(2)]
+        rows = PartRows(web.context.engine, "somebody", web.settings)
+        assert rows.spare() == 2
+        for seats_left, project in zip((1, 0), projects, strict=True):
+            folder = behave(web, project, segment="hang")
+            run(web, project)
+            web.until((folder / "hanging").exists)
+            assert rows.spare() == seats_left
+
+
+@pytest.mark.parametrize(
+    ("waiting", "seats", "fewest", "taken"),
+    [
+        (20, 20, 4, 1),  # each its own
+        (14, 2, 1, 4),  # half of a seat's share, so that both end about the same time
+        (14, 2, 4, 4),
+        (14, 2, 16, 7),  # all that is its share: its processors would idle
+        (3, 8, 4, 1),
+        (5, 1, 8, 5),
+    ],
+)
+def test_a_seat_takes_as_many_objects_as_keep_all_busy(waiting: int, seats: int, fewest: int, taken: int) -> None:
+    assert fair_share(waiting, seats, fewest) == taken
+
+
+def test_a_server_that_stops_leaves_no_process_and_the_next_goes_on(tmp_path: Path) -> None:
+    with running(tmp_path / "data", heavy_jobs=2, **FREE) as web:
+        project, folder = held(web, *NAMES)
+        job = run(web, project)
+        both_at_work(web, folder)
+        processes = [process_at(folder, name) for name in NAMES]
+    assert all(gone(process) for process in processes)
+    for name in NAMES:
+        (folder / f"hold-{name}").unlink()
+    with running(tmp_path / "data", heavy_jobs=2, **FREE, **QUICK) as web:
+        assert web.job(job, "done", "failed")["state"] == "done"
+
+
+SEAT = """
+import sys, threading
+from pathlib import Path
+from app.settings import Settings
+from app.work import run_jobs
+from tests.app.conftest import FAKE_COMMANDS
+quick = {"sharing_costs_s": 0.0, "beat_s": 0.3, "beats_missed_s": 6.0, "min_free_bytes": 0, "job_memory_bytes": 0}
+run_jobs(Settings(data_dir=Path(sys.argv[1]), **quick), FAKE_COMMANDS, threading.Event())
+"""
+
+
+@contextmanager
+def seat(web: Running, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """`r2c2r work` in a process and on a data folder of its own, that takes jobs."""
+    folder.mkdir()
+    places = {"R2C2R_DATABASE": web.settings.postgres, "R2C2R_STORE": web.settings.store}
+    with subprocess.Popen(
+        [sys.executable, "-c", SEAT, str(folder)], env={**os.environ, **places}, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        try:
+            yield process
+        finally:
+            with contextlib.suppress(psutil.Error):
+                for each in [*psutil.Process(process.pid).children(recursive=True), process]:
+                    each.kill()
+
+
+@pytest.fixture
+def served(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[Running]:
+    """A server that computes nothing, with rows and files that seats reach."""
+    if not REQUIRED:
+        pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
+    places = {"postgres": postgres_server.of_folder(tmp_path), "store": f"file://{tmp_path / 'store'}"}
+    with running(tmp_path / "web", **places, **QUICK, heavy_jobs=0) as web:
+        yield web
+    postgres_server.drop_all()
+
+
+def held_at(web: Running, one: subprocess.Popen[bytes], two: subprocess.Popen[bytes]) -> tuple[int, dict[int, Path]]:
+    """A job of which each of both seats holds an object; and the project's folder at each, by its process."""
+    project, _ = held(web, *NAMES)
+    web.context.store.keep(project)
+    job = run(web, project)
+    at = {seat.pid: web.settings.data_dir.parent / name / "projects" / project for name, seat in (("one", one), ("two", two))}
+    web.until(lambda: all(list(folder.glob("at-*.part")) for folder in at.values()))
+    return job, at
+
+
+@pytest.mark.own_database
+def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Running, tmp_path: Path) -> None:
+    with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
+        job, folders = held_at(served, one, two)
+        with reading(served.context.engine) as session:
+            owner = int((session.get_one(Job, job).owner or "").split(":")[1])
+        (helper,) = folders.keys() - {owner}
+        (name,) = (path.stem.removeprefix("at-") for path in folders[helper].glob("at-*.part"))
+        lost = process_at(folders[helper], name)
+        at_it = {found["process"]: found["jobs"][0]["objects"] for found in served.get("/api/seats")["seats"] if found["jobs"]}
+        assert at_it == {owner: [], helper: [name]}
+        (one if one.pid == helper else two).kill()
+        served.until(lambda: gone(lost))  # what the machine had begun ends with it
+        for each in (*({*NAMES} - {name}), name):  # its own, then the other's
+            served.until((folders[owner] / f"at-{each}.part").exists)
+            (folders[owner] / f"hold-{each}").unlink()
+        project = served.job(job, "done", "failed")["project"]
+        assert served.get(f"/api/jobs/{job}")["state"] == "done"
+    served.context.store.fetch(project)
+    nouns = stored(tmp_path / "web/projects" / project / "work")
+    assert sorted(nouns) == sorted(f"nouns/{stage}/{name}.noun" for stage in SHARED for name in NAMES)
+
+
+@pytest.mark.own_database
+def test_a_job_that_is_cancelled_where_pages_are_served_stops_at_every_machine(served: Running, tmp_path: Path) -> None:
+    with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
+        job, folders = held_at(served, one, two)
+        processes = [psutil.Process(int(path.read_text())) for folder in folders.values() for path in folder.glob("at-*.part")]
+        served.post(f"/api/jobs/{job}/cancel")
+        assert served.job(job, "cancelled", "done", "failed")["state"] == "cancelled"
+        assert all(gone(process) for process in processes)
+        assert parts(served) == []

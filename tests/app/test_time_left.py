@@ -1,0 +1,71 @@
+"""The time that a job says it still needs."""
+
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from app.db.engine import open_engine, reading, writing
+from app.db.tables import Job, JobEvent, Project
+from app.jobs.durations import longest
+from app.jobs.plans import Step
+from app.jobs.steps import JobProgress
+
+TOOK_S = {"segment": 30.0, "generate": 20.0, "export": 60.0}
+
+
+def test_a_run_that_finds_most_done_does_not_promise_the_rest_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
+    progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
+    said = [progress.eta_s]
+    for at, took_s in enumerate((2.0, 2.0, 60.0)):  # the first two were done before
+        progress.at(at)
+        for tenth in range(1, 11):
+            now[0] += took_s / 10
+            progress.fraction = tenth / 10
+            said.append(progress.eta_s)
+    assert said[0] == 110.0
+    told = [seconds for seconds in said if seconds is not None]
+    assert len(told) == len(said)
+    assert told == sorted(told, reverse=True)  # it never rises
+
+
+def test_a_run_that_is_slower_than_before_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
+    progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
+    progress.at(1)
+    now[0] += 60.0  # what took half a minute
+    assert progress.eta_s == pytest.approx(160.0)
+
+
+def test_the_longest_of_the_projects_own_finished_runs_counts(tmp_path: Path) -> None:
+    engine = open_engine(tmp_path / "r2c2r.db")
+    with writing(engine) as session:
+        for project in ("mine", "other"):
+            session.add(Project(id=project, name=project, source_name="scan.r3d", status="ready", created=0.0, updated=0.0))
+        session.flush()
+        for project, state, seconds in (
+            ("mine", "done", 10.0),
+            ("mine", "done", 2.0),
+            ("mine", "failed", 99.0),
+            ("other", "done", 50.0),
+        ):
+            job = Job(project_id=project, kind="run", state=state, created=0.0)
+            session.add(job)
+            session.flush()
+            for kind, stage, at in (
+                ("stage", "segment", 5.0),
+                ("progress", "segment", 6.0),
+                ("stage", "export", 5.0 + seconds),
+                ("state", "export", 5.0 + 3 * seconds),
+            ):
+                session.add(JobEvent(job_id=job.id or 0, at=time.time() + at, kind=kind, stage=stage))
+                session.flush()
+    with reading(engine) as session:
+        took = longest(session, Job(project_id="mine", kind="run", state="queued", created=0.0))
+        assert took == pytest.approx({"segment": 10.0, "export": 20.0}, abs=0.1)
+        assert longest(session, Job(project_id="mine", kind="import", state="queued", created=0.0)) == {}
+    engine.dispose()

@@ -1,0 +1,192 @@
+"""Two servers on one Postgres and one store: what happens at one is seen at the other."""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import Engine
+
+from app import hub as hubs
+from app.db import channel as channels
+from app.db.channel import Channel, join_hubs
+from app.db.engine import opened
+from app.hub import Hub
+from tests.app.conftest import Running, running
+from tests.app.object_server import REQUIRED
+from tests.app.postgres import PostgresServer
+from tests.app.test_jobs import run
+from tests.app.test_live import CLICK, listening, until
+
+pytestmark = pytest.mark.own_database
+
+if not REQUIRED:
+    pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
+
+
+@pytest.fixture
+def address(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[str]:
+    yield postgres_server.of_folder(tmp_path)
+    postgres_server.drop_all()
+
+
+@pytest.fixture
+def two(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Running, Running]]:
+    monkeypatch.setattr(hubs, "PRESENCE_S", 0.0)
+    options = {"postgres": address, "store": f"file://{tmp_path / 'store'}", "beat_s": 0.5}
+    with (
+        running(tmp_path / "a", user="ann", **options) as a,
+        running(tmp_path / "b", user="bob", run_jobs=False, **options) as b,
+    ):
+        yield a, b
+
+
+@pytest.fixture
+def engine(address: str) -> Iterator[Engine]:
+    with opened(address) as found:
+        yield found
+
+
+def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Running, Running]) -> None:
+    a, b = two
+    project = a.sample()
+    with listening(a, project) as at_a, listening(b, project) as at_b:
+        both = {"ann", "bob"}
+        assert (
+            {person["who"] for person in presence(at_b, at_least=2)}
+            == {person["who"] for person in presence(at_a, at_least=2)}
+            == both
+        )
+        at_a.send_json({"type": "watch", "project": project, "page": "review", "object": None})
+        while not any(person["page"] == "review" and person["who"] == "ann" for person in presence(at_b, at_least=2)):
+            pass
+        made = b.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+        seen, _ = until(at_a, type="segment", object=made["id"], state="done")
+        assert [message["frame"] for message in seen if message["type"] == "mask"] == [3, 0, 7]
+        lane = {"object": made["id"], "frames": [0, 3, 7], "complete": True}
+        a.until(lambda: [one for one in a.get(f"/api/projects/{project}/lanes") if lane.items() <= one.items()] != [])
+        job = run(b, project)  # it runs at a
+        told: list[dict[str, Any]] = []
+        while not told or told[-1]["state"] != "done":
+            message = at_b.receive_json()
+            if message["type"] == "job" and message["job"]["id"] == job:
+                told.append(message["job"])
+        assert len({one["stage"] for one in told}) > 3
+        until(at_b, type="projects")
+        at_a.close()
+        while {person["who"] for person in presence(at_b)} != {"bob"}:
+            pass
+
+
+def test_what_is_put_into_the_trash_at_one_is_gone_at_the_other(two: tuple[Running, Running]) -> None:
+    a, b = two
+    project = a.sample()
+    with listening(b, project) as at_b:
+        a.delete(f"/api/projects/{project}")
+        until(at_b, type="projects")
+        b.until(lambda: b.client.get(f"/api/projects/{project}").status_code == 404)
+
+
+def test_all_messages_arrive_in_their_order_also_over_broken_connections(
+    engine: Engine, postgres_server: PostgresServer
+) -> None:
+    told: list[int] = []
+    gaps: list[None] = []
+    with channel(engine, "a") as a, channel(engine, "b") as b:
+        b.hears["number"] = lambda sender, said: told.append(said["number"])
+        b.on_gap.append(lambda: gaps.append(None))
+        for number in range(300):
+            a.say("number", {"number": number})
+            if number % 100 == 50:
+                wait(lambda number=number: len(told) > number - 50)
+                postgres_server.run("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'r2c2r'")
+        wait(lambda: bool(told) and told[-1] == 299)
+    assert list(dict.fromkeys(told)) == list(range(300))  # one whose commit was not heard of is sent again
+    assert gaps == []
+
+
+def test_who_was_away_while_messages_were_deleted_has_its_tabs_fetch_everything(engine: Engine) -> None:
+    gaps = threading.Event()
+    with channel(engine, "a") as one:
+        one.on_gap.append(gaps.set)
+        wait(lambda: one._newest is not None and one._newest[0] > 0)
+        with engine.connect().execution_options(write=True) as connection:
+            connection.exec_driver_sql("DELETE FROM messages")
+            connection.exec_driver_sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
+            connection.commit()
+        assert gaps.wait(60)
+
+
+def test_who_vanishes_is_forgotten_and_what_it_may_not_have_told_is_fetched(engine: Engine) -> None:
+    gone: list[tuple[str, bool]] = []
+    hub = Hub()
+    with channel(engine, "a", beat_s=0.2) as a:
+        a.on_gone.append(lambda sender, vanished: gone.append((sender, vanished)))
+        join_hubs(a, hub)
+        epoch = hub.epoch
+        with channel(engine, "in order"):
+            wait(lambda: "in order" in a._heard)
+        wait(lambda: gone == [("in order", False)])
+        assert hub.epoch == epoch
+        lost = Channel(engine, "lost", 3600.0)
+        lost.start()
+        wait(lambda: hub.epoch != epoch)
+        assert gone == [("in order", False), ("lost", True)]
+        lost.stop()
+
+
+def test_what_waits_for_a_database_that_does_not_answer_is_bounded(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channels, "WAITING_BYTES", 10_000)
+    kinds: list[str] = []
+    with channel(engine, "b") as b:
+        b.hears["x"] = lambda *_: kinds.append("x")
+        b.on_gap.append(lambda: kinds.append("gap"))
+        a = Channel(engine, "a", 3600.0)
+        for _ in range(3):
+            a.say("x", {"bits": "1" * 4_000})
+        a.start()
+        wait(lambda: bool(kinds))
+        a.stop()
+    assert kinds == ["gap"]
+
+
+def test_a_newer_version_of_a_row_is_not_followed_by_an_older_of_another_server(engine: Engine) -> None:
+    first, second = Hub(), Hub()
+    with channel(engine, "a") as a, channel(engine, "b") as b:
+        join_hubs(a, first)
+        join_hubs(b, second)
+        first.publish_state("object", "p", 1, 2, name="newer")
+        wait(lambda: second.seq == 1)
+        second.publish_state("object", "p", 1, 1, name="older")
+        second.publish("review", "p")
+        wait(lambda: first.seq == 2)
+    assert (first.seq, second.seq) == (2, 2)
+
+
+@contextmanager
+def channel(engine: Engine, name: str, beat_s: float = 3600.0) -> Iterator[Channel]:
+    one = Channel(engine, name, beat_s)
+    one.start()
+    assert one._listening.wait(60)
+    try:
+        yield one
+    finally:
+        one.stop()
+
+
+def presence(socket: Any, *, at_least: int = 0) -> list[dict[str, Any]]:
+    """Who is here, as it is told next, or once so many are."""
+    while True:
+        message = socket.receive_json()
+        if message["type"] == "presence" and len(message["people"]) >= at_least:
+            return list(message["people"])
+
+
+def wait(condition: Any) -> None:
+    deadline = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.01)

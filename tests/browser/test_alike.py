@@ -1,0 +1,88 @@
+"""Many of one kind: the others like an object, by keys alone, and one name for all in the order they stand."""
+
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.test_many import post
+from tests.browser.test_pages import serious
+from tests.browser.test_together import rows, sample
+from tests.browser.together import Server, signed_in
+
+# half a metre wide and 20 cm high, as what is proposed
+CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_ones_like_an_object_are_shown_and_confirmed(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
+    )
+    page = signed_in(context, server, "cleo")
+    project = sample(page)
+    page.goto(f"{project}/annotate?frame=3")
+    proposals = page.get_by_label("Proposals", exact=True)
+    shown = proposals.get_by_role("listitem")
+    expect(shown).to_have_count(3)
+    front = {"corners_m": CORNERS, "handle": None, "hinge": None}
+    post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "pull_out", "front": front})  # type: ignore[dict-item]
+    expect(page.locator(".object-list")).to_contain_text("drawn · 3 frames")
+
+    page.get_by_role("button", name="drawer_1", exact=True).click()
+    page.keyboard.press("j")
+    expect(proposals.get_by_role("heading")).to_have_text("Like drawer_1 (2)")
+    expect(proposals).to_contain_text("By category: it has no flat front to compare.")
+    page.keyboard.press("Escape")
+    expect(proposals.get_by_role("heading")).to_have_text("Proposals (3)")
+
+    page.get_by_role("button", name="pull_out_1", exact=True).click()
+    page.get_by_role("button", name="Find the ones like this").press("Enter")
+    expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (2)")
+    expect(shown.first).to_contain_text("50 % alike")
+    expect(shown.first).to_have_class("current")
+    proposals.scroll_into_view_if_needed()
+    picture(page, f"alike-{theme}")
+    assert serious(page, "alike") == []
+    answers: list[Callable[[], None]] = []
+    page.route("**/proposals/confirm", lambda route: answers.append(partial(route.fulfill, response=route.fetch())))
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="pull_out_2", exact=True)).to_be_visible()
+    expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (1)")
+    page.keyboard.press("Control+z")  # of what is confirmed, though the answer is still on its way
+    answers.pop()()
+    page.unroute("**/proposals/confirm")
+    expect(rows(page)).to_have_count(3)
+    expect(page.get_by_role("button", name="pull_out_1", exact=True)).to_be_visible()
+    expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (2)")
+
+    page.get_by_label("Least confidence").select_option("50 % alike")
+    page.locator("r2c2r-frame-canvas canvas").focus()
+    page.keyboard.press("Shift+Enter")
+    expect(page.get_by_role("button", name="pull_out_3", exact=True)).to_be_visible()
+    expect(proposals).to_contain_text("No proposal is like pull_out_1.")
+    page.get_by_role("button", name="All proposals").click()
+    expect(proposals.get_by_role("heading")).to_have_text("Proposals (1)")
+    context.close()
+
+
+def test_several_are_numbered_from_left_to_right_and_from_the_top_down(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "cleo")
+    project = sample(page)
+    page.goto(f"{project}/annotate?frame=3")
+    expect(page.get_by_label("Proposals", exact=True).get_by_role("listitem")).to_have_count(3)
+    for across, down in ((0.6, 0.0), (0.0, 0.3), (0.0, 0.0)):  # made from the last to the first
+        corners = [[x + across, y, z - down] for x, y, z in CORNERS]
+        front = {"corners_m": corners, "handle": None, "hinge": None}
+        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "flap", "front": front})  # type: ignore[dict-item]
+    expect(page.locator(".object-list").get_by_text("drawn · 3 frames")).to_have_count(3)
+    page.get_by_role("button", name="flap_1", exact=True).click(modifiers=["Control"])
+    page.get_by_role("button", name="flap_3", exact=True).click(modifiers=["Shift"])
+    page.get_by_label("Name for all, numbered").fill("door")
+    page.get_by_label("Name for all, numbered").press("Enter")
+    expect(page.locator(".object-list .pick")).to_have_text(["drawer_1", "mug_1", "door_3", "door_2", "door_1"])
+    picture(page, "numbered")
+    context.close()

@@ -1,0 +1,83 @@
+"""Objects are assigned to people: shown and found by it in the list, and waiting in their inbox."""
+
+import re
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.serving import box_of
+from tests.browser.test_journey import picture
+from tests.browser.test_many import post
+from tests.browser.test_pages import serious
+from tests.browser.test_together import pick, rows, sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_objects_are_assigned_and_wait_for_their_person(browser: Browser, server: Server, theme: str) -> None:
+    how = {"viewport": {"width": 1280, "height": 720}, "color_scheme": theme, "bypass_csp": True}  # for axe
+    contexts = [browser.new_context(**how) for _ in range(2)]  # type: ignore[arg-type]
+    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    project = sample(ann)
+    for _ in range(10):
+        post(ann, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "bottle"})
+    ann.goto(f"{project}/annotate")
+    inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
+
+    # one, by keyboard, in the list; taken back and done again
+    pick(ann, "drawer_1")
+    whose = ann.get_by_label("drawer_1 is assigned to")
+    whose.focus()
+    whose.press("b")
+    expect(whose).to_have_value("bea")
+    expect(ann.locator(".toast", has_text="drawer_1: assigned to bea")).to_be_visible()
+    expect(inbox).to_have_text("Inbox 1")
+    expect(rows(ann).first).to_contain_text("@bea")
+    ann.get_by_role("button", name="Undo", exact=True).click()
+    expect(whose).to_have_value("")
+    expect(inbox).to_have_text("Inbox")
+    ann.get_by_role("button", name="Redo", exact=True).click()
+    expect(inbox).to_have_text("Inbox 1")
+
+    # several, from the bar and from the palette
+    ann.get_by_role("button", name="bottle_1", exact=True).click(modifiers=["Control"])
+    ann.get_by_role("button", name="bottle_3", exact=True).click(modifiers=["Shift"])
+    ann.get_by_label("Assign all to").select_option("bea")
+    expect(ann.locator(".toast", has_text="3 objects: assigned to bea")).to_be_visible()
+    expect(inbox).to_have_text("Inbox 4")
+    picture(ann, f"objects-assigned-{theme}")
+    assert serious(ann, "objects assigned") == []
+    ann.get_by_label("Selected objects").get_by_role("button", name="None").click()
+    ann.get_by_role("button", name="bottle_3", exact=True).click()
+    ann.keyboard.press("Control+k")
+    ann.keyboard.type("assign to nobody")
+    ann.keyboard.press("Enter")
+    expect(inbox).to_have_text("Inbox 3")
+
+    # found by it
+    ann.get_by_label("Which objects").select_option("nobodys")
+    expect(rows(ann)).to_have_count(9)
+    ann.get_by_label("Which objects").select_option("all")
+    ann.get_by_label("Find objects").fill("@bea")
+    expect(rows(ann)).to_have_count(4)  # the chosen one stays
+
+    # in the inbox: to the object, and done with it
+    inbox.click()
+    mine = bea.get_by_role("region", name=re.compile("^Objects assigned to you"))
+    expect(mine.get_by_role("link")).to_have_text(["drawer_1", "bottle_1", "bottle_2"])
+    picture(bea, f"objects-inbox-{theme}")
+    assert serious(bea, "inbox with objects") == []
+    bea.set_viewport_size({"width": 390, "height": 800})
+    assert bea.evaluate("document.documentElement.scrollWidth") <= 390
+    bea.set_viewport_size({"width": 1280, "height": 720})
+    mine.get_by_role("button", name="Done: bottle_1").press("Enter")
+    expect(mine.get_by_role("link")).to_have_text(["drawer_1", "bottle_2"])
+    expect(inbox).to_have_text("Inbox 2")
+    mine.get_by_role("link", name="drawer_1").press("Enter")
+    expect(bea.get_by_label("drawer_1 is assigned to")).to_have_value("bea")
+    bea.get_by_label("Which objects").select_option("mine")
+    expect(rows(bea)).to_have_count(2)
+    lock, eye = (box_of(rows(bea).first.get_by_role("button", name=name)) for name in ("Lock drawer_1", "Hide drawer_1"))
+    assert lock["y"] == eye["y"]
+    for context in contexts:
+        context.close()

@@ -1,0 +1,45 @@
+"""Naming objects: any words are joined to a name, categories are offered, and what is to know of one is said once."""
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.test_many import post
+from tests.browser.test_together import rows, sample
+from tests.browser.together import Server, signed_in
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_names_are_joined_and_an_unknown_category_is_said_once(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    for _ in range(3):
+        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "gizmo"})
+    page.goto(f"{project}/annotate?frame=3")
+    expect(rows(page)).to_have_count(5)
+    offered = page.locator("#categories option").evaluate_all("options => options.map(option => option.value)")
+    assert {"bottle", "mug", "chair", "sink", "drawer", "wall_cabinet"} <= set(offered)
+
+    notices = page.locator(".object-list li > .muted:not(.row)")
+    expect(notices).to_have_count(1)
+    expect(notices).to_contain_text("'gizmo' is not a known category")
+    page.get_by_role("button", name="gizmo_3", exact=True).click()
+    expect(notices).to_have_count(2)  # of the first, and of the one that is worked at
+
+    page.get_by_label("Name of gizmo_3").fill("mom's cook books")
+    page.get_by_label("Name of gizmo_3").press("Enter")
+    expect(page.get_by_role("button", name="mom_s_cook_books", exact=True)).to_be_visible()
+    page.get_by_label("Category of mom_s_cook_books").fill("book")
+    page.get_by_label("Category of mom_s_cook_books").press("Enter")
+    expect(notices).to_have_count(1)
+    expect(page.get_by_label("Category of the next object")).to_have_value("drawer")  # it follows nothing
+
+    proposals = page.get_by_label("Proposals", exact=True)
+    expect(proposals.get_by_role("button", name="Confirm 2", exact=True)).to_be_enabled()
+    expect(proposals.get_by_label("Least confidence")).to_have_value("0.8")
+    assert "at least" in proposals.inner_text()
+    page.get_by_label("Least confidence").select_option("95 % sure")
+    expect(proposals.get_by_role("button", name="Confirm 1", exact=True)).to_be_enabled()
+    picture(page, f"naming-{theme}")
+    context.close()

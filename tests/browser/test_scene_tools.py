@@ -1,0 +1,264 @@
+"""The 3D view as an instrument: a click chooses, eyes hide, geometry shows at once what it can, nobody clicked the worktop."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.viewer.assembly import Assembly, shapes_of
+from app.viewer.camera import USUAL_FOV, from_axis
+from r2c2r_core.export.plan import facing, plan_bundle
+from tests.app.finished import keep_results
+from tests.app.nouns import finish
+from tests.browser.serving import box_of
+from tests.browser.test_journey import picture
+from tests.browser.test_together import sample, say
+from tests.browser.together import Server, signed_in
+from tests.core.export.kitchen import kitchen
+from tests.core.export.test_report import certificate
+
+ASK = """async ([method, path, body]) => {
+  const options = { method, headers: { "content-type": "application/json", "x-requested-with": "r2c2r" } };
+  const answer = await fetch(path, body === null ? options : { ...options, body: JSON.stringify(body) });
+  return await answer.json();
+}"""
+CLICK = {"frame": 3, "x": 80, "y": 60, "label": 1}
+
+
+def ask(page: Page, method: str, path: str, body: Any = None) -> Any:
+    return page.evaluate(ASK, [method, path, body])
+
+
+def finished(page: Page, server: Server) -> str:
+    """A project with the small kitchen in its workspace, one bundle, and a next run that hangs; the address of its overview."""
+    project = sample(page)
+    name = project.split("/p/")[1]
+    for category, number in (("cabinet", 1), ("double_door_cabinet", 1), ("bottle", 1)):
+        called = {"double_door_cabinet": "double_1"}.get(category, f"{category}_{number}")
+        ask(
+            page, "POST", f"/api/projects/{name}/objects?infer=false", {"name": called, "category": category, "points": [CLICK]}
+        )
+    page.goto(f"{project}/run")
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.get_by_role("button", name="Run again").wait_for()
+    work = server.data / "projects" / name / "work"
+    finish(work)
+    keep_results(work, certificate())
+    (work.parent / "behave.json").write_text(json.dumps({"segment": "hang"}))
+    page.goto(f"{project}/review")
+    page.get_by_role("button", name="Scene", exact=True).click()
+    expect(page.locator(".joints strong")).to_contain_text("joint")
+    return project
+
+
+def from_front(page: Page, name: str) -> tuple[float, float]:
+    """Where the middle of an object's front face is on the screen, looked at from the front."""
+    plan = plan_bundle(kitchen())
+    shown = Assembly(None, plan, {body.name: list(shapes_of(body.link, "meshes")) for body in plan.bodies})
+    ahead = facing(plan)
+    assert ahead is not None
+    place, target = from_axis("front", ahead, *shown.bounds)
+    depth = (target - place) / np.linalg.norm(target - place)
+    right = np.cross(depth, [0.0, 0.0, 1.0])
+    item = next(item for item in kitchen().objects if item.name == name)
+    front = item.world_from_object.apply(np.array([[0.0, -item.dimensions_m[1] / 2, 0.0]]))[0]
+    offset = front - place
+    frame = box_of(page.get_by_title("3D view of the project"))
+    scale = frame["height"] / 2 / np.tan(USUAL_FOV / 2) / (offset @ depth)
+    across, down = offset @ right * scale, -(offset - (offset @ depth) * depth)[2] * scale
+    return frame["x"] + frame["width"] / 2 + float(across), frame["y"] + frame["height"] / 2 + float(down)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_click_in_the_scene_chooses_and_the_scene_stays(browser: Browser, server: Server, theme: Any) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme=theme)
+    page = signed_in(context, server, "ann")
+    finished(page, server)
+    page.keyboard.press("6")
+    scene = page.get_by_role("button", name="Scene", exact=True)
+    for name in ("cabinet_1", "double_1", "counter_1"):
+        chosen = page.locator(".review nav button[aria-pressed=true]")
+        expect(clicked(page, name)).to_have_text(name)
+        expect(chosen).to_have_count(1)
+        expect(scene).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("0")
+    expect(page.get_by_role("button", name="Parallel")).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="Hide bottle_1 in the scene").click()
+    expect(page.get_by_role("button", name="Show bottle_1 in the scene")).to_be_visible()
+    page.get_by_label("What is drawn of the scene").select_option("both")
+    page.wait_for_timeout(1500)
+    picture(page, f"scene-tools-{theme}")
+    context.close()
+
+
+def clicked(page: Page, name: str) -> Any:
+    """Click the object until the list says that it is chosen: the view turns when it can."""
+    chosen = page.locator(".review nav button[aria-pressed=true]", has_text=name)
+    for _ in range(80):  # a busy machine takes its time to draw the first view
+        page.mouse.click(*from_front(page, name))
+        page.wait_for_timeout(1500)
+        if chosen.count():
+            break
+    return chosen
+
+
+def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_marked_stale(
+    browser: Browser, server: Server
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = finished(page, server)
+    page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
+    page.get_by_text("Correct it").click()
+    page.get_by_label("Hinge of cabinet_1").select_option("right")
+    expect(page.get_by_text("Preview: cabinet_1; certified by the next run")).to_be_visible()
+    expect(page.get_by_text("before the last change")).to_be_visible()
+    picture(page, "preview")
+    page.goto(f"{project}/run")
+    expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
+    assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was made anew
+    context.close()
+
+
+def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    finished(page, server)
+    made = page.locator(".review nav section", has_text="Made from the scan")
+    made.get_by_role("button", name="counter_1", exact=True).click()
+    panel = page.locator(".review > aside")
+    expect(panel).to_contain_text("nobody clicked it")
+    panel.get_by_label("Width (cm)").fill("310")
+    panel.get_by_role("button", name="Set size").click()
+    expect(page.get_by_text("Preview: counter_1; certified by the next run")).to_be_visible()
+    picture(page, "made")
+    panel.get_by_role("button", name="Leave it out").click()
+    expect(made.get_by_role("button", name="Bring back counter_1")).to_be_visible()
+    made.get_by_role("button", name="Bring back counter_1").click()
+    expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
+    context.close()
+
+
+def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_ones_own(
+    browser: Browser, server: Server
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = finished(page, server)
+    page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
+    page.get_by_text("Correct it").click()
+    page.get_by_label("Hinge of cabinet_1").select_option("right")
+    expect(page.locator(".toast", has_text="cabinet_1: hinge right")).to_be_visible()
+    nav = page.locator(".review nav")
+    page.keyboard.press("/")
+    nav.get_by_role("button", name="double_1", exact=True).click(modifiers=["ControlOrMeta"])
+    chosen = nav.get_by_role("group", name="Selected objects")
+    expect(chosen).to_contain_text("2 objects selected")
+    picture(page, "copy")
+    chosen.get_by_role("button", name="Copy hinge of cabinet_1").click()
+    expect(page.locator(".toast", has_text="Copied hinge to double_1")).to_be_visible()
+    chosen.get_by_role("button", name="None").click()
+    expect(chosen).to_be_hidden()
+    page.get_by_label("Order").select_option("risk")
+    first = nav.locator("ul li").first
+    expect(first.locator(".risk")).not_to_be_empty()
+    name, second = (nav.locator("ul li .name").nth(k).inner_text() for k in (0, 1))
+    first.get_by_role("button", name=name).first.click()
+    page.keyboard.press("n")
+    expect(nav.locator("button[aria-pressed=true]")).to_contain_text(second)
+    picture(page, "risk")
+    page.get_by_label("Order").select_option("")
+    nav.get_by_role("button", name="cabinet_1", exact=True).click()
+    page.get_by_label("How cabinet_1 opens").select_option("drawer")
+    expect(page.locator(".toast", has_text="cabinet_1: built as drawer")).to_be_visible()
+    page.get_by_label("Category of cabinet_1").fill("spice_rack")
+    page.get_by_label("Category of cabinet_1").press("Enter")
+    expect(page.locator(".toast", has_text="cabinet_1 is a spice_rack from the next run on")).to_be_visible()
+    name = project.split("/p/")[1]
+    objects = {one["name"]: one for one in ask(page, "GET", f"/api/projects/{name}/objects")}
+    assert objects["cabinet_1"]["category"] == "spice_rack"
+    override = ask(page, "GET", f"/api/projects/{name}/objects/{objects['cabinet_1']['id']}/override")
+    assert override["built_as"] == "drawer"
+    copied = ask(page, "GET", f"/api/projects/{name}/objects/{objects['double_1']['id']}/override")
+    assert (copied["hinge"], copied["built_as"], copied["dimensions_m"]) == ("right", None, None)
+    context.close()
+
+
+def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_the_view(
+    browser: Browser, server: Server
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    finished(page, server)
+    page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
+    page.keyboard.press("z")
+    section = page.get_by_role("group", name="Section")
+    expect(section.locator("output").nth(1)).to_have_text(re.compile(r"0\.\d\d m to 0\.\d\d m from the front, of 0\.\d\d m"))
+    section.get_by_role("button", name="Around the object").click()
+    narrow = section.locator("output").nth(0).inner_text()
+    left = section.get_by_label("Width from the left")
+    left.press("ArrowRight")
+    expect(section.locator("output").nth(0)).not_to_have_text(narrow)
+    page.get_by_label("What is drawn of the scene").select_option("unobserved")
+    expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
+    picture(page, "section")
+
+    share = left.input_value()
+    page.keyboard.press("c")
+    say(page, "Comment", "this side was never filmed")
+    note = page.get_by_role("button", name="this side was never filmed", exact=True)
+    expect(page.locator("r2c2r-comments")).to_contain_text("with a view")
+    section.get_by_role("button", name="Show all").click()
+    page.get_by_label("What is drawn of the scene").select_option("meshes")
+    page.keyboard.press("5")
+    note.click()
+    expect(page.get_by_role("button", name="Scene", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_label("What is drawn of the scene")).to_have_value("unobserved")
+    expect(left).to_have_value(share)
+
+    page.get_by_label("Look from").select_option("run")
+    page.keyboard.press("z")
+    expect(section).to_be_hidden()
+    context.close()
+
+
+def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = finished(page, server)
+    (server.data / "projects" / project.split("/p/")[1] / "behave.json").unlink()
+    size = next(item.dimensions_m[0] for item in kitchen().objects if item.name == "cabinet_1")
+    page.goto(project)
+    card = page.locator("r2c2r-true-lengths")
+    expect(card).to_contain_text("Measure one or two edges in the room with a tape")
+    card.get_by_label("Object").select_option(label="cabinet_1")
+    typed = card.get_by_label("True length, in mm")
+    typed.fill("wide")
+    typed.press("Enter")
+    assert typed.evaluate("field => field.validationMessage").startswith("A length such as 596")
+    typed.fill(f"{1010 * size:.1f} mm")
+    typed.press("Enter")
+    expect(card.locator("tbody tr")).to_contain_text("−1.0 %")
+    expect(card).to_contain_text("The scan is too small by 1.0 %")
+    card.get_by_role("button", name="Remove width of cabinet_1").click()
+    card.get_by_role("button", name="Put it back").click()
+    expect(card.locator("tbody tr")).to_have_count(1)
+    picture(page, "lengths")
+
+    with page.expect_download() as table:
+        page.get_by_role("link", name="Clicks and minutes of each person and object").click()
+    assert table.value.path().read_text().splitlines()[0].startswith("project,person,object,category,clicks")
+
+    card.get_by_role("button", name="Rescale the recording").click()
+    warning = page.get_by_role("dialog", name="Rescale the recording")
+    expect(warning).to_contain_text("Every length of the recording changes by +1.0 %")
+    expect(warning).to_contain_text("Only one true length says so")
+    picture(page, "rescale")
+    warning.get_by_role("button", name=re.compile(r"Multiply every length by 1\.010\d")).click()
+    expect(card).to_contain_text("Every length is multiplied by 1.010")
+    expect(card.get_by_role("button", name="Read lengths as recorded")).to_be_visible()
+    context.close()

@@ -1,0 +1,25 @@
+"""What each seat does, on the page People."""
+
+from playwright.sync_api import Browser, expect
+
+from tests.browser.test_journey import picture
+from tests.browser.together import Server, signed_in
+
+
+def test_a_seat_that_helps_another_names_its_objects(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    job = {"id": 7, "project_id": "p", "project_name": "Kitchen A", "kind": "run", "stage": "generate", "progress": 0.4}
+    seat = {"version": "1", "jobs_at_a_time": 1, "began": 1.0, "silent_s": 0.0, "draining": False, "here": False}
+    seats = [
+        {**seat, "id": 1, "host": "gpu-1", "process": 11, "jobs": [{**job, "objects": []}]},
+        {**seat, "id": 2, "host": "gpu-2", "process": 12, "jobs": [{**job, "objects": ["drawer_1", "mug_1"]}]},
+    ]
+    page.route("**/api/seats", lambda route: route.fulfill(json={"waiting": 0, "shared": True, "seats": seats}))
+    page.goto(f"{server.address}/people")
+    rows = page.locator("r2c2r-seat-list tbody tr")
+    expect(rows.nth(0)).to_contain_text("Kitchen A generate, 40 %")
+    expect(rows.nth(1)).to_contain_text("Kitchen A generate, helps: drawer_1, mug_1")
+    rows.nth(1).scroll_into_view_if_needed()
+    picture(page, "seats")
+    context.close()

@@ -1,0 +1,74 @@
+"""A phone, a page zoomed to 200 %, and a keyboard alone reach the picture; messages leave the lanes free."""
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.serving import box_of
+from tests.browser.test_journey import picture
+from tests.browser.test_many import post
+from tests.browser.test_together import rows, sample
+from tests.browser.together import Server, signed_in
+
+ZOOMED = {"width": 640, "height": 360}  # 1280 × 720 at 200 %
+PHONE = {"width": 390, "height": 844}
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(browser: Browser, server: Server, theme: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    for name, size in (("zoomed", ZOOMED), ("phone", PHONE)):
+        page.set_viewport_size(size)  # type: ignore[arg-type]
+        page.goto(f"{project}/annotate?frame=3")
+        expect(rows(page)).to_have_count(2)
+        frame = box_of(page.locator("r2c2r-frame-canvas"))
+        assert frame["height"] >= 240
+        assert frame["width"] == size["width"]
+        assert page.evaluate("document.documentElement.scrollWidth") == size["width"]
+        header = box_of(page.locator(".topbar"))
+        assert header["height"] <= 90  # two lines
+        for button in page.locator(".topbar button").all():
+            expect(button).to_be_in_viewport(ratio=1)
+        rows(page).first.locator(".pick").click()  # the list is below, and can be reached
+        expect(page.get_by_label("Name of drawer_1")).to_be_visible()
+        page.locator("main").evaluate("main => main.scrollTo(0, 0)")
+        picture(page, f"{name}-{theme}")
+    context.close()
+
+
+def test_one_key_skips_to_the_picture(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    page.goto(f"{project}/annotate?frame=3")
+    expect(rows(page)).to_have_count(2)
+    page.keyboard.press("Tab")
+    skip = page.get_by_role("button", name="Skip to the picture")
+    expect(skip).to_be_focused()
+    expect(skip).to_be_in_viewport(ratio=1)
+    page.keyboard.press("Enter")
+    expect(page.locator("r2c2r-frame-canvas canvas")).to_be_focused()
+    page.goto(project)
+    expect(page.get_by_role("heading", name="The recording")).to_be_visible()
+    expect(skip).to_have_count(0)  # there is no picture here
+    context.close()
+
+
+def test_messages_leave_the_lanes_free(browser: Browser, server: Server) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    for _ in range(9):
+        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "mug"})
+    page.clock.install()
+    page.goto(f"{project}/annotate?frame=3")
+    expect(rows(page)).to_have_count(11)
+    page.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)  # on a busy machine the first message is gone before the last
+    for name in ("mug_1", "mug_2", "mug_3", "mug_4"):
+        page.get_by_role("button", name=name, exact=True).click()
+        page.get_by_role("button", name=f"Delete {name}", exact=True).click()
+    expect(page.locator(".toast")).to_have_count(4)
+    lowest = box_of(page.locator(".toast").last)
+    assert lowest["y"] + lowest["height"] <= box_of(page.locator("r2c2r-film-strip"))["y"]
+    context.close()
