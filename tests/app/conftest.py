@@ -3,7 +3,6 @@
 import asyncio
 import sys
 import threading
-import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +23,7 @@ from app.settings import Settings
 from app.viewer.client import Viewer
 from tests.app import postgres
 from tests.app.postgres import PostgresServer
+from tests.waiting import until
 
 FAKES = Path(__file__).parent / "fakes"
 ORIGIN = "http://127.0.0.1:8000"
@@ -88,11 +88,8 @@ class Running:
         return self.get(f"/api/jobs/{job}")
 
     @staticmethod
-    def until(condition: Callable[[], bool], seconds: float = 90.0) -> None:
-        deadline = time.monotonic() + seconds
-        while not condition():
-            assert time.monotonic() < deadline, "waited too long"
-            time.sleep(0.03)
+    def until(condition: Callable[[], object]) -> None:
+        until(condition)
 
     @staticmethod
     def _checked(answer: Any, status: int | None) -> Any:

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -16,6 +15,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+
+from tests.waiting import until
 
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 BUCKET = "scans"
@@ -76,12 +77,6 @@ class ObjectServer:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
 
-    def stop(self) -> None:
-        self.process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            self.process.wait(timeout=5)
-        self.kill()
-
     def _wait(self) -> None:
         import obstore
 
@@ -94,14 +89,22 @@ class ObjectServer:
             client_options={"allow_http": True},
             retry_config={"max_retries": 0},
         )
-        deadline = time.monotonic() + 90
-        while True:
-            assert self.process.poll() is None, (self.folder / "log").read_text()[-3000:]
+
+        def answers() -> bool:
+            assert self.process.poll() is None, self._log()
             with suppress(urllib.error.URLError, OSError, obstore.exceptions.BaseError):
                 obstore.put(store, "ready", b"1")  # a bucket is made with its first object
-                return
-            assert time.monotonic() < deadline, (self.folder / "log").read_text()[-3000:]
-            time.sleep(0.1)
+                return True
+            return False
+
+        try:
+            until(answers)
+        except AssertionError as error:
+            raise AssertionError(self._log()) from error
+
+    def _log(self) -> str:
+        """The end of what the server wrote."""
+        return (self.folder / "log").read_text()[-3000:]
 
 
 @contextmanager
@@ -116,7 +119,7 @@ def object_server() -> Iterator[ObjectServer]:
     try:
         yield found
     finally:
-        found.stop()
+        found.kill()  # nobody reads what it holds any more
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -3,16 +3,17 @@
 import hashlib
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
 from app.db.engine import open_engine
+from tests.waiting import PATIENCE_S, until
 
 TEMPLATE = "template_r2c2r"
 FAST = ("fsync=off", "synchronous_commit=off", "full_page_writes=off", "shared_buffers=32MB", "max_connections=200")
@@ -89,9 +90,9 @@ def server(given: Sequence[str] = FAST) -> Iterator[PostgresServer]:
         open_engine(found.address(TEMPLATE)).dispose()
         yield found
     finally:
-        process.terminate()
+        process.send_signal(signal.SIGINT)  # it ends its connections rather than waiting for them
         try:
-            process.wait(timeout=10)
+            process.wait(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
@@ -101,12 +102,11 @@ def server(given: Sequence[str] = FAST) -> Iterator[PostgresServer]:
 def _wait(found: PostgresServer, process: "subprocess.Popen[bytes]") -> None:
     import psycopg
 
-    deadline = time.monotonic() + 60
-    while True:
-        try:
+    def answers() -> bool:
+        assert process.poll() is None, (found.folder / "log").read_text()
+        with suppress(psycopg.OperationalError):
             found.run("SELECT 1")
-            return
-        except psycopg.OperationalError:
-            assert process.poll() is None, (found.folder / "log").read_text()
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+            return True
+        return False
+
+    until(answers, "Postgres does not answer")

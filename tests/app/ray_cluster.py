@@ -15,6 +15,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tests.waiting import PATIENCE_S
+
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}  # else a busy machine lets its workers wait
 TOKEN = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "not-a-secret-of-the-tests-0123456789abcdef"}
 
@@ -58,7 +60,7 @@ class RayNode:
         assert self.process.stdout is not None
         self.process.stdout.close()
         with suppress(subprocess.TimeoutExpired):
-            self.process.wait(timeout=20)
+            self.process.wait(timeout=PATIENCE_S)
         for process in left:
             with suppress(psutil.Error):
                 process.kill()

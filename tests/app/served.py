@@ -2,13 +2,14 @@
 
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
+
+from tests.waiting import until
 
 
 @contextmanager
@@ -20,9 +21,8 @@ def served(app: FastAPI, **options: Any) -> Iterator[int]:
         thread = threading.Thread(target=server.run, args=([listening],))
         thread.start()
         try:
-            while not server.started:
-                assert thread.is_alive()
-                time.sleep(0.01)  # uvicorn tells of its start by this flag alone
+            until(lambda: server.started or not thread.is_alive())  # uvicorn tells of its start by this flag alone
+            assert server.started
             yield listening.getsockname()[1]
         finally:
             server.should_exit = True

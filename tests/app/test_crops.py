@@ -5,12 +5,13 @@ from typing import Any
 import pytest
 
 from tests.app.conftest import Running
+from tests.app.test_live import listening, until
 from tests.app.test_reviews import Reviewed, reviewed
 
 __all__ = ["reviewed"]
 
 CROP: dict[str, Any] = {"corner_m": [0.1, 0.2, 0.3], "edges_m": [[0.4, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.6]]}
-MUG = {"category": "mug", "points": [{"frame": 3, "x": 152, "y": 40}]}  # tests/app/fakes/live.py takes its time there
+MUG = {"category": "mug", "points": [{"frame": 3, "x": 152, "y": 40}]}
 
 
 def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> None:
@@ -25,9 +26,10 @@ def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> N
         return str(item["segment"])
 
     web.until(lambda: state() == "done")
-    cropped = web.patch(here, {"crop": CROP})
-    assert cropped["crop"] == CROP
-    assert cropped["segment"] in ("waiting", "running")
+    with listening(web, project) as socket:
+        assert web.patch(here, {"crop": CROP})["crop"] == CROP
+        until(socket, type="segment", object=made["id"], restart=True)
+        until(socket, type="segment", object=made["id"], state="done")
     assert web.patch(here, {"name": "renamed"})["crop"] == CROP  # absent is not none
     assert web.patch(here, {"crop": None})["crop"] is None
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["crop"] == CROP

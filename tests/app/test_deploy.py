@@ -9,7 +9,6 @@ import socket
 import ssl
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -30,6 +29,7 @@ from tests.app.conftest import FAKE_COMMANDS
 from tests.app.people import PASSWORD
 from tests.app.served import served
 from tests.app.test_imports import archive
+from tests.waiting import PATIENCE_S, until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 NAME = "kitchens.example"
@@ -146,8 +146,8 @@ def proxy(program: str, given: list[str], port: int, folder: Path) -> Iterator[N
     with (folder / "said").open("wb") as said:
         process = subprocess.Popen([program, *given], stdout=said, stderr=said)
     try:
-        while not listens(port):
-            assert process.poll() is None, (folder / "said").read_text()
+        until(lambda: process.poll() is not None or listens(port), f"{program} does not listen")
+        assert process.poll() is None, (folder / "said").read_text()
         yield
     finally:
         process.kill()
@@ -156,15 +156,14 @@ def proxy(program: str, given: list[str], port: int, folder: Path) -> Iterator[N
 
 def listens(port: int) -> bool:
     try:
-        socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).close()
     except OSError:
-        time.sleep(0.02)
         return False
     return True
 
 
 def test_pages_sockets_and_recordings_come_through(proxied: Proxied, monkeypatch: pytest.MonkeyPatch) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         entered = client.get(f"/?token={proxied.settings.launch_token}")
         assert "Secure" in entered.headers["set-cookie"]
         assert "strict-transport-security" in entered.headers
@@ -174,7 +173,7 @@ def test_pages_sockets_and_recordings_come_through(proxied: Proxied, monkeypatch
     with connect(
         address, ssl=proxied.trusted, origin=proxied.origin, additional_headers={"Cookie": cookie}, proxy=None
     ) as live:
-        assert '"hello"' in live.recv(timeout=60)
+        assert '"hello"' in live.recv(timeout=PATIENCE_S)
     monkeypatch.setenv("SSL_CERT_FILE", str(proxied.certificate))
     monkeypatch.setenv("no_proxy", "localhost")
     token = tokens.add(proxied.app.state.context.engine, None, "a script", "annotator")[0]  # type: ignore[attr-defined]
@@ -185,7 +184,7 @@ def test_pages_sockets_and_recordings_come_through(proxied: Proxied, monkeypatch
 
 
 def test_what_a_browser_says_of_its_address_is_not_believed(proxied: Proxied) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         headers = {"X-Requested-With": "tests", "X-Forwarded-For": "203.0.113.9", "X-Forwarded-Proto": "http"}
         assert client.get("/?token=wrong", headers=headers).status_code == 401
         client.get(f"/?token={proxied.settings.launch_token}", headers=headers)
@@ -194,7 +193,7 @@ def test_what_a_browser_says_of_its_address_is_not_believed(proxied: Proxied) ->
 
 
 def test_what_a_browser_says_of_who_it_is_does_not_come_through(proxied: Proxied) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         for headers in ({"X-Forwarded-User": "ann"}, {"x-forwarded-user": "ann"}):
             assert client.get("/api/system", headers=headers).status_code == 401
     assert accounts.everyone(proxied.app.state.context.engine) == []  # type: ignore[attr-defined]
@@ -204,7 +203,7 @@ def test_what_a_browser_says_of_who_it_is_does_not_come_through(proxied: Proxied
 def test_whom_the_proxy_lets_in_is_in_under_that_name_alone(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (
         behind_proxy(name, tmp_path, monkeypatch, signs_in=True) as proxied,
-        httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=60) as client,
+        httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client,
     ):
         said = {"X-Forwarded-User": "root"}
         assert client.get("/api/system", headers=said).status_code == 401
@@ -222,7 +221,7 @@ def test_of_several_servers_one_keeps_a_3d_view_an_upload_or_a_project_and_any_a
         trusted = ssl.create_default_context(cafile=str(tmp_path / "certificate.pem"))
         with (
             proxy(program, given, port, tmp_path),
-            httpx.Client(base_url=f"https://localhost:{port}", verify=trusted, trust_env=False) as client,
+            httpx.Client(base_url=f"https://localhost:{port}", verify=trusted, trust_env=False, timeout=PATIENCE_S) as client,
         ):
             kept = ("/viewer/token/", "/api/projects/p/viewer/show", "/api/uploads", "/api/uploads/u")
             assert len({client.get(path).text for path in kept for _ in range(5)}) == 1
@@ -249,9 +248,11 @@ def named_server(name: str) -> Iterator[int]:
     with ThreadingHTTPServer(("127.0.0.1", 0), Named) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.05,))
         thread.start()
-        yield server.server_port
-        server.shutdown()
-        thread.join()
+        try:
+            yield server.server_port
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 def test_the_containers_run_commands_that_exist() -> None:

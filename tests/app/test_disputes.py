@@ -30,8 +30,8 @@ from tests.app.conftest import FAKE_COMMANDS, Running, fake
 from tests.app.nouns import finish
 from tests.app.test_live import listening
 from tests.app.test_live import until as hear
-from tests.app.test_live_segment import until
 from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, kitchen, prompt
+from tests.waiting import PATIENCE_S, until
 
 Lines = list[dict[str, Any]]
 DOOR_M, PAIR_M = 0.5, 1.003  # of one door, and of both with the seam between them
@@ -78,7 +78,7 @@ def desk(session: GeometricSession, capture: Capture, said: Lines) -> Iterator[S
     at_work.start()
     yield SimpleNamespace(put=commands.put)
     commands.put(None)
-    at_work.join(30)
+    at_work.join(PATIENCE_S)
 
 
 def told(number: int, door: ObjectPrompt, others: Any = None) -> dict[str, Any]:
@@ -157,13 +157,13 @@ def test_masks_on_their_way_end_when_they_are_asked_for_anew(
         for count, glimpse in enumerate(streamed(asked)):
             if asked.name == doors[0].name and count == 1:
                 held.set()
-                assert going.wait(30)
+                assert going.wait(PATIENCE_S)
             yield glimpse
 
     monkeypatch.setattr(GeometricSession, "stream", lambda self, asked: stream(asked))
     first, second = (told(number, door) for number, door in enumerate(doors, 1))
     desk.put(segment(first, [first]))
-    assert held.wait(30)
+    assert held.wait(PATIENCE_S)
     desk.put(segment(second, [first, second]))
     until(lambda: any(line["object"] == 2 for line in said))
     going.set()

@@ -1,7 +1,6 @@
 """One person asks for more heavy work than the machine can do: nobody else waits for it, and the server still ends."""
 
 import os
-import socket
 import subprocess
 import sys
 import threading
@@ -24,6 +23,7 @@ from app.gates import Gate
 from app.services import accounts
 from tests.app.conftest import Running
 from tests.app.test_uploads import archive
+from tests.waiting import LOOK_S, PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 CROWD = 44  # more than the 40 threads that requests share
@@ -40,14 +40,14 @@ from tests.app.conftest import FAKE_COMMANDS, fake
 data = Path(sys.argv[1])
 viewer = Viewer(Settings(data_dir=data), fake("viewer"))
 vars(serve)["create_app"] = partial(create_app, commands=FAKE_COMMANDS, viewer_client=viewer)
-serve.serve(host="127.0.0.1", port=int(sys.argv[2]), data_dir=data)
+serve.serve(host="127.0.0.1", port=0, data_dir=data)
 """
 
 
 def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_the_midst_of_it(tmp_path: Path) -> None:
     with (
+        ThreadPoolExecutor(2 * CROWD) as crowd,  # left last: what it asks ends with the server
         served(tmp_path) as (server, printed),
-        ThreadPoolExecutor(2 * CROWD) as crowd,
         browser(printed) as ann,
         browser(printed) as eve,
     ):
@@ -70,11 +70,11 @@ def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_t
         assert eve.post("/api/login", json={"name": "eve", "password": PASSWORD}).status_code == 204
         theirs = uploaded(eve, "good.r3d", archive(("frame", b"x")))
         assert eve.post(f"/api/uploads/{theirs}/finish").status_code == 202  # behind one of Ann's at most
-        helpers = psutil.Process(server.pid).children(recursive=True)
+        helpers = helpers_of(server)
         assert len(helpers) > 1  # a look and the 3D view at least
         server.terminate()
-        assert server.wait(timeout=60) in (0, -15)
-        assert psutil.wait_procs(helpers, timeout=60)[1] == []
+        assert server.wait(timeout=PATIENCE_S) in (0, -15)
+        assert psutil.wait_procs(helpers, timeout=PATIENCE_S)[1] == []
     engine = open_engine(tmp_path / "r2c2r.db")
     with reading(engine) as session:
         assert set(session.exec(select(Upload.id))) == set(uploads)  # that nobody could look at them is not their fault
@@ -90,7 +90,7 @@ def test_a_gate_does_one_piece_of_each_asker_at_a_time_and_refuses_what_is_beyon
         def work(who: str) -> str:
             at_work.append(who)
             most.append(at_work.count("ann"))
-            going.wait(60)
+            going.wait(PATIENCE_S)
             at_work.remove(who)
             return who
 
@@ -100,12 +100,15 @@ def test_a_gate_does_one_piece_of_each_asker_at_a_time_and_refuses_what_is_beyon
         async with anyio.create_task_group() as group:
             for who in ("ann", "ann", "ann", "bob"):
                 group.start_soon(ask, who)
-            while sorted(at_work) != ["ann", "bob"]:
-                await anyio.sleep(0.01)
-            with pytest.raises(TooMany, match="3 looks are under way") as refused:
-                await gate.run("ann", work, "ann")
-            assert refused.value.retry_s == 7
-            going.set()
+            try:
+                with anyio.fail_after(PATIENCE_S):
+                    while sorted(at_work) != ["ann", "bob"]:
+                        await anyio.sleep(LOOK_S)
+                with pytest.raises(TooMany, match="3 looks are under way") as refused:
+                    await gate.run("ann", work, "ann")
+                assert refused.value.retry_s == 7
+            finally:
+                going.set()
         assert (sorted(done), max(most)) == (["ann", "ann", "ann", "bob"], 1)
         assert gate._askers == {}
         assert await gate.run("ann", work, "ann") == "ann"
@@ -130,7 +133,8 @@ class Answers:
 
 def browser(address: str) -> httpx.Client:
     limits = httpx.Limits(max_connections=2 * CROWD + 1)
-    return httpx.Client(base_url=address.split("/?")[0], headers={"X-Requested-With": "tests"}, timeout=90, limits=limits)
+    said = {"X-Requested-With": "tests"}
+    return httpx.Client(base_url=address.split("/?")[0], headers=said, timeout=PATIENCE_S, limits=limits)
 
 
 def uploaded(client: httpx.Client, name: str, content: bytes) -> str:
@@ -145,15 +149,25 @@ def served(data: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     engine = open_engine(data / "r2c2r.db")
     accounts.add(engine, "eve", "annotator", PASSWORD)
     engine.dispose()
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    words = [sys.executable, "-c", SERVER, str(data), str(port)]
+    words = [sys.executable, "-c", SERVER, str(data)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     server = subprocess.Popen(words, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
         assert server.stdout is not None
         yield server, server.stdout.readline().split(" ", 1)[1].strip()
     finally:
+        helpers = helpers_of(server)
         server.kill()
         server.wait()
+        for each in helpers:
+            with suppress(psutil.NoSuchProcess):
+                each.kill()
         server.stdout.close()  # type: ignore[union-attr]
+
+
+def helpers_of(server: subprocess.Popen[str]) -> list[psutil.Process]:
+    """The processes that it has started and that run; none of one that has ended."""
+    try:
+        return psutil.Process(server.pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        return []

@@ -41,7 +41,7 @@ def test_a_phones_film_becomes_a_project(zipped: bool, start: Callable[..., Any]
             project = web.post("/api/projects/upload?filename=scan.zip", status=202, content=content)
         else:
             project = web.post("/api/projects/import", {"path": str(scan)}, 202)
-        web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] != "importing", 60)
+        web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] != "importing")
         found = web.get(f"/api/projects/{project['id']}")
         assert found["status"] == "ready", found["error"]
         assert found["capture"]["format"] == "Stray Scanner"

@@ -5,10 +5,12 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from sqlmodel import select
 
@@ -18,6 +20,7 @@ from app.errors import Unavailable
 from app.process import started_at
 from app.settings import Settings
 from tests.app.conftest import Running
+from tests.waiting import PATIENCE_S
 
 STAGES = ["segment", "generate", "align", "synthesize", "warp", "export"]
 
@@ -269,20 +272,20 @@ def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(st
     with start() as web:
         project = web.sample()
         settings: Settings = web.settings
-    orphan = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
-    engine = open_engine(settings.rows)
-    with writing(engine) as session:
-        lost = Job(project_id=project, kind="run", state="running", created=time.time(), attempts=1, stage="align")
-        lost.worker_pid, lost.worker_started = orphan.pid, started_at(orphan.pid)
-        lost.owner = f"{socket.gethostname()}:1:gone"
-        session.add(lost)
-        session.flush()
-        number = lost.id or 0
-    engine.dispose()
-    with start() as web:
-        web.job(number, "done")
-        assert "taken up again" in str(web.get(f"/api/jobs/{number}/events"))
-        assert orphan.wait(timeout=60) == -signal.SIGKILL
+    with ended([sys.executable, "-c", "import signal; signal.pause()"], start_new_session=True) as orphan:
+        engine = open_engine(settings.rows)
+        with writing(engine) as session:
+            lost = Job(project_id=project, kind="run", state="running", created=time.time(), attempts=1, stage="align")
+            lost.worker_pid, lost.worker_started = orphan.pid, started_at(orphan.pid)
+            lost.owner = f"{socket.gethostname()}:1:gone"
+            session.add(lost)
+            session.flush()
+            number = lost.id or 0
+        engine.dispose()
+        with start() as web:
+            web.job(number, "done")
+            assert "taken up again" in str(web.get(f"/api/jobs/{number}/events"))
+            assert orphan.wait(timeout=PATIENCE_S) == -signal.SIGKILL
 
 
 def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Callable[..., Any]) -> None:
@@ -335,23 +338,37 @@ def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start:
     engine = open_engine(settings.rows)
     with writing(engine) as session:
         session.add(Job(project_id=project, kind="run", state="queued", created=time.time()))
-    server = subprocess.Popen([sys.executable, "-c", SERVER, str(settings.data_dir)], cwd=Path(__file__).parents[2])
-    Running.until(lambda: (folder / "hanging").exists())
-    server.kill()
-    server.wait()
+    with ended([sys.executable, "-c", SERVER, str(settings.data_dir)], cwd=Path(__file__).parents[2]):
+        Running.until(lambda: (folder / "hanging").exists())
     with writing(engine) as session:
         (job,) = session.exec(select(Job).where(Job.kind == "run"))
-        assert job.state == "running"
-        worker = job.worker_pid or 0
+        was, worker = job.state, job.worker_pid
+        assert worker is not None
         job.heartbeat = 0.0  # long ago: where servers share the database, that is what tells
         session.add(job)
     engine.dispose()
     (folder / "behave.json").unlink()
-    with start() as web:
-        web.job(job.id or 0, "done")
-        assert "taken up again" in str(web.get(f"/api/jobs/{job.id}/events"))
-        assert len(web.get(f"/api/projects/{project}/objects")) == 2
-    Running.until(lambda: not _alive(worker))
+    try:
+        assert was == "running"
+        with start() as web:
+            web.job(job.id or 0, "done")
+            assert "taken up again" in str(web.get(f"/api/jobs/{job.id}/events"))
+            assert len(web.get(f"/api/projects/{project}/objects")) == 2
+        Running.until(lambda: not _alive(worker))
+    finally:
+        with suppress(psutil.Error):
+            psutil.Process(worker).kill()
+
+
+@contextmanager
+def ended(command: list[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that is killed with the block, unless it ended before."""
+    process = subprocess.Popen(command, **options)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
 def _alive(pid: int) -> bool:

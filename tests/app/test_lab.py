@@ -17,6 +17,7 @@ from tests.app.people import PASSWORD
 from tests.app.postgres import PostgresServer, programs
 from tests.app.test_deploy import caddy, free_port
 from tests.app.test_oidc import Identities, provider  # noqa: F401  # a fixture
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.own_database
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,7 +101,7 @@ def test_every_line_of_the_page_does_what_it_says(
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=900,
+            timeout=PATIENCE_S * 5,
             check=False,
         )
         assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-6000:]}"

@@ -14,6 +14,7 @@ from app.services import prompts
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
+HELD = {**CLICK, "x": 156.5}  # gets one frame and no further: tests/app/fakes/live.py
 
 
 @contextmanager
@@ -84,8 +85,7 @@ def test_the_end_of_masks_is_told_last_however_the_threads_meet(web: Running, mo
 
 def test_a_newer_click_supersedes_the_masks_of_the_older(web: Running) -> None:
     project = web.sample()
-    slow = {**CLICK, "x": 155.5}
-    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [slow]}, 201)
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
     address = f"/api/projects/{project}/objects/{made['id']}/points/{made['points'][0]['id']}"
     web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
     web.patch(address, {"x": 30.5})
@@ -125,8 +125,7 @@ def test_a_click_that_finds_nothing_says_so_on_the_object(web: Running) -> None:
 
 def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
     project = web.sample()
-    points = [{**CLICK, "x": 155.5}]
-    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": points}, 201)
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
     web.until(lambda: _object(web, project, made["id"])["mask_frames"] > 0)
     stopped = web.post(f"/api/projects/{project}/objects/{made['id']}/segment/cancel")
     assert stopped["segment"] == "partial"
@@ -136,8 +135,7 @@ def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
 def test_masks_that_were_still_to_come_go_on_after_an_orderly_restart(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
-        held = {"category": "drawer", "points": [{**CLICK, "x": 156.5}]}  # gets one frame and no further
-        made = web.post(f"/api/projects/{project}/objects", held, 201)
+        made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
         web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
     with start() as web:
         web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
@@ -147,17 +145,17 @@ def test_the_time_of_preparing_proposing_and_drawing_masks_is_computing(start: C
     with start() as web:
         project = web.sample()
         before = web.get(f"/api/projects/{project}/figures")["computing_s"]
-        slow = next(web.settings.data_dir.rglob("work")) / "prepare_slowly"
-        slow.touch()
+        preparing = next(web.settings.data_dir.rglob("work")) / "prepare_slowly"
+        preparing.touch()
         web.post(f"/api/projects/{project}/live/open")
         began = time.monotonic()
         web.until(lambda: time.monotonic() - began > 1.0)
-        slow.unlink()
+        preparing.unlink()
         web.until(lambda: web.get(f"/api/projects/{project}/proposals")["state"] == "done")
         web.until(lambda: web.get(f"/api/projects/{project}/figures")["computing_s"] >= before + 1.0)
         ready = web.get(f"/api/projects/{project}/figures")["computing_s"]
-        held = {"category": "drawer", "points": [{**CLICK, "x": 155.5}]}  # slow
-        made = web.post(f"/api/projects/{project}/objects", held, 201)
+        slow = {"category": "drawer", "points": [{**CLICK, "x": 155.5}]}
+        made = web.post(f"/api/projects/{project}/objects", slow, 201)
         web.until(lambda: _object(web, project, made["id"])["segment"] == "done")
         web.until(lambda: web.get(f"/api/projects/{project}/figures")["computing_s"] >= ready + 0.3)
     with start() as web:
@@ -166,13 +164,15 @@ def test_the_time_of_preparing_proposing_and_drawing_masks_is_computing(start: C
 
 def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.jobs.live.IDLE_LOOK_S", 0.05)
-    with start(live_idle_s=0.6) as web:
+    with start() as web:
         project = web.sample()
         web.post(f"/api/projects/{project}/live/open")
-        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
+        web.until(lambda: web.get(f"/api/projects/{project}/proposals")["state"] == "done")
+        assert web.get(f"/api/projects/{project}/live")["state"] == "ready"
+        web.context.live._sessions[project].used -= web.settings.live_idle_s  # as if so long had passed
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "off")
         web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
-        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] in ("ready", "off"))
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
 
 
 def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:

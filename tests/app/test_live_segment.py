@@ -15,6 +15,7 @@ from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.model.inputs import ObjectPrompt
+from tests.waiting import PATIENCE_S, until
 
 CAMERA = Intrinsics(fx=50.0, fy=50.0, cx=20.0, cy=15.0, width=40, height=30)
 CAPTURE: Any = SimpleNamespace(frames=tuple(SimpleNamespace(index=index, rgb_camera=CAMERA) for index in range(4)))
@@ -38,7 +39,7 @@ class Session:
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
         self.begun.set()
-        assert self.gate.wait(10)
+        assert self.gate.wait(PATIENCE_S)
         for frame in range(4):
             yield frame, mask(int(prompt.points[-1].x)), 0.5
 
@@ -73,7 +74,7 @@ def desk(said: list[dict[str, Any]]) -> Iterator[SimpleNamespace]:
     def end() -> None:
         session.gate.set()
         commands.put(None)
-        at_work.join(10)
+        at_work.join(PATIENCE_S)
 
     yield SimpleNamespace(session=session, put=commands.put, start=at_work.start, end=end)
     end()
@@ -83,15 +84,6 @@ def click(number: int, x: float, category: str = "drawer") -> dict[str, Any]:
     point = {"frame": 0, "x": x, "y": 5.0, "label": 1}
     prompt = {"name": f"o{number}", "category": category, "points": [point]}
     return {"cmd": "segment", "object": number, "key": f"{number}-{x:g}", "prompt": prompt}
-
-
-def until(condition: Any) -> None:
-    waited = threading.Event()
-    for _ in range(1000):
-        if condition():
-            return
-        waited.wait(0.01)
-    raise AssertionError("did not happen")
 
 
 def test_a_first_look_comes_first_and_again_only_when_the_mask_differs(desk: Any, said: list[dict[str, Any]]) -> None:
@@ -109,7 +101,7 @@ def test_a_first_look_comes_first_and_again_only_when_the_mask_differs(desk: Any
 def test_a_click_is_answered_while_another_objects_frames_are_at_work(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
-    assert desk.session.begun.wait(10)
+    assert desk.session.begun.wait(PATIENCE_S)
     desk.put(click(2, 10.0))
     until(lambda: len(said) == 2)
     assert (said[1]["object"], said[1]["frame"]) == (2, 0)
@@ -118,7 +110,7 @@ def test_a_click_is_answered_while_another_objects_frames_are_at_work(desk: Any,
 def test_a_newer_click_ends_the_older_masks_at_once(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
-    assert desk.session.begun.wait(10)
+    assert desk.session.begun.wait(PATIENCE_S)
     desk.put(click(1, 10.0))
     until(lambda: len(said) == 2)
     desk.session.gate.set()
@@ -176,7 +168,7 @@ def test_a_first_look_that_cannot_be_shown_fails_its_object_alone(desk: Any, sai
 def test_a_cancelled_object_says_so_and_nothing_after(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
-    assert desk.session.begun.wait(10)
+    assert desk.session.begun.wait(PATIENCE_S)
     desk.put({"cmd": "cancel", "object": 1})
     until(lambda: said[-1].get("end") == "cancelled")
     desk.end()

@@ -2,8 +2,6 @@
 
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from app.process import Line, python_module
 from app.settings import Settings
 from app.store.opening import open_store
 from tests.app.object_server import REQUIRED
+from tests.waiting import PATIENCE_S, until
 
 pytestmark = pytest.mark.own_database
 SAYS = """
@@ -104,8 +103,7 @@ def test_a_step_whose_job_was_lost_meanwhile_keeps_nothing(order: Order, tmp_pat
 def test_a_step_is_asked_to_stop(order: Order) -> None:
     seat = NodeSeat(replace(order, command=(sys.executable, "-c", WAITS)))
     assert seat.start() is None
-    while not seat.hear().lines:
-        pass
+    until(lambda: seat.hear().lines)
     seat.ask_to_stop()
     assert heard_to_the_end(seat).status == -15
 
@@ -130,7 +128,7 @@ def test_a_process_group_ends_with_who_began_it() -> None:
     group = psutil.Process(tethered.pid).children(recursive=True)
     assert len(group) == 2
     tethered.stdin.close()
-    tethered.wait(timeout=60)
+    tethered.wait(timeout=PATIENCE_S)
     until(lambda: not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in group))
     tethered.stdout.close()
 
@@ -147,10 +145,3 @@ def test_it_ends_as_its_program_does_and_hands_on_what_it_is_told(code: str, sta
         tethered.stdin.flush()
         assert tethered.stdout.read() == b"said\n"
         assert tethered.wait() == status
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)

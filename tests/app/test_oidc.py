@@ -19,6 +19,7 @@ from app.services.oidc import roles_of_groups
 from r2c2r_core.errors import InputError
 from tests.app.conftest import COOKIE, FAKES, ORIGIN, Running
 from tests.app.people import PASSWORD, browser
+from tests.waiting import PATIENCE_S
 
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 if not REQUIRED:
@@ -35,7 +36,7 @@ class Identities:
 
     def __init__(self, port: int) -> None:
         self.issuer = f"http://127.0.0.1:{port}"
-        self.client = httpx.Client(base_url=self.issuer, trust_env=False, timeout=60)
+        self.client = httpx.Client(base_url=self.issuer, trust_env=False, timeout=PATIENCE_S)
 
     def knows(self, subject: str, **claims: Any) -> None:
         assert self.client.put(f"/users/{subject}", json=claims).status_code == 204

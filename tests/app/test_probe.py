@@ -14,6 +14,7 @@ from app.jobs.plans import Commands
 from app.process import Worker
 from tests.core.ingest.tiny import TinyRoom
 from tests.core.ingest.tiny_formats import write_stray
+from tests.waiting import PATIENCE_S
 
 PROBE = Commands().probe
 
@@ -62,7 +63,7 @@ def test_whatever_decodes_uploads_is_started_alone() -> None:
 def test_what_a_killed_worker_leaves_in_its_temporary_folder_goes(tmp_path: Path) -> None:
     leaves = "import json, tempfile, time; print(json.dumps({'at': tempfile.mkdtemp()}), flush=True); time.sleep(600)"
     worker = Worker((sys.executable, "-c", leaves), tmp_path / "log")
-    line = worker.next_line(timeout=60)
+    line = worker.next_line(timeout=PATIENCE_S)
     assert line is not None
     assert Path(line["at"]).is_dir()
     worker.close()

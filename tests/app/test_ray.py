@@ -17,6 +17,7 @@ from tests.app.object_server import REQUIRED
 from tests.app.ray_cluster import RayNode, ray_node
 from tests.app.test_jobs import behave, run
 from tests.app.test_sharing import FREE, NAMES, SHARED, held, stored
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.own_database
 
@@ -52,7 +53,7 @@ def test_a_step_whose_node_dies_ends_with_it_is_begun_anew_and_is_cancelled(node
         (cache / "hanging").unlink()
         (actor,) = node.actors()
         actor.kill()
-        _, alive = psutil.wait_procs(lost, timeout=60)
+        _, alive = psutil.wait_procs(lost, timeout=PATIENCE_S)
         assert alive == []
         web.until((cache / "hanging").exists)
         web.post(f"/api/jobs/{job}/cancel")

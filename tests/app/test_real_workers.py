@@ -13,7 +13,7 @@ def test_a_sample_is_made_read_and_segmented_by_the_real_processes(start: Callab
     with start(commands=Commands()) as web:
         wish = {"seed": 1, "frames": 10, "width": 320, "height": 240}
         project = web.post("/api/projects/sample", wish, 202)["id"]
-        web.until(lambda: web.get(f"/api/projects/{project}")["status"] != "importing", 120)
+        web.until(lambda: web.get(f"/api/projects/{project}")["status"] != "importing")
         found = web.get(f"/api/projects/{project}")
         assert found["status"] == "ready", found["error"]
         assert (found["capture"]["frame_count"], found["capture"]["width"], found["capture"]["up_source"]) == (10, 320, "file")
@@ -23,7 +23,7 @@ def test_a_sample_is_made_read_and_segmented_by_the_real_processes(start: Callab
         objects = web.get(f"/api/projects/{project}/objects")
         base = next(item for item in objects if item["category"] in ("cabinet", "drawer"))
         web.post(f"/api/projects/{project}/objects/{base['id']}/segment", status=202)
-        web.until(lambda: _segment(web, project, base["id"]) not in ("waiting", "running"), 120)
+        web.until(lambda: _segment(web, project, base["id"]) not in ("waiting", "running"))
         assert _segment(web, project, base["id"]) == "done"
         (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == base["id"]]
         assert base["points"][0]["frame"] in lane["frames"]

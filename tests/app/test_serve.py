@@ -19,6 +19,7 @@ from app.settings import Settings
 from r2c2r_core.cli import main
 from r2c2r_core.errors import EnvironmentProblem, InputError
 from tests.app.conftest import Running
+from tests.waiting import PATIENCE_S
 
 
 def test_a_taken_port_is_one_line_with_the_next_step(tmp_path: Path) -> None:
@@ -85,7 +86,7 @@ def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> N
             serve(host="127.0.0.1", port=0, data_dir=tmp_path)
     finally:
         server.terminate()
-        assert server.wait(timeout=60) in (0, -15)
+        assert server.wait(timeout=PATIENCE_S) in (0, -15)
         server.stdout.close()  # type: ignore[union-attr]
 
 
@@ -126,7 +127,7 @@ def test_who_asks_is_what_the_proxy_says_only_where_the_server_was_told_to_belie
             wrong = json.dumps({"name": "ann", "password": "x"}).encode()
             request = urllib.request.Request(f"{address.rstrip('/')}/api/login", wrong, headers)
             with pytest.raises(urllib.error.HTTPError, match="401"):
-                urllib.request.urlopen(request, timeout=60)
+                urllib.request.urlopen(request, timeout=PATIENCE_S)
         (refused,) = [entry for entry in audit.entries(engine, None, 50).entries if entry.action == "refused"]
         assert refused.client == seen
         engine.dispose()
@@ -150,7 +151,7 @@ def served(data: Path, **options: Any) -> Iterator[str]:
         yield server.stdout.readline().split(" ", 1)[1].strip()
     finally:
         server.terminate()
-        server.wait(timeout=60)
+        server.wait(timeout=PATIENCE_S)
         server.stdout.close()
 
 
@@ -158,7 +159,7 @@ def _status(address: str) -> int:
     """As a browser that was never there."""
     browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     try:
-        with browser.open(address, timeout=60) as answer:
+        with browser.open(address, timeout=PATIENCE_S) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
@@ -166,7 +167,7 @@ def _status(address: str) -> int:
 
 def _answers(address: str) -> bool:
     try:
-        with urllib.request.urlopen(f"{address.split('/?')[0].rstrip('/')}/api/health", timeout=60) as answer:
+        with urllib.request.urlopen(f"{address.split('/?')[0].rstrip('/')}/api/health", timeout=PATIENCE_S) as answer:
             return bool(json.load(answer)["state"] == "ok")
     except OSError:
         return False

@@ -15,6 +15,7 @@ from app.services.attempts import MOST_WAIT_S, Attempts
 from app.services.passwords import weakness
 from tests.app.conftest import COOKIE, Running
 from tests.app.people import PASSWORD, browser, signed_in, with_accounts
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,7 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
     verified, going = accounts.verified, threading.Event()
 
     def late(*arguments: Any) -> Any:
-        going.wait(120)
+        going.wait(PATIENCE_S)
         return verified(*arguments)
 
     async def at_once(_: float) -> None:
@@ -114,7 +115,8 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
         try:
             Running.until(lambda: sum(each.done() for each in asked) == 20)  # 30 of an address are taken on
             assert {each.result() for each in asked if each.done()} == {429}
-            assert crowd.submit(shared.client.get, "/login").result(60).status_code == 200  # one that takes a shared thread
+            page = crowd.submit(shared.client.get, "/login")  # which takes a shared thread
+            assert page.result(PATIENCE_S).status_code == 200
         finally:
             going.set()
     assert sorted({each.result() for each in asked}) == [401, 429]

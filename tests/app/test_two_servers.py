@@ -1,7 +1,6 @@
 """Two servers on one Postgres and one store: what happens at one is seen at the other."""
 
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,11 +14,13 @@ from app.db import channel as channels
 from app.db.channel import Channel, join_hubs
 from app.db.engine import opened
 from app.hub import Hub
+from tests import waiting
 from tests.app.conftest import Running, running
 from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import run
 from tests.app.test_live import CLICK, listening, until
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.own_database
 
@@ -36,7 +37,7 @@ def address(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[str]:
 @pytest.fixture
 def two(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Running, Running]]:
     monkeypatch.setattr(hubs, "PRESENCE_S", 0.0)
-    options = {"postgres": address, "store": f"file://{tmp_path / 'store'}", "beat_s": 0.5}
+    options = {"postgres": address, "store": f"file://{tmp_path / 'store'}", "beat_s": 5.0}
     with (
         running(tmp_path / "a", user="ann", **options) as a,
         running(tmp_path / "b", user="bob", run_jobs=False, **options) as b,
@@ -61,8 +62,7 @@ def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Ru
             == both
         )
         at_a.send_json({"type": "watch", "project": project, "page": "review", "object": None})
-        while not any(person["page"] == "review" and person["who"] == "ann" for person in presence(at_b, at_least=2)):
-            pass
+        waiting.until(lambda: ("ann", "review") in [(one["who"], one["page"]) for one in presence(at_b, at_least=2)])
         made = b.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
         seen, _ = until(at_a, type="segment", object=made["id"], state="done")
         assert [message["frame"] for message in seen if message["type"] == "mask"] == [3, 0, 7]
@@ -77,8 +77,7 @@ def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Ru
         assert len({one["stage"] for one in told}) > 3
         until(at_b, type="projects")
         at_a.close()
-        while {person["who"] for person in presence(at_b)} != {"bob"}:
-            pass
+        waiting.until(lambda: {person["who"] for person in presence(at_b)} == {"bob"})
 
 
 def test_what_is_put_into_the_trash_at_one_is_gone_at_the_other(two: tuple[Running, Running]) -> None:
@@ -101,9 +100,9 @@ def test_all_messages_arrive_in_their_order_also_over_broken_connections(
         for number in range(300):
             a.say("number", {"number": number})
             if number % 100 == 50:
-                wait(lambda number=number: len(told) > number - 50)
+                waiting.until(lambda number=number: len(told) > number - 50)
                 postgres_server.run("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'r2c2r'")
-        wait(lambda: bool(told) and told[-1] == 299)
+        waiting.until(lambda: bool(told) and told[-1] == 299)
     assert list(dict.fromkeys(told)) == list(range(300))  # one whose commit was not heard of is sent again
     assert gaps == []
 
@@ -112,30 +111,37 @@ def test_who_was_away_while_messages_were_deleted_has_its_tabs_fetch_everything(
     gaps = threading.Event()
     with channel(engine, "a") as one:
         one.on_gap.append(gaps.set)
-        wait(lambda: one._newest is not None and one._newest[0] > 0)
+        waiting.until(lambda: one._newest is not None and one._newest[0] > 0)
         with engine.connect().execution_options(write=True) as connection:
             connection.exec_driver_sql("DELETE FROM messages")
             connection.exec_driver_sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
             connection.commit()
-        assert gaps.wait(60)
+        assert gaps.wait(PATIENCE_S)
 
 
 def test_who_vanishes_is_forgotten_and_what_it_may_not_have_told_is_fetched(engine: Engine) -> None:
     gone: list[tuple[str, bool]] = []
     hub = Hub()
-    with channel(engine, "a", beat_s=0.2) as a:
+    with channel(engine, "a") as a:
         a.on_gone.append(lambda sender, vanished: gone.append((sender, vanished)))
         join_hubs(a, hub)
         epoch = hub.epoch
         with channel(engine, "in order"):
-            wait(lambda: "in order" in a._heard)
-        wait(lambda: gone == [("in order", False)])
+            waiting.until(lambda: "in order" in a._heard)
+        waiting.until(lambda: gone == [("in order", False)])
         assert hub.epoch == epoch
+    hub = Hub()
+    with channel(engine, "b", beat_s=0.2) as b:
+        b.on_gone.append(lambda sender, vanished: gone.append((sender, vanished)))
+        join_hubs(b, hub)
+        epoch = hub.epoch
         lost = Channel(engine, "lost", 3600.0)
         lost.start()
-        wait(lambda: hub.epoch != epoch)
-        assert gone == [("in order", False), ("lost", True)]
-        lost.stop()
+        try:
+            waiting.until(lambda: hub.epoch != epoch)
+            assert gone == [("in order", False), ("lost", True)]
+        finally:
+            lost.stop()
 
 
 def test_what_waits_for_a_database_that_does_not_answer_is_bounded(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,8 +154,10 @@ def test_what_waits_for_a_database_that_does_not_answer_is_bounded(engine: Engin
         for _ in range(3):
             a.say("x", {"bits": "1" * 4_000})
         a.start()
-        wait(lambda: bool(kinds))
-        a.stop()
+        try:
+            waiting.until(lambda: kinds)
+        finally:
+            a.stop()
     assert kinds == ["gap"]
 
 
@@ -159,10 +167,10 @@ def test_a_newer_version_of_a_row_is_not_followed_by_an_older_of_another_server(
         join_hubs(a, first)
         join_hubs(b, second)
         first.publish_state("object", "p", 1, 2, name="newer")
-        wait(lambda: second.seq == 1)
+        waiting.until(lambda: second.seq == 1)
         second.publish_state("object", "p", 1, 1, name="older")
         second.publish("review", "p")
-        wait(lambda: first.seq == 2)
+        waiting.until(lambda: first.seq == 2)
     assert (first.seq, second.seq) == (2, 2)
 
 
@@ -170,8 +178,8 @@ def test_a_newer_version_of_a_row_is_not_followed_by_an_older_of_another_server(
 def channel(engine: Engine, name: str, beat_s: float = 3600.0) -> Iterator[Channel]:
     one = Channel(engine, name, beat_s)
     one.start()
-    assert one._listening.wait(60)
     try:
+        assert one._listening.wait(PATIENCE_S)
         yield one
     finally:
         one.stop()
@@ -183,10 +191,3 @@ def presence(socket: Any, *, at_least: int = 0) -> list[dict[str, Any]]:
         message = socket.receive_json()
         if message["type"] == "presence" and len(message["people"]) >= at_least:
             return list(message["people"])
-
-
-def wait(condition: Any) -> None:
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline, "waited too long"
-        time.sleep(0.01)

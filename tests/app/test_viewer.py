@@ -17,6 +17,7 @@ from app.viewer.client import Viewer
 from tests.app.conftest import ORIGIN, SOCKETS, Running, fake, running
 from tests.app.nouns import finish
 from tests.app.test_jobs import run
+from tests.waiting import PATIENCE_S
 
 PROTOCOL = "viser-v1.1.1"
 STANDING = np.eye(4).tolist()
@@ -221,7 +222,7 @@ def test_the_raw_port_takes_only_those_who_know_the_key() -> None:
 
 
 def _status(port: int, headers: dict[str, str]) -> int:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
     try:
         connection.request("GET", "/", headers=headers)
         return connection.getresponse().status
