@@ -25,8 +25,13 @@ class Patience:
 
     connect_s: float = 10.0
     answer_s: float = 900.0  # a textured sample takes 20 s to some minutes, and it may wait behind others
+    leave_s: float = 3.0  # to connect, and to be heard, when nobody waits for an answer any more
     tries: int = 4
     first_wait_s: float = 1.0  # doubled after every try
+
+
+class _NoAnswer(TimeoutError):
+    """Who took the connection said nothing for too long."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,14 +77,14 @@ def ask(
     patience = endpoint.patience
     wait = patience.first_wait_s
     for attempt in range(patience.tries):
-        last, asked_at = attempt == patience.tries - 1, time.monotonic()
+        last = attempt == patience.tries - 1
         try:
             status, content, retry_after = _once(endpoint, method, path, body, content_type, progress)
+        except _NoAnswer as error:
+            raise BackendUnavailable(
+                f"generator at {endpoint.where} gave no answer in {patience.answer_s:.0f} s", hint="see its log"
+            ) from error
         except (OSError, http.client.HTTPException) as error:
-            if isinstance(error, TimeoutError) and time.monotonic() - asked_at > patience.connect_s:
-                raise BackendUnavailable(
-                    f"generator at {endpoint.where} gave no answer in {patience.answer_s:.0f} s", hint="see its log"
-                ) from error
             if last or isinstance(error, ssl.SSLError):
                 raise BackendUnavailable(
                     f"generator at {endpoint.where} cannot be reached ({_reason(error)})",
@@ -117,12 +122,13 @@ def _once(
     endpoint: Endpoint, method: str, path: str, body: bytes | None, content_type: str, progress: Progress
 ) -> tuple[int, bytes, float]:
     """Status, body and Retry-After of one request. It runs in a thread of its own, so that a person can stop it."""
-    connection = _connection(endpoint)
+    connection, connected = _connection(endpoint), threading.Event()
     outcome: list[tuple[int, bytes, float] | BaseException] = []
 
     def talk() -> None:
         try:
             connection.connect()
+            connected.set()
             connection.sock.settimeout(endpoint.patience.answer_s)
             headers = {"Content-Type": content_type, "Accept": "*/*", "Connection": "close"}
             if endpoint.token:
@@ -142,11 +148,13 @@ def _once(
         while thread.is_alive():
             progress.check()
             if time.monotonic() > deadline:  # a server that drips a byte at a time never trips the socket's timeout
-                raise TimeoutError("timed out")
+                raise _NoAnswer
             thread.join(_POLL_S)
     finally:
         _hang_up(connection)
         thread.join(2.0)
+    if isinstance(outcome[0], TimeoutError) and connected.is_set():
+        raise _NoAnswer from outcome[0]
     if isinstance(outcome[0], BaseException):
         raise outcome[0]
     return outcome[0]

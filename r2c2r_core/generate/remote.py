@@ -122,7 +122,8 @@ class Remote(MeshGenerator):
                     )
                 self._rest()
         except R2C2RError:
-            once = replace(self._endpoint, patience=Patience(connect_s=3.0, answer_s=3.0, tries=1))
+            leave_s = self._endpoint.patience.leave_s
+            once = replace(self._endpoint, patience=Patience(connect_s=leave_s, answer_s=leave_s, tries=1))
             with contextlib.suppress(R2C2RError):
                 ask(once, "DELETE", job)
             raise

@@ -10,8 +10,9 @@ import trimesh
 from PIL import Image
 
 from r2c2r_core.generate.exchange import Patience
+from tests.waiting import PATIENCE_S
 
-QUICK = Patience(connect_s=2.0, answer_s=20.0, tries=3, first_wait_s=0.05)
+QUICK = Patience(connect_s=PATIENCE_S, answer_s=PATIENCE_S, leave_s=PATIENCE_S, tries=3, first_wait_s=0.05)
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """The remote generator against servers of both protocols, and against servers that misbehave."""
 
 import base64
+import http.client
 import io
 import json
 import threading
@@ -18,6 +19,7 @@ from r2c2r_core.generate.stage import GENERATORS, GenerateConfig
 from r2c2r_core.geometry.meshes import is_watertight, oriented_extents
 from r2c2r_core.progress import Progress
 from tests.core.generate.stub import QUICK, answering, box_glb, said
+from tests.waiting import PATIENCE_S, held, until
 
 
 @pytest.fixture(scope="module")
@@ -117,34 +119,44 @@ def test_an_endless_answer_is_cut_off(evidence, monkeypatch):
 
 
 def test_a_person_can_stop_a_request_that_hangs(evidence):
-    stop, released, answered = threading.Event(), threading.Event(), threading.Event()
+    stop, answered = threading.Event(), threading.Event()
 
     def hang(*request):
         stop.set()
-        released.wait(120)
+        released.wait(PATIENCE_S)
         answered.set()
         return said(200, {})
 
-    with answering(hang) as (address, _):
+    with answering(hang) as (address, _), held() as released:
         with pytest.raises(Cancelled):
             nim(address, progress=Progress(is_cancelled=stop.is_set)).make(evidence, "c0", 0)
         assert not answered.is_set()
-        released.set()
 
 
 def test_a_server_that_hangs_is_asked_once(evidence):
-    released = threading.Event()
-
     def hang(*request):
-        released.wait(10)
+        released.wait(PATIENCE_S)
         return said(200, {})
 
-    impatient = Patience(connect_s=0.2, answer_s=0.5, tries=3, first_wait_s=0.05)
-    with answering(hang) as (address, asked):
+    impatient = Patience(connect_s=PATIENCE_S, answer_s=0.5, tries=3, first_wait_s=0.05)
+    with answering(hang) as (address, asked), held() as released:
         with pytest.raises(BackendUnavailable, match="gave no answer in"):
             Remote(url=f"{address}/v1/infer", patience=impatient).make(evidence, "c0", 0)
-        released.set()
+        until(lambda: asked)  # it may take a request on after nobody waits for it any more
     assert len(asked) == 1
+
+
+def test_a_server_that_takes_no_connection_is_asked_again(evidence, monkeypatch):
+    tries = []
+
+    def connect(self):
+        tries.append(self)
+        raise TimeoutError("timed out")
+
+    monkeypatch.setattr(http.client.HTTPConnection, "connect", connect)
+    with pytest.raises(BackendUnavailable, match=r"cannot be reached \(timed out\)"):
+        nim("http://127.0.0.1:9").make(evidence, "c0", 0)
+    assert len(tries) == QUICK.tries
 
 
 def test_the_token_travels_in_the_header_and_never_in_the_address(evidence, monkeypatch):

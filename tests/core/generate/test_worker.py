@@ -2,7 +2,6 @@
 
 import http.client
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from r2c2r_core.generate.serve_worker import MOST_REQUEST_BYTES, open_server
 from r2c2r_core.generate.wire import Wish, decode_form, decode_wish, encode_form, encode_wish
 from r2c2r_core.progress import Progress
 from tests.core.generate.stub import QUICK, answering, box_glb, said, serving
+from tests.waiting import PATIENCE_S, until
 
 
 @pytest.fixture(scope="module")
@@ -101,19 +101,16 @@ def test_stopping_tells_the_worker(evidence):
 
     def slow(wish, progress):
         began.set()
-        for _ in range(200):
-            try:
-                progress.check()
-            except Cancelled:
-                told.set()
-                raise
-            time.sleep(0.02)
-        raise AssertionError("nobody stopped it")
+        try:
+            until(progress.check, "nobody stopped it")
+        except Cancelled:
+            told.set()
+            raise
 
     with worker(slow) as address:
         with pytest.raises(Cancelled):
             remote(address, progress=Progress(is_cancelled=began.is_set)).make(evidence, "c0", 0)
-        assert told.wait(5)
+        assert told.wait(PATIENCE_S)
 
 
 def test_a_mesh_damaged_on_its_way_is_not_used(evidence):
@@ -142,7 +139,7 @@ def test_a_mesh_damaged_on_its_way_is_not_used(evidence):
 )
 def test_the_worker_answers_what_it_cannot_serve(method, path, headers, status):
     with worker(lambda wish, progress: None) as address:
-        connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=60)
+        connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=PATIENCE_S)
         connection.putrequest(method, path)
         for name, value in headers.items():
             connection.putheader(name, value)
