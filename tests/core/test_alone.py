@@ -10,13 +10,14 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.alone import network_can_be_left
+from tests.waiting import PATIENCE_S
 
 PROGRAM = """
 import os, pathlib, socket, sys
 print(sorted(os.listdir()), os.getcwd())
 pathlib.Path(sys.argv[1]).write_text("ours stays ours")
 try:
-    socket.create_connection(("127.0.0.1", int(sys.argv[2])), timeout=5).close()
+    socket.create_connection(("127.0.0.1", int(sys.argv[2]))).close()
     print("heard")
 except OSError as error:
     print("refused", error)
@@ -46,5 +47,5 @@ def test_it_reaches_no_server_of_this_machine(tmp_path: Path) -> None:
         pytest.skip("this system lets no process leave its network")
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-        socket.create_connection(("127.0.0.1", port), timeout=5).close()  # it can be heard from here
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).close()  # it can be heard from here
         assert alone(tmp_path, tmp_path / "made", port)[1].startswith("refused")

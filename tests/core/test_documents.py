@@ -7,6 +7,7 @@ import pytest
 
 from r2c2r_core.documents import parse_json, read_json
 from r2c2r_core.errors import InputError
+from tests.waiting import PATIENCE_S
 
 HINT = "give a file of settings"
 
@@ -72,7 +73,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
         done.set()
 
     threading.Thread(target=read, daemon=True).start()
-    assert done.wait(60)
+    assert done.wait(PATIENCE_S)
 
 
 @pytest.mark.parametrize(("name", "says"), [(".", "a folder, a file expected"), ("a", "no such file"), ("n" * 300, "too long")])

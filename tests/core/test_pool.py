@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from r2c2r_core.errors import Cancelled, ObjectNotSeen
 from r2c2r_core.pool import Failed, Pool, Task, WorkerLost, usual_workers
 from r2c2r_core.progress import SILENT, Progress
+from tests.waiting import PATIENCE_S, until
 
 
 def double(value: int, progress: Progress) -> int:
@@ -32,11 +32,9 @@ def fall(progress: Progress) -> None:
 
 
 def work_on(progress: Progress) -> None:
-    """Until it is told to stop, for a minute at most."""
+    """Until it is told to stop."""
     progress.at(0.0, str(os.getpid()))
-    for _ in range(600):
-        time.sleep(0.1)
-        progress.check()
+    until(progress.check)
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +90,12 @@ def test_a_worker_ends_when_whoever_holds_it_is_gone() -> None:
     with pytest.raises(Gone):
         list(pool.run({"a": Task(work_on, ())}, Progress(heard)))
     (worker,) = pool._busy.values()
-    worker.channel.close()  # as the kernel does for a process that died
-    assert worker._process.wait(timeout=60) == 0
+    try:
+        worker.channel.close()  # as the kernel does for a process that died
+        assert worker._process.wait(timeout=PATIENCE_S) == 0
+    finally:
+        worker._process.kill()
+        worker._process.wait()
 
 
 def test_as_many_workers_as_cores_and_memory_allow(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from r2c2r_core.export.probes.sapien_probe import without_visuals
 from r2c2r_core.export.simulators import Recipe, recipes
 from tests.core.export.conftest import write_folder
 from tests.core.export.kitchen import kitchen
+from tests.waiting import PATIENCE_S
 
 RECIPES = {recipe.simulator: recipe for recipe in recipes("hand made", "cabinet_1")}
 HERE = {"MuJoCo": "mujoco", "PyBullet": "pybullet"}
@@ -49,7 +50,12 @@ def test_python_lines_are_python(recipe: Recipe) -> None:
 def test_the_lines_run(simulator: str, folder: Path) -> None:
     pytest.importorskip(HERE[simulator], reason=f"{RECIPES[simulator].install}")
     ran = subprocess.run(
-        [sys.executable, "-c", RECIPES[simulator].code], cwd=folder, capture_output=True, text=True, check=False, timeout=600
+        [sys.executable, "-c", RECIPES[simulator].code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE_S * 4,
     )
     assert ran.returncode == 0, ran.stderr
 
@@ -60,7 +66,7 @@ def test_the_lines_run_in_an_environment_of_its_own(simulator: str, folder: Path
     if not python:
         pytest.skip(f"{APART[ELSEWHERE[simulator]].variable} names no environment")
     code = RECIPES[simulator].code
-    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=1800)
+    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=PATIENCE_S * 10)
     assert ran.returncode == 0, ran.stderr
 
 
@@ -74,7 +80,7 @@ def test_sapiens_lines_run_without_a_device_as_their_note_says(folder: Path, tmp
     code = recipe.code.replace("sapien.Scene()", without[0]).replace(
         "scene.urdf", str(without_visuals(folder / "scene.urdf", tmp_path))
     )
-    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=600)
+    ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=PATIENCE_S * 4)
     assert ran.returncode == 0, ran.stderr
 
 

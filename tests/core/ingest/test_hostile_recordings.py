@@ -23,6 +23,7 @@ from r2c2r_core.ingest.readers import decoder, video
 from r2c2r_core.ingest.readers.images import image_size
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
+from tests.waiting import PATIENCE_S
 
 from .tiny import TinyRoom, jpeg, write_r3d, write_seven_scenes, zip_folder
 from .tiny_formats import HEVC, write_nerfstudio, write_stray
@@ -102,7 +103,7 @@ signal.raise_signal(signal.SIGKILL)
     said = subprocess.run([sys.executable, "-c", asking], capture_output=True, text=True, check=False)
     assert said.returncode == -signal.SIGKILL, said.stderr
     with contextlib.suppress(psutil.NoSuchProcess):
-        psutil.Process(int(said.stdout)).wait(timeout=30)
+        psutil.Process(int(said.stdout)).wait(timeout=PATIENCE_S)
 
 
 def test_only_jpeg_and_png_reach_a_decoder() -> None:

@@ -1,7 +1,8 @@
 import dataclasses
-import time
+import fcntl
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from r2c2r_core.segment.stage import open_session
 from r2c2r_core.segment.surface import draw, drawn_size, parts_of
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import FRONT_Y, click_on, prompt
+from tests.waiting import until
 
 
 def test_runs_come_back_from_disk_as_they_were(session: GeometricSession, tmp_path: Path) -> None:
@@ -35,14 +37,21 @@ def test_a_damaged_file_is_computed_anew(tmp_path: Path) -> None:
     assert kept(path, lambda: (5, 6)) == (3, 4)
 
 
-def test_what_two_ask_for_at_once_is_computed_once(tmp_path: Path) -> None:
+def test_what_two_ask_for_at_once_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     computed: list[int] = []
+    locking: list[int] = []
+    lock = fcntl.flock
+
+    def noted(file: Any, how: int) -> None:
+        locking.append(1)
+        lock(file, how)
 
     def compute() -> tuple[int, int]:
         computed.append(1)
-        time.sleep(0.2)
+        until(lambda: len(locking) == 2)  # the other one waits
         return 1, 2
 
+    monkeypatch.setattr(fcntl, "flock", noted)
     with ThreadPoolExecutor(2) as threads:
         assert list(threads.map(lambda _: kept(tmp_path / "value.noun", compute), range(2))) == [(1, 2)] * 2
     assert computed == [1]
