@@ -28,21 +28,26 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from waiting import PATIENCE
+
 SILENT_S, ALONE_S = 40.0, 150.0  # on a busy machine; the slowest honest case takes some 5 s
 MOST_BYTES = 6 << 30
 _LINE = re.compile(r"^(r2c2r(?: \w+)*: |usage: )")
 
 
-def fuzz(seed: int, *, count: int | None = None, minutes: float | None = None) -> dict[str, Any]:
-    """Run cases 0, 1, … until that many are done or the time is up; counts, and every case that ended wrongly."""
+def fuzz(seed: int, *, count: int | None = None, minutes: float | None = None, patience: float = PATIENCE) -> dict[str, Any]:
+    """Run cases 0, 1, … until that many are done or the time is up; counts, and every case that ended wrongly.
+
+    `patience` times the silence after which a case is suspected, and then taken for one that hangs.
+    """
     began, number = time.monotonic(), 0
     faults: list[dict[str, Any]] = []
     by_command, by_kind, codes = Counter[str](), Counter[str](), Counter[str]()
     peak_mb, slowest = 0.0, (0.0, -1)
     while (count is None or number < count) and (minutes is None or time.monotonic() - began < 60 * minutes):
-        for said in _worker(seed, number, SILENT_S):
+        for said in _worker(seed, number, patience * SILENT_S):
             if "end" in said:  # it fell silent, or died
-                alone = list(_worker(seed, number, ALONE_S, only=True))
+                alone = list(_worker(seed, number, patience * ALONE_S, only=True))
                 if "end" in alone[-1] and not any("done" in line for line in alone):
                     faults.append({"case": number, "wrong": alone[-1]["end"], "said": ""})
                 number += 1

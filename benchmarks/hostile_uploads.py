@@ -25,12 +25,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from hostile_kinds import KINDS, Members, packed
 from kept import add_options, report
+from waiting import PATIENCE
 
 from app.jobs.plans import Commands
 from tests.app.conftest import Running, running
 from tests.core.ingest.tiny import TinyRoom, write_r3d
 
 ABUSE = "abused_protocol"
+ENDED_S = 60.0  # what a request started ends with it: long after, it is taken for left behind
 NAMES = ("scan.r3d", "scan.zip", "../../etc/passwd", "a\nb.r3d", "<img src=x onerror=alert(1)>.zip", "\u202egpj.zip", "x" * 300)
 
 
@@ -147,7 +149,7 @@ def left_behind(web: Running, before: set[psutil.Process]) -> str:
     if files or web.get("/api/jobs"):
         return f"left behind: {files[:3]}"
     processes = [child for child in psutil.Process().children(recursive=True) if child not in before and child.is_running()]
-    _, alive = psutil.wait_procs(processes, timeout=5)
+    _, alive = psutil.wait_procs(processes, timeout=ENDED_S * PATIENCE)
     return f"still running: {alive[:3]}" if alive else ""
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import httpx2 as httpx
 from kill_server import SetUp
-from waiting import until
+from waiting import PATIENCE, until
 
 PIECES = 12  # that a recording is uploaded in
 
@@ -44,7 +44,7 @@ class Journey:
 
     def __init__(self, server: SetUp, rng: random.Random, real: Path | None) -> None:
         self.server, self.rng, self.real = server, rng, real
-        self.client = httpx.Client(timeout=60, follow_redirects=True)  # to the store, for a bundle
+        self.client = httpx.Client(timeout=60 * PATIENCE, follow_redirects=True)  # to the store, for a bundle
         self.recording = (real / "scan.r3d").read_bytes() if real else _any_zip()
         self.upload: tuple[str, int] | None = None  # id, acknowledged bytes
         self.project, self.ready, self.stood_in = "", False, False

@@ -33,11 +33,12 @@ from kept import add_options, report
 from kill_journey import Journey, Refused
 from kill_lab import lab
 from kill_server import Server, SetUp
+from waiting import PATIENCE
 
 MOST_ACTS = 16
 FIRST_KILLS = 3  # may hit the import; the others come when there is a project to work on
 MOST_STAGES = 2  # that are waited for before a kill
-PATIENCE_S = 240.0
+PATIENCE_S = 240.0 * PATIENCE
 
 
 def kill_often(server: SetUp, *, kills: int, seed: int, real: Path | None = None) -> dict[str, Any]:

@@ -272,7 +272,7 @@ def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(st
     with start() as web:
         project = web.sample()
         settings: Settings = web.settings
-    with ended([sys.executable, "-c", "import signal; signal.pause()"], start_new_session=True) as orphan:
+    with ended([sys.executable, "-c", "import time; time.sleep(3600)"], start_new_session=True) as orphan:
         engine = open_engine(settings.rows)
         with writing(engine) as session:
             lost = Job(project_id=project, kind="run", state="running", created=time.time(), attempts=1, stage="align")

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from app.jobs.ray_order import Order
 from app.jobs.ray_seat import Heard, NodeSeat
 from app.jobs.seats import version
-from app.process import Line, python_module
+from app.process import python_module
 from app.settings import Settings
 from app.store.opening import open_store
 from tests.app.object_server import REQUIRED
@@ -58,12 +59,10 @@ def order(tmp_path: Path) -> Order:
 
 
 def heard_to_the_end(seat: NodeSeat) -> Heard:
-    lines, log = list[Line](), b""
-    while True:
-        heard = seat.hear()
-        lines, log = lines + heard.lines, log + heard.log
-        if heard.status is not None:
-            return Heard(lines, log, heard.status)
+    heard: list[Heard] = []
+    until(lambda: heard.append(seat.hear()) or heard[-1].status is not None)  # type: ignore[func-returns-value]
+    lines = [line for each in heard for line in each.lines]
+    return Heard(lines, b"".join(each.log for each in heard), heard[-1].status)
 
 
 def test_what_a_node_made_is_in_the_store_when_its_last_word_is_heard(order: Order, tmp_path: Path) -> None:
@@ -116,21 +115,25 @@ def test_another_version_is_refused(order: Order) -> None:
 
 def test_a_process_group_ends_with_who_began_it() -> None:
     script = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); " + WAITS
-    tethered = subprocess.Popen(
+    with subprocess.Popen(
         [*python_module("app.tethered"), sys.executable, "-c", script],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,
-    )
-    assert tethered.stdin is not None
-    assert tethered.stdout is not None
-    tethered.stdout.readline()
-    group = psutil.Process(tethered.pid).children(recursive=True)
-    assert len(group) == 2
-    tethered.stdin.close()
-    tethered.wait(timeout=PATIENCE_S)
-    until(lambda: not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in group))
-    tethered.stdout.close()
+    ) as tethered:
+        assert tethered.stdin is not None
+        assert tethered.stdout is not None
+        tethered.stdout.readline()
+        group = psutil.Process(tethered.pid).children(recursive=True)
+        try:
+            assert len(group) == 2
+            tethered.stdin.close()
+            tethered.wait(timeout=PATIENCE_S)
+            until(lambda: not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in group))
+        finally:
+            for process in (*group, tethered):
+                with suppress(psutil.NoSuchProcess):
+                    process.kill()
 
 
 @pytest.mark.parametrize(("code", "status"), [("raise SystemExit(3)", 3), ("import os; os.kill(os.getpid(), 9)", -9)])

@@ -63,8 +63,10 @@ def test_whatever_decodes_uploads_is_started_alone() -> None:
 def test_what_a_killed_worker_leaves_in_its_temporary_folder_goes(tmp_path: Path) -> None:
     leaves = "import json, tempfile, time; print(json.dumps({'at': tempfile.mkdtemp()}), flush=True); time.sleep(600)"
     worker = Worker((sys.executable, "-c", leaves), tmp_path / "log")
-    line = worker.next_line(timeout=PATIENCE_S)
-    assert line is not None
-    assert Path(line["at"]).is_dir()
-    worker.close()
+    try:
+        line = worker.next_line(timeout=PATIENCE_S)
+        assert line is not None
+        assert Path(line["at"]).is_dir()
+    finally:
+        worker.close()
     assert not Path(line["at"]).parent.exists()

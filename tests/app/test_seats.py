@@ -21,6 +21,7 @@ from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
 from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
+from tests.app.test_sharing import held
 
 pytestmark = pytest.mark.own_database
 
@@ -108,13 +109,14 @@ def test_a_job_at_a_seat_is_cancelled_and_its_log_read_while_it_runs(shared: dic
 
 def test_a_seat_that_is_drained_ends_what_it_does_and_then_itself(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared, heavy_jobs=0) as web, seat(web, tmp_path / "one") as one:
-        project = web.sample()
-        behave(web, project, segment="slow", warp="slow")
+        project, _ = held(web, "drawer_1")
         web.context.store.keep(project)
         job = run(web, project)
-        web.job(job, "running")
+        there = tmp_path / f"one/projects/{project}"
+        web.until((there / "at-drawer_1.part").exists)
         (number,) = [found["id"] for found in shown(web)["seats"] if not found["here"]]
         web.patch(f"/api/seats/{number}", {"draining": True})
+        (there / "hold-drawer_1").unlink()
         web.until(lambda: not one.is_alive())
         assert web.job(job, "done")["state"] == "done"
         waiting = run(web, project)

@@ -19,11 +19,12 @@ from tests.app.conftest import Running, running
 from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import behave, run
+from tests.waiting import FACTOR
 
 SHARED = {"segment": "objects", "generate": "objects"}
 NAMES = ("drawer_1", "mug_1")  # of the sample
 FREE = {"sharing_costs_s": 0.0}  # so that two objects are worth it
-QUICK = {"beat_s": 0.3, "beats_missed_s": 6.0}  # longer than a seat is silent between two of its signs of life
+QUICK = {"beat_s": 0.3, "beats_missed_s": 6.0 * FACTOR}  # longer than a seat is silent between two of its signs of life
 
 
 def held(web: Running, *names: str) -> tuple[str, Path]:
@@ -215,7 +216,8 @@ from pathlib import Path
 from app.settings import Settings
 from app.work import run_jobs
 from tests.app.conftest import FAKE_COMMANDS
-quick = {"sharing_costs_s": 0.0, "beat_s": 0.3, "beats_missed_s": 6.0, "min_free_bytes": 0, "job_memory_bytes": 0}
+from tests.app.test_sharing import FREE, QUICK
+quick = {**FREE, **QUICK, "min_free_bytes": 0, "job_memory_bytes": 0}
 run_jobs(Settings(data_dir=Path(sys.argv[1]), **quick), FAKE_COMMANDS, threading.Event())
 """
 
