@@ -183,7 +183,7 @@ def _open(
     settings: Settings, commands: Commands, viewer_client: Viewer | None, metrics: Metrics, traces: TracerProvider
 ) -> Context:
     """Everything that runs: the database, the queue, the live segmenters, the viewer."""
-    engine, hub, gates, store = open_engine(settings.rows), Hub(), Gates(), open_store(settings)
+    engine, hub, gates, store = open_engine(settings.rows, busy_s=settings.busy_s), Hub(), Gates(), open_store(settings)
     rows = JobRows(engine, hub, settings, store, FINISHERS, job_ended)
     runner = Runner(rows, settings, commands, metrics.stages, traces)
     context = Context(

@@ -11,6 +11,7 @@ from pathlib import Path
 import app
 from r2c2r_core.errors import InputError
 
+BUSY_S = 10.0
 MEBIBYTE = 1024 * 1024
 MAX_UPLOAD_BYTES = 16 * 1024 * MEBIBYTE
 DATABASE = "r2c2r.db"  # in the data folder; by it the folder is known to be one
@@ -88,6 +89,9 @@ class Settings:
     kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0
+    viewer_answer_s: float = 60.0  # until the 3D view's process must have answered
+    viewer_page_s: float = 10.0  # the same for a file of its page, and for its connection
+    busy_s: float = BUSY_S  # until a request is refused that waits for another's writing
     run_jobs: bool = True  # tests of other things leave the queue alone
     preview_width: int = 960
     user: str = field(default_factory=lambda: _user_name())

@@ -17,21 +17,23 @@ from app.db.migrations import migrate, require_tables
 from app.db.sqlite import explained
 from app.db.tables import Bundle, Comment, Event, Project
 from app.db.usable import require_usable
+from app.settings import BUSY_S
 
 _log = logging.getLogger(__name__)
 
 
-def open_engine(database: Path | str, *, anew: bool = False) -> Engine:
+def open_engine(database: Path | str, *, anew: bool = False, busy_s: float = BUSY_S) -> Engine:
     """The engine of a database, a file or the address of a Postgres, migrated to the newest tables.
 
     Raises DatabaseUnusable for a file that is none, is damaged, is of a newer r2c2r or may not be written, and where there
-    is no file beside projects (an empty one would hide them), unless it is to be made `anew`.
+    is no file beside projects (an empty one would hide them), unless it is to be made `anew`. Who uses it waits for another's
+    writing, up to `busy_s`.
     """
     if isinstance(database, str):
-        engine = postgres.postgres_engine(database)
+        engine = postgres.postgres_engine(database, busy_s)
     else:
         require_usable(database, anew=anew)
-        engine = _engine(database, _prepare)
+        engine = _engine(database, _prepare, busy_s)
     with _said_plainly(engine):
         migrate(engine)
         require_tables(engine)
@@ -130,8 +132,8 @@ def _said_plainly(engine: Engine) -> Iterator[None]:
         raise said from error
 
 
-def _engine(database: Path, prepare: Callable[[sqlite3.Connection, Any], None]) -> Engine:
-    engine = create_engine(f"sqlite:///{database}", connect_args={"check_same_thread": False, "timeout": 10})
+def _engine(database: Path, prepare: Callable[[sqlite3.Connection, Any], None], busy_s: float = BUSY_S) -> Engine:
+    engine = create_engine(f"sqlite:///{database}", connect_args={"check_same_thread": False, "timeout": busy_s})
     event.listen(engine, "connect", prepare)
     event.listen(engine, "begin", _begin)
     return engine
@@ -147,7 +149,6 @@ def _prepare(connection: sqlite3.Connection, _record: Any) -> None:
     connection.execute("PRAGMA journal_mode=WAL")
     connection.execute("PRAGMA synchronous=FULL")  # a click that was acknowledged survives a power cut
     connection.execute("PRAGMA foreign_keys=ON")
-    connection.execute("PRAGMA busy_timeout=10000")
     connection.execute("PRAGMA secure_delete=ON")  # what was deleted is overwritten
 
 

@@ -4,6 +4,7 @@ Whoever writes holds one advisory lock until the transaction ends, so that there
 what it read is still true when it writes; whoever reads sees the rows of one moment.
 """
 
+import math
 from typing import Any
 
 from sqlalchemy import URL, Engine, create_engine, event, make_url, text
@@ -15,7 +16,6 @@ from r2c2r_core.errors import EnvironmentProblem, InputError, R2C2RError
 DRIVER = "postgresql+psycopg"
 NOW = text("SELECT extract(epoch FROM clock_timestamp())")
 WRITER = 0x72326332  # the advisory lock of writers; migrations take it too
-_LOCK_WAIT = "-c lock_timeout=10s"  # as long as SQLite waits for its writer
 _READ = "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"
 _WRITE = f"SELECT pg_advisory_xact_lock({WRITER})"
 _WRITE_SOON = f"SET LOCAL synchronous_commit TO off; {_WRITE}"
@@ -31,13 +31,16 @@ _FAULTS = {
 }
 
 
-def postgres_engine(address: str) -> Engine:
-    """The engine of a Postgres; raises InputError for an address of another kind, EnvironmentProblem without the driver."""
-    url = _checked(address)
+def postgres_engine(address: str, busy_s: float) -> Engine:
+    """The engine of a Postgres; raises InputError for an address of another kind, EnvironmentProblem without the driver.
+
+    Its writer, and its answer to who connects, are waited for up to `busy_s`.
+    """
+    url, waits = _checked(address), {"options": f"-c lock_timeout={1000 * busy_s:.0f}ms", "connect_timeout": math.ceil(busy_s)}
     try:
         engine = create_engine(
             url,
-            connect_args={"options": _LOCK_WAIT, "connect_timeout": 10, "application_name": "r2c2r"},
+            connect_args={**waits, "application_name": "r2c2r"},
             pool_pre_ping=True,  # a Postgres that was started anew is found before a request fails on it
             pool_size=10,
             max_overflow=20,

@@ -115,7 +115,7 @@ def place(context: Context, project_id: str, session_id: str, body: schemas.View
 async def page(context: Context, token: str, path: str, session_id: str) -> Response:
     """The 3D view's page, or a file of it."""
     port = await _port(context, token, session_id)
-    return await proxy.fetch_page(port, quote(path), context.viewer.key)
+    return await proxy.fetch_page(port, quote(path), context.viewer.key, context.settings.viewer_page_s)
 
 
 async def socket(context: Context, token: str, connection: WebSocket) -> None:
@@ -124,7 +124,8 @@ async def socket(context: Context, token: str, connection: WebSocket) -> None:
     try:
         with context.viewer.watched(token, person.name):
             port = await _port(replace(context, person=person), token, connection.state.session)
-            await proxy.pump(connection, port, context.viewer.key, lambda: _session_end(context, connection))
+            page_s = context.settings.viewer_page_s
+            await proxy.pump(connection, port, context.viewer.key, page_s, lambda: _session_end(context, connection))
     except (Forbidden, TooMany, Unavailable) as error:
         await connection.close(_CLOSING.get(type(error), 1013), error.message)
 

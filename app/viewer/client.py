@@ -20,7 +20,6 @@ from app.process import Worker, python_module
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
 
-ANSWER_S = 60.0
 TOKEN_S = 12 * 3600.0
 MOST_VIEWS = 24  # each holds what it shows
 MOST_CONNECTIONS = 12  # at a time, of one person: a tab has one, and one more while it connects anew
@@ -55,7 +54,7 @@ class Opened:
 
 
 class Viewer:
-    """All open 3D views. Every method may be called from any thread; those that ask the process wait for it, up to ANSWER_S."""
+    """All open 3D views. Every method may be called from any thread; those that ask the process wait for it."""
 
     def __init__(self, settings: Settings, command: tuple[str, ...] = WORKER, *, enabled: bool = True) -> None:
         self.enabled = enabled
@@ -243,7 +242,7 @@ class Viewer:
         return result
 
     def _answer(self, worker: Worker) -> dict[str, Any]:
-        deadline = time.monotonic() + ANSWER_S
+        deadline = time.monotonic() + self._settings.viewer_answer_s
         while time.monotonic() < deadline:
             try:
                 line = worker.next_line(timeout=deadline - time.monotonic())

@@ -28,10 +28,10 @@ INJECTED = (
 )
 
 
-async def fetch_page(port: int, path: str, key: str) -> Response:
+async def fetch_page(port: int, path: str, key: str, answer_s: float) -> Response:
     """A file of viser's client; its page gets what it needs to live in an iframe."""
     try:
-        status, content_type, content = await anyio.to_thread.run_sync(_fetch, port, path, key)
+        status, content_type, content = await anyio.to_thread.run_sync(_fetch, port, path, key, answer_s)
     except OSError as error:
         raise Unavailable("the 3D view does not answer", hint="open the review page again") from error
     if status != 200:
@@ -42,7 +42,7 @@ async def fetch_page(port: int, path: str, key: str) -> Response:
     return Response(content, headers=headers)
 
 
-async def pump(socket: WebSocket, port: int, key: str, session_end: Callable[[], Awaitable[object]]) -> None:
+async def pump(socket: WebSocket, port: int, key: str, answer_s: float, session_end: Callable[[], Awaitable[object]]) -> None:
     """Carry messages both ways until either side leaves, or who looks may not look any more."""
     wanted = [Subprotocol(name) for name in socket.scope["subprotocols"]]
     try:
@@ -52,6 +52,7 @@ async def pump(socket: WebSocket, port: int, key: str, session_end: Callable[[],
             max_size=None,
             compression=None,
             proxy=None,
+            open_timeout=answer_s,
             additional_headers={KEY_HEADER: key},
         )
     except (OSError, websockets.WebSocketException):
@@ -83,8 +84,8 @@ async def _down(socket: WebSocket, upstream: websockets.ClientConnection) -> Non
             await (socket.send_bytes(content) if isinstance(content, bytes) else socket.send_text(content))
 
 
-def _fetch(port: int, path: str, key: str) -> tuple[int, str, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+def _fetch(port: int, path: str, key: str, answer_s: float) -> tuple[int, str, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=answer_s)
     try:
         connection.request("GET", f"/{path}", headers={KEY_HEADER: key})
         answer = connection.getresponse()

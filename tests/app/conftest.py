@@ -23,7 +23,7 @@ from app.settings import Settings
 from app.viewer.client import Viewer
 from tests.app import postgres
 from tests.app.postgres import PostgresServer
-from tests.waiting import until
+from tests.waiting import PATIENCE_S, until
 
 FAKES = Path(__file__).parent / "fakes"
 ORIGIN = "http://127.0.0.1:8000"
@@ -44,6 +44,9 @@ FAKE_COMMANDS = Commands(
     vary=fake("vary", BARE),
     live=fake("live"),
 )
+
+
+PATIENT = {"viewer_answer_s": PATIENCE_S, "viewer_page_s": PATIENCE_S, "busy_s": PATIENCE_S}  # settings of a slow machine
 
 
 @dataclass
@@ -111,6 +114,7 @@ def running(
         "beat_s": 3600.0,  # no signs of life among the statements that a test counts
         "user": "tester",
         "import_roots": (data_dir.parent,),
+        **PATIENT,
     }
     rows = {"postgres": _POSTGRES[-1].of_folder(data_dir)} if _POSTGRES else {}
     settings = Settings(data_dir=data_dir, **{**given, **rows, **options})

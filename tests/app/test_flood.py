@@ -36,9 +36,9 @@ from app import serve
 from app.main import create_app
 from app.settings import Settings
 from app.viewer.client import Viewer
-from tests.app.conftest import FAKE_COMMANDS, fake
+from tests.app.conftest import FAKE_COMMANDS, PATIENT, fake
 data = Path(sys.argv[1])
-viewer = Viewer(Settings(data_dir=data), fake("viewer"))
+viewer = Viewer(Settings(data_dir=data, **PATIENT), fake("viewer"))
 vars(serve)["create_app"] = partial(create_app, commands=FAKE_COMMANDS, viewer_client=viewer)
 serve.serve(host="127.0.0.1", port=0, data_dir=data)
 """

@@ -30,7 +30,7 @@ from app.routes.once import COVERED
 from app.services import accounts, prompts, sending
 from app.settings import Settings
 from app.viewer.client import Viewer
-from tests.app.conftest import Running, commits, fake
+from tests.app.conftest import PATIENT, Running, commits, fake
 from tests.app.nouns import finish
 from tests.app.test_honeypots import write_truth
 from tests.app.test_imports import R3D
@@ -178,7 +178,7 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
 
 
 def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Callable[..., Any], tmp_path: Path) -> None:
-    viewer = Viewer(Settings(data_dir=tmp_path / "data"), fake("viewer"))
+    viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), fake("viewer"))
     with start(viewer=viewer) as web:
         tried = set()
         for operation, method, path, sent in changes(web, tmp_path):

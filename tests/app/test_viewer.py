@@ -14,7 +14,7 @@ from app.errors import Unavailable
 from app.settings import Settings
 from app.viewer import contract
 from app.viewer.client import Viewer
-from tests.app.conftest import ORIGIN, SOCKETS, Running, fake, running
+from tests.app.conftest import ORIGIN, PATIENT, SOCKETS, Running, fake, running
 from tests.app.nouns import finish
 from tests.app.test_jobs import run
 from tests.waiting import PATIENCE_S
@@ -27,7 +27,7 @@ MOVED = [[0.0, -1.0, 0.0, 0.3], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.5], [0.0
 @pytest.fixture
 def seen(tmp_path: Path) -> Iterator[Running]:
     """An app whose viewer is a fake upstream that echoes."""
-    viewer = Viewer(Settings(data_dir=tmp_path / "data"), fake("viewer"))
+    viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), fake("viewer"))
     with running(tmp_path / "data", viewer=viewer) as web:
         yield web
 
@@ -106,7 +106,7 @@ def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
 
 
 def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any], tmp_path: Path) -> None:
-    broken = Viewer(Settings(data_dir=tmp_path / "data"), (sys.executable, "-c", "raise SystemExit(3)"))
+    broken = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), (sys.executable, "-c", "raise SystemExit(3)"))
     with start(viewer=broken) as web:
         project = web.sample()
         web.job(run(web, project), "done")
@@ -118,7 +118,7 @@ def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any
 
 
 def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> None:
-    viewer = Viewer(Settings(data_dir=tmp_path / "data", viewer_idle_s=0.0), fake("viewer"))
+    viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT, viewer_idle_s=0.0), fake("viewer"))
     with running(tmp_path / "data", viewer=viewer) as web:
         project = web.sample()
         url = web.post(f"/api/projects/{project}/viewer")["url"]
