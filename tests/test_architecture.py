@@ -167,6 +167,34 @@ def test_no_large_file_is_tracked() -> None:
     assert [name for name, size in sizes.items() if size > most.get(Path(name).suffix, 1_000_000)] == []
 
 
+HURRIED = re.compile(r"time\.sleep\(|wait_for_timeout\(|\btimeout=[\d.]*[1-9]|\.(wait|join|result)\(\d")
+"""A wait of a chosen length, or a limit of one's own: no number is right on every machine. A timeout of 0 is no wait."""
+MAY_HURRY = {
+    "waiting.py": "the one wait that is of a length",
+    "app/fakes/live.py": "takes its time as slow work does",
+    "app/fakes/vary.py": "takes its time as slow work does",
+    "app/fakes/worker.py": "takes its time as slow work does",
+    "app/test_jobs.py": "a program that hangs",
+    "app/test_live.py": "gives a thread the time to do what it must not",
+    "app/test_node_seat.py": "programs that hang",
+    "app/test_probe.py": "a program that hangs",
+    "core/test_cli.py": "a program that hangs",
+}
+
+
+def test_no_test_is_in_a_hurry() -> None:
+    """All limits are those of tests/waiting.py; what a test needs is waited for by what it shows."""
+    tests = ROOT / "tests"
+    hurried = [
+        (path.relative_to(tests).as_posix(), number, line.strip())
+        for path in sorted(tests.rglob("*.py"))
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if HURRIED.search(line)
+    ]
+    assert [found for found in hurried if found[0] not in MAY_HURRY] == []
+    assert MAY_HURRY.keys() - {path for path, *_ in hurried} == set()  # a reason goes with what it was for
+
+
 @pytest.mark.parametrize("command", ["serve", "demo", "sample", "info", "run", "check", "evaluate", "dataset", "doctor"])
 def test_every_command_is_in_the_readme(command: str) -> None:
     assert f"r2c2r {command}" in (ROOT / "README.md").read_text()

@@ -31,7 +31,7 @@ from tests.app.nouns import finish
 from tests.app.test_live import listening
 from tests.app.test_live import until as hear
 from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, kitchen, prompt
-from tests.waiting import PATIENCE_S, until
+from tests.waiting import PATIENCE_S, held, until
 
 Lines = list[dict[str, Any]]
 DOOR_M, PAIR_M = 0.5, 1.003  # of one door, and of both with the seam between them
@@ -150,23 +150,22 @@ def test_masks_on_their_way_end_when_they_are_asked_for_anew(
     desk: Any, said: Lines, doors: list[ObjectPrompt], session: GeometricSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else what is left of them would be taken for the new ones."""
-    going, held = threading.Event(), threading.Event()
-    streamed = session.stream
+    streaming, streamed = threading.Event(), session.stream
 
     def stream(asked: ObjectPrompt) -> Iterator[Any]:
         for count, glimpse in enumerate(streamed(asked)):
             if asked.name == doors[0].name and count == 1:
-                held.set()
+                streaming.set()
                 assert going.wait(PATIENCE_S)
             yield glimpse
 
     monkeypatch.setattr(GeometricSession, "stream", lambda self, asked: stream(asked))
     first, second = (told(number, door) for number, door in enumerate(doors, 1))
-    desk.put(segment(first, [first]))
-    assert held.wait(PATIENCE_S)
-    desk.put(segment(second, [first, second]))
-    until(lambda: any(line["object"] == 2 for line in said))
-    going.set()
+    with held() as going:
+        desk.put(segment(first, [first]))
+        assert streaming.wait(PATIENCE_S)
+        desk.put(segment(second, [first, second]))
+        until(lambda: any(line["object"] == 2 for line in said))
     ended(said, 2)
     desk.put({"cmd": "cancel", "object": 1})  # says so, if there is anything left to cancel
     desk.put(segment(told(3, doors[1]), None))

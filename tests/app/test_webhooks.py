@@ -21,6 +21,7 @@ from app.services import posting as sender
 from r2c2r_core.errors import InputError
 from tests.app.conftest import Running
 from tests.app.people import signed_in, with_accounts
+from tests.waiting import LOOK_S, held
 
 HERE = "127.0.0.0/8"
 
@@ -189,13 +190,12 @@ def test_a_redirect_is_not_followed(listener: tuple[str, type[Listening]]) -> No
 
 def test_who_answers_a_byte_at_a_time_has_no_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(posting, "TOTAL_S", 0.3)
-    ended = threading.Event()
 
     def drip(listening: socket.socket) -> None:
         connection, _ = listening.accept()
         with connection:
             try:
-                while not ended.wait(0.01):
+                while not ended.wait(LOOK_S):
                     connection.sendall(b"H")
             except OSError:  # the other end hung up, as it should
                 return
@@ -203,9 +203,8 @@ def test_who_answers_a_byte_at_a_time_has_no_more_time(monkeypatch: pytest.Monke
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=drip, args=(listening,))
         thread.start()
-        with pytest.raises((OSError, posting.http.client.HTTPException)):
+        with held() as ended, pytest.raises((OSError, posting.http.client.HTTPException)):
             posting.post(f"http://127.0.0.1:{listening.getsockname()[1]}/", b"{}", {}, posting.networks(HERE))
-        ended.set()
         thread.join()
 
 
