@@ -76,13 +76,13 @@ export function slider(text, input) {
 }
 
 /**
- * New children in the place of the old ones. Who was at one of them by keyboard stays where they were: at the one with the same
- * `data-at`, "what:which", else at the next of the same "what"; and what was selected of a text still is.
+ * New children in the place of the old ones. Who was at one of them by keyboard, or at a field at all, stays where they were: at the
+ * one with the same `data-at`, "what:which", else at the next of the same "what"; and what was selected of a text still is.
  * @param {HTMLElement} parent
  * @param {...(Node | string)} children
  */
 export function renew(parent, ...children) {
-  const at = parent.querySelector("[data-at]:focus-visible");
+  const at = parent.querySelector("[data-at]:is(:focus-visible, input:focus)");
   const old = at instanceof HTMLElement ? (at.dataset.at ?? "") : "";
   const alike = `[data-at^="${CSS.escape(old.split(":")[0] ?? "")}:"]`;
   const place = at ? [...parent.querySelectorAll(alike)].indexOf(at) : -1;

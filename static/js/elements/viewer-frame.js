@@ -36,7 +36,7 @@ export class ViewerFrame extends LiveElement {
    */
   async open(project, what) {
     this.#project = project;
-    this.#wanted = what;
+    this.#want(what);
     if (!this.#url) this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
     try {
       const session = await openViewer(project);
@@ -51,11 +51,16 @@ export class ViewerFrame extends LiveElement {
 
   /** The last wish wins; where to look or stand is asked once and must not be lost to it. @param {Partial<ViewerShow>} what */
   show(what) {
-    this.#wanted = what;
+    this.#want(what);
     if (!this.#url) return;
     this.#queue = this.#queue.then(() =>
       this.#wanted === what || what.look || what.camera ? this.#ask(what, true) : undefined,
     );
+  }
+
+  /** What was asked once while the view opens is asked when it is there. @param {Partial<ViewerShow>} what */
+  #want(what) {
+    this.#wanted = this.#url || what.mode !== this.#wanted.mode ? what : { ...this.#wanted, ...what };
   }
 
   /**

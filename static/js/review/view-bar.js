@@ -55,7 +55,7 @@ export class ViewBar extends EventTarget {
   clip = new ClipPanel();
   #section = toggle("Section", () => this.clip.toggle());
   /** What colours mean, and the box that is shown. */
-  below = h("div", { class: "below" });
+  below = h("div", { class: "below" }, this.clip.element);
   #parallel = toggle("Parallel", () => this.toggleParallel());
   #preview = h("span", { class: "chip warn", role: "status", hidden: true });
   #scan = h("input", { type: "checkbox" });
@@ -209,7 +209,8 @@ export class ViewBar extends EventTarget {
     this.#section.hidden = !this.#inside;
     this.clip.element.hidden = !this.#inside || !this.clip.on;
     const legend = mode === "scene" ? heatLegend(this.wish.draw) : null;
-    this.below.replaceChildren(...(legend ? [legend] : []), this.clip.element);
+    this.below.querySelector(".heat-legend")?.remove(); // the box stays where it is: somebody may be at a side of it
+    if (legend) this.below.prepend(legend);
     this.below.hidden = this.clip.element.hidden && !legend;
     const inWorld = this.isSolid && mode !== "candidate";
     this.#measure.hidden = !inWorld;
