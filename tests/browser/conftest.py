@@ -3,13 +3,16 @@
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
-from tests.browser.serving import PATIENCE_MS, printed_again, served
+from tests.browser.serving import REMEMBER, NewContext, printed_again, served
 from tests.browser.together import Server
+from tests.waiting import PATIENCE_MS
 
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 
@@ -45,10 +48,11 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[str]:
+@pytest.fixture
+def address(tmp_path: Path, sample: Path) -> Iterator[str]:
     """The app on a free port, with an empty database; the sample lies where it may be imported from by path."""
-    data = tmp_path_factory.mktemp("data")
+    data = tmp_path / "served"
+    data.mkdir()
     shutil.copy(sample / "scan.r3d", data / "scan.r3d")
     with served(data) as found:
         yield found
@@ -56,23 +60,36 @@ def address(tmp_path_factory: pytest.TempPathFactory, sample: Path) -> Iterator[
 
 @pytest.fixture(scope="module")  # its event loop must not outlive the browser tests: others start loops of their own
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET, timeout=PATIENCE_MS) as opened,
+    ):
         yield opened
-        opened.close()
 
 
 @pytest.fixture
-def page(browser: Browser, address: str) -> Iterator[Page]:
+def new_context(browser: Browser) -> Iterator[NewContext]:
+    """Makes contexts, of 1280 x 720 pixels where nothing else is asked for, that end with the test."""
+    with ExitStack() as opened:
+
+        def make(**how: Any) -> BrowserContext:
+            context = opened.enter_context(browser.new_context(**how))
+            context.set_default_timeout(PATIENCE_MS)
+            context.set_default_navigation_timeout(PATIENCE_MS)
+            context.add_init_script(REMEMBER)
+            return context
+
+        yield make
+
+
+@pytest.fixture
+def page(address: str, new_context: NewContext) -> Iterator[Page]:
     """A page that is signed in, and that fails the test when our code throws."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
-    context.set_default_timeout(PATIENCE_MS)
-    opened = context.new_page()
+    opened = new_context().new_page()
     thrown: list[str] = []
     opened.on("pageerror", lambda error: thrown.append(str(error)))
     opened.goto(printed_again(address))
     yield opened
-    context.close()
     assert thrown == []
 
 

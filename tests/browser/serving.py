@@ -1,18 +1,30 @@
-"""The app served on a free port over a data folder, and its printed addresses."""
+"""The app served on a free port over a data folder, its printed addresses, and how tests wait for its pages."""
 
 import re
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import FloatRect, Locator, expect
+from playwright.sync_api import BrowserContext, FloatRect, Locator, Page, expect
 
 from app.serve import new_address
+from tests.waiting import PATIENCE_S, until
 
-PATIENCE_MS = 180_000  # a busy machine that draws 3D in software; nothing waits longer than what it waits for takes
+NewContext = Callable[..., BrowserContext]
+"""Takes what `Browser.new_context` takes."""
+
+STEADY = 4  # looks in a row that see a thing in one place
+REMEMBER = """new MutationObserver((changes) => {
+  const added = changes.flatMap(({ addedNodes }) => [...addedNodes]);
+  const toasts = added.filter((node) => node instanceof Element && node.matches(".toast") && node.checkVisibility());
+  (window.toasted ??= []).push(...toasts.map((toast) => toast.textContent));
+}).observe(document, { childList: true, subtree: true });"""
+TAKE = """(text) => {
+  const found = (window.toasted ?? []).findIndex((said) => said.includes(text));
+  return found >= 0 && window.toasted.splice(found, 1);
+}"""
 
 _folders: dict[str, Path] = {}  # of running servers, by their addresses
 
@@ -29,24 +41,47 @@ def served(data: Path) -> Iterator[str]:
     code = f"from pathlib import Path; from app.serve import serve; {serve}"
     server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
-    line = server.stdout.readline()
-    found = re.search(r"(http://\S+?/)\S*", line)
-    assert found, line
-    _folders[found.group(1)] = data
-    yield found.group()
+    try:
+        line = server.stdout.readline()
+        found = re.search(r"(http://\S+?/)\S*", line)
+        assert found, line
+        _folders[found.group(1)] = data
+        yield found.group()
+    finally:
+        end(server)
+
+
+def end(server: "subprocess.Popen[str]") -> None:
+    """Ask it to end; one that does not is killed."""
+    assert server.stdout is not None
     server.terminate()
-    server.wait(timeout=60)
+    try:
+        server.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
     server.stdout.close()
 
 
 def box_of(locator: Locator) -> FloatRect:
     """Where it is on the screen, once it stays there: pages are laid out while they are filled."""
-    until, before = time.monotonic() + PATIENCE_MS / 1000, None
-    while time.monotonic() < until:
+    seen: list[FloatRect | None] = []
+
+    def stays() -> bool:
         expect(locator).to_be_visible()
-        box = locator.bounding_box()
-        if box and box == before:
-            return box
-        before = box
-        locator.page.wait_for_timeout(50)
-    raise AssertionError(f"{locator} does not stay in one place: {before}")
+        seen.append(locator.bounding_box())
+        return len(seen) >= STEADY and all(box == seen[-1] for box in seen[-STEADY:]) and seen[-1] is not None
+
+    until(stays, f"{locator} does not stay in one place")
+    assert seen[-1] is not None
+    return seen[-1]
+
+
+def wait_for_toast(page: Page, text: str) -> None:
+    """Wait until the page has said so in a message, which goes after a while or when others come; each counts once."""
+    page.wait_for_function(TAKE, arg=text)
+
+
+def drawn(page: Page) -> None:
+    """Wait until the page has drawn what it knows by now."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from functools import partial
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_pages import serious
@@ -17,10 +18,8 @@ CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_ones_like_an_object_are_shown_and_confirmed(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "cleo")
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")
@@ -65,11 +64,10 @@ def test_the_ones_like_an_object_are_shown_and_confirmed(browser: Browser, serve
     expect(proposals).to_contain_text("No proposal is like pull_out_1.")
     page.get_by_role("button", name="All proposals").click()
     expect(proposals.get_by_role("heading")).to_have_text("Proposals (1)")
-    context.close()
 
 
-def test_several_are_numbered_from_left_to_right_and_from_the_top_down(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_several_are_numbered_from_left_to_right_and_from_the_top_down(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")
@@ -85,4 +83,3 @@ def test_several_are_numbered_from_left_to_right_and_from_the_top_down(browser: 
     page.get_by_label("Name for all, numbered").press("Enter")
     expect(page.locator(".object-list .pick")).to_have_text(["drawer_1", "mug_1", "door_3", "door_2", "door_1"])
     picture(page, "numbered")
-    context.close()

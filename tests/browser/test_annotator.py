@@ -1,17 +1,18 @@
 """Who may not decide sees no button that would be refused, and can comment."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.app.nouns import finish
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_an_annotator_is_told_that_a_reviewer_decides(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_an_annotator_is_told_that_a_reviewer_decides(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "cleo")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")
@@ -23,6 +24,5 @@ def test_an_annotator_is_told_that_a_reviewer_decides(browser: Browser, server: 
     expect(page.locator(".review > aside").get_by_role("combobox").first).to_be_disabled()
     expect(page.get_by_role("button", name="Comment", exact=True)).to_be_enabled()
     page.keyboard.press("y")
-    expect(page.locator(".toast", has_text="A reviewer accepts")).to_be_visible()
+    wait_for_toast(page, "A reviewer accepts")
     picture(page, f"annotator-{theme}")
-    context.close()

@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_pages import serious
@@ -14,9 +14,8 @@ from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_objects_are_assigned_and_wait_for_their_person(browser: Browser, server: Server, theme: str) -> None:
-    how = {"viewport": {"width": 1280, "height": 720}, "color_scheme": theme, "bypass_csp": True}  # for axe
-    contexts = [browser.new_context(**how) for _ in range(2)]  # type: ignore[arg-type]
+def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext, server: Server, theme: str) -> None:
+    contexts = [new_context(color_scheme=theme, bypass_csp=True) for _ in range(2)]  # for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)
     for _ in range(10):
@@ -30,7 +29,7 @@ def test_objects_are_assigned_and_wait_for_their_person(browser: Browser, server
     whose.focus()
     whose.press("b")
     expect(whose).to_have_value("bea")
-    expect(ann.locator(".toast", has_text="drawer_1: assigned to bea")).to_be_visible()
+    wait_for_toast(ann, "drawer_1: assigned to bea")
     expect(inbox).to_have_text("Inbox 1")
     expect(rows(ann).first).to_contain_text("@bea")
     ann.get_by_role("button", name="Undo", exact=True).click()
@@ -43,7 +42,7 @@ def test_objects_are_assigned_and_wait_for_their_person(browser: Browser, server
     ann.get_by_role("button", name="bottle_1", exact=True).click(modifiers=["Control"])
     ann.get_by_role("button", name="bottle_3", exact=True).click(modifiers=["Shift"])
     ann.get_by_label("Assign all to").select_option("bea")
-    expect(ann.locator(".toast", has_text="3 objects: assigned to bea")).to_be_visible()
+    wait_for_toast(ann, "3 objects: assigned to bea")
     expect(inbox).to_have_text("Inbox 4")
     picture(ann, f"objects-assigned-{theme}")
     assert serious(ann, "objects assigned") == []
@@ -79,5 +78,3 @@ def test_objects_are_assigned_and_wait_for_their_person(browser: Browser, server
     expect(rows(bea)).to_have_count(2)
     lock, eye = (box_of(rows(bea).first.get_by_role("button", name=name)) for name in ("Lock drawer_1", "Hide drawer_1"))
     assert lock["y"] == eye["y"]
-    for context in contexts:
-        context.close()

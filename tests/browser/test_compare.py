@@ -3,10 +3,10 @@
 import re
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.app.test_differences import with_a_deeper_one
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
@@ -21,8 +21,10 @@ SHOWN = """async () => {
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(
+    new_context: NewContext, server: Server, theme: str
+) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     with_a_deeper_one(server.data / "projects" / project.split("/p/")[1] / "work")
@@ -61,5 +63,4 @@ def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(browse
     expect(page.get_by_role("button", name="Candidate", exact=True)).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("r")
     compare.get_by_role("article", name="c1").get_by_role("button", name="Accept").click()
-    expect(page.locator(".toast", has_text="accepted c1 of drawer_1")).to_be_visible()
-    context.close()
+    wait_for_toast(page, "accepted c1 of drawer_1")

@@ -3,16 +3,19 @@
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(
+    new_context: NewContext, server: Server, theme: str
+) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -36,12 +39,11 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(browser: 
     expect(said).to_have_count(0)
     expect(rows(page).last).to_contain_text("2 clicks")
     expect(page.get_by_role("button", name="drawer_2", exact=True)).to_have_attribute("aria-pressed", "true")
-    context.close()
 
 
-def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(browser: Browser, tmp_path: Path) -> None:
+def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_context: NewContext, tmp_path: Path) -> None:
     with Server(tmp_path, live="panels") as server:  # 0.8 m wide and 1.2 m high
-        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        context = new_context()
         page = signed_in(context, server, "ann")
         sample(page)
         page.get_by_role("link", name="Annotate").click()
@@ -51,14 +53,13 @@ def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(brows
         said = page.locator(".contradicted")
         expect(said.first).to_contain_text("0.80 m wide")
         expect(said.first).to_contain_text("click off it where its mask goes too far")
-        context.close()
 
 
 def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_mends_it(
-    browser: Browser, tmp_path: Path
+    new_context: NewContext, tmp_path: Path
 ) -> None:
     with Server(tmp_path, live="panels") as server:  # of 0.8 by 1.2 m
-        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        context = new_context()
         page = signed_in(context, server, "ann")
         sample(page)
         page.get_by_role("link", name="Annotate").click()
@@ -71,4 +72,3 @@ def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_m
         page.get_by_label("Category of drawer_2").fill("refrigerator")
         page.get_by_label("Category of drawer_2").press("Enter")
         expect(said).to_have_count(0)
-        context.close()

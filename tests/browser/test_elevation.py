@@ -3,9 +3,9 @@
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
 from tests.browser.test_together import sample
@@ -44,8 +44,8 @@ def stored(page: Page) -> list[dict[str, Any]]:
     return [entry for entry in file["objects"] if "front" in entry]
 
 
-def test_fronts_are_drawn_split_typed_merged_and_taken_back(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_fronts_are_drawn_split_typed_merged_and_taken_back(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -103,15 +103,14 @@ def test_fronts_are_drawn_split_typed_merged_and_taken_back(browser: Browser, se
     page.reload()
     expect(fronts(page)).to_have_count(1)
     expect(fronts(page).first).to_contain_text("600 × 700")
-    context.close()
 
 
 def names(page: Page) -> list[str]:
     return fronts(page).locator(".what").all_inner_texts()
 
 
-def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -171,11 +170,10 @@ def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(browser: 
     expect(fronts(page)).to_have_count(4)
     page.keyboard.press("Control+z")
     expect(fronts(page)).to_have_count(2)
-    context.close()
 
 
-def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -205,14 +203,11 @@ def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(br
     (merged,) = (entry["front"] for entry in stored(page))
     for side in ("left_m", "right_m"):
         assert merged["handle"][side] == pytest.approx(alone["handle"][side] - 0.3, abs=0.02)
-    context.close()
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_handle_and_hinge_of_one_front_are_copied_to_the_others(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -247,11 +242,10 @@ def test_handle_and_hinge_of_one_front_are_copied_to_the_others(browser: Browser
     page.keyboard.press("Control+z")  # one gesture
     expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
     assert [entry["front"]["hinge"] for entry in stored(page)] == [None, None, "left"]
-    context.close()
 
 
-def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 420, "height": 800})
+def test_the_header_of_a_project_fits_a_phone(new_context: NewContext, server: Server) -> None:
+    context = new_context(viewport={"width": 420, "height": 800})
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -260,4 +254,3 @@ def test_the_header_of_a_project_fits_a_phone(browser: Browser, server: Server) 
     for name in ("Keyboard and mouse help", "Dark or light"):
         box = box_of(page.get_by_role("button", name=name))
         assert box["x"] + box["width"] <= 420
-    context.close()

@@ -4,9 +4,10 @@ import csv
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.app.test_honeypots import write_truth
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
 from tests.browser.test_together import click_frame, ready, rows, sample
@@ -14,9 +15,8 @@ from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_honeypot_is_slipped_in_done_and_scored(browser: Browser, server: Server, theme: str) -> None:
-    how = {"viewport": {"width": 1280, "height": 720}, "color_scheme": theme, "bypass_csp": True}  # for axe
-    contexts = [browser.new_context(**how, accept_downloads=True) for _ in range(2)]  # type: ignore[arg-type]
+def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, server: Server, theme: str) -> None:
+    contexts = [new_context(color_scheme=theme, bypass_csp=True) for _ in range(2)]  # for axe
     ann, cleo = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
     project = sample(ann).split("/p/")[1]
     write_truth(server.data / "projects" / project / "source")
@@ -25,7 +25,7 @@ def test_a_honeypot_is_slipped_in_done_and_scored(browser: Browser, server: Serv
     ann.get_by_role("combobox", name="For", exact=True).select_option("cleo")
     ann.get_by_label("Called", exact=True).fill("Flat 7")
     ann.get_by_role("button", name="Slip it in").press("Enter")
-    expect(ann.locator(".toast", has_text="Flat 7 is in the inbox of cleo")).to_be_visible()
+    wait_for_toast(ann, "Flat 7 is in the inbox of cleo")
     line = ann.get_by_role("region", name="Honeypots").locator("tbody tr")
     expect(line).to_contain_text("0 of 2")
 
@@ -57,5 +57,3 @@ def test_a_honeypot_is_slipped_in_done_and_scored(browser: Browser, server: Serv
         ann.get_by_role("link", name="Table of effort of Flat 7").press("Enter")
     told = list(csv.DictReader(Path(waiting.value.path()).read_text().splitlines()))
     assert [one["true object"] for one in told if one["true object"]] == ["front_1", "oven_1"]
-    for context in contexts:
-        context.close()

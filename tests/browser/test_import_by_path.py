@@ -1,16 +1,16 @@
 """A recording on the server's machine: a refused path stays with its reason, one from a folder that was allowed comes in."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of
 from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_refused_path_stays_and_says_what_allows_it(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     page.get_by_role("button", name="From this machine…").click()
     field = page.get_by_label("Path on this machine")
@@ -23,4 +23,3 @@ def test_a_refused_path_stays_and_says_what_allows_it(browser: Browser, server: 
     expect(alert).to_contain_text("--import-from DIR")
     expect(field).to_have_value("/usr/share/kitchen.r3d")
     picture(page, f"import-refused-{theme}")
-    context.close()

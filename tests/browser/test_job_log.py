@@ -2,14 +2,15 @@
 
 import json
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_running_and_a_cancelled_job_have_a_log(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_running_and_a_cancelled_job_have_a_log(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     folder = server.data / "projects" / project.split("/p/")[1]
@@ -24,4 +25,3 @@ def test_a_running_and_a_cancelled_job_have_a_log(browser: Browser, server: Serv
     page.get_by_role("button", name="Cancel").click()
     expect(page.locator("r2c2r-job")).to_contain_text("cancelled")
     expect(log).to_contain_text("cancelled")
-    context.close()

@@ -8,15 +8,25 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import box_of, drawn
+from tests.waiting import PATIENCE_MS, until
 
 PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: the journey leaves a screenshot of every page there
-LONG_MS = 600_000  # the pipeline on two busy cores
+LONG_MS = 4 * PATIENCE_MS  # the pipeline on two busy cores
 
 
-def picture(page: Page, name: str) -> None:
-    if PICTURES:
-        page.screenshot(path=f"{PICTURES}/{name}.png", timeout=LONG_MS)  # a software GL is slow
+def picture(page: Page, name: str, *, still: bool = False) -> None:
+    """Leave a screenshot; a still one when two in a row are alike, as a software GL draws a 3D view when it can."""
+    if not PICTURES:
+        return
+    taken = [b""]
+
+    def taken_twice() -> bool:
+        taken.append(page.screenshot(timeout=LONG_MS))
+        return not still or taken[-1] == taken[-2]
+
+    until(taken_twice, f"{name} goes on changing")
+    Path(f"{PICTURES}/{name}.png").write_bytes(taken[-1])
 
 
 def click_of(sample: Path, category: str) -> tuple[int, float, float]:
@@ -75,7 +85,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
     page.get_by_role("button", name="drawer_1", exact=True).click()
     page.get_by_label("Name of drawer_1").select_text()  # text selected in a field keeps the object chosen
-    page.wait_for_timeout(300)
+    drawn(page)
     page.get_by_label("Name of drawer_1").fill("top_drawer")
     page.get_by_label("Name of drawer_1").press("Enter")
     expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
@@ -96,17 +106,15 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     # Review: the viewer shows through our own origin; accept
     page.get_by_role("link", name="Review").first.click()
     expect(page.locator("iframe")).to_have_attribute("src", re.compile(r"^/viewer/[\w-]"))
-    expect(page.frame_locator("iframe").locator("canvas").first).to_be_visible(timeout=60_000)
+    expect(page.frame_locator("iframe").locator("canvas").first).to_be_visible()
     expect(page.get_by_label("top_drawer", exact=False).first).to_be_attached()
-    page.get_by_role("button", name="Open all").wait_for(timeout=60_000)
+    page.get_by_role("button", name="Open all").wait_for()
     page.get_by_role("button", name="Open all").click()
-    page.wait_for_timeout(3000)
-    picture(page, "6-review-scene")
+    picture(page, "6-review-scene", still=True)
     page.get_by_role("button", name=re.compile("^Accept")).first.click()
     expect(page.get_by_text("1 of 1 object accepted")).to_be_visible(timeout=LONG_MS)
     page.keyboard.press("2")
-    page.wait_for_timeout(3000)
-    picture(page, "7-review-aligned")
+    picture(page, "7-review-aligned", still=True)
 
     # Download
     page.get_by_role("link", name="Download").first.click()
@@ -129,7 +137,7 @@ def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_pat
         page.get_by_role("button", name="Import a scan").first.click()
     chooser.value.set_files(bad)
     message = page.get_by_role("alert").or_(page.locator(".toast.bad"))
-    expect(message.first).to_contain_text("notes.r3d", timeout=60_000)
+    expect(message.first).to_contain_text("notes.r3d")
     picture(page, "9-refused")
 
 

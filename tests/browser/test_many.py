@@ -3,8 +3,9 @@
 import re
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
@@ -19,8 +20,8 @@ def post(page: Page, path: str, body: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_many_objects_are_searched_and_new_object_stays_in_sight(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     for number in range(14):
@@ -38,12 +39,11 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(browser: Browse
     picture(page, f"many-objects-{theme}")
     page.get_by_label("Find objects").fill("")
     expect(rows(page)).to_have_count(16)
-    context.close()
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_sixty_objects_are_grouped_locked_and_changed_together(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     for number in range(58):
@@ -84,7 +84,7 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(browser: Browser,
     page.get_by_label("Selected objects").get_by_role("button", name="Lock").click()
     picture(page, f"sixty-objects-{theme}")
     page.get_by_label("Selected objects").get_by_role("button", name="Delete").click()
-    expect(page.locator(".toast", has_text="jar_1 is locked")).to_be_visible()
+    wait_for_toast(page, "jar_1 is locked")
     page.get_by_label("Which objects").select_option("locked")
     expect(page.locator(".object-list .pick")).to_have_count(3)
     page.reload()  # a lock is kept
@@ -94,12 +94,11 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(browser: Browser,
     page.keyboard.press("Shift+L")
     expect(page.get_by_label("Name of jar_1")).to_be_visible()
     page.get_by_role("button", name="Delete jar_1").click()
-    expect(page.locator(".toast", has_text="Deleted jar_1")).to_be_visible()
-    context.close()
+    wait_for_toast(page, "Deleted jar_1")
 
 
-def test_projects_are_searched_and_ordered(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_projects_are_searched_and_ordered(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic", "Bath", "Attic two"):
         post(page, "/api/projects/sample", {"name": name})
@@ -110,4 +109,3 @@ def test_projects_are_searched_and_ordered(browser: Browser, server: Server) -> 
     page.get_by_label("Find projects").fill("attic")
     expect(names).to_have_text(["Attic", "Attic two"])
     picture(page, "many-projects")
-    context.close()

@@ -1,8 +1,9 @@
 """Naming objects: any words are joined to a name, categories are offered, and what is to know of one is said once."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
@@ -10,8 +11,8 @@ from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_names_are_joined_and_an_unknown_category_is_said_once(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     for _ in range(3):
@@ -42,4 +43,3 @@ def test_names_are_joined_and_an_unknown_category_is_said_once(browser: Browser,
     page.get_by_label("Least confidence").select_option("95 % sure")
     expect(proposals.get_by_role("button", name="Confirm 1", exact=True)).to_be_enabled()
     picture(page, f"naming-{theme}")
-    context.close()

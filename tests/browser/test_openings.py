@@ -1,9 +1,9 @@
 """A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed too."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
@@ -11,9 +11,9 @@ from tests.browser.together import Server, signed_in
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
-    browser: Browser, server: Server, theme: str
+    new_context: NewContext, server: Server, theme: str
 ) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -33,4 +33,3 @@ def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
     lane.click(position={"x": 0.9 * box["width"], "y": box["height"] / 2})  # its last third is the last frame
     expect(state).to_have_text("open, 86° ± 2°")
     expect(page.locator("r2c2r-film-strip .transport output")).to_contain_text("frame 7")
-    context.close()

@@ -5,8 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
 from tests.browser.test_together import click_frame, ready, rows, sample
@@ -14,9 +15,8 @@ from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_second_opinion_is_asked_given_and_compared(browser: Browser, server: Server, theme: str) -> None:
-    how = {"viewport": {"width": 1280, "height": 720}, "color_scheme": theme, "bypass_csp": True}  # for axe
-    contexts = [browser.new_context(**how, accept_downloads=True) for _ in range(2)]  # type: ignore[arg-type]
+def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, server: Server, theme: str) -> None:
+    contexts = [new_context(color_scheme=theme, bypass_csp=True) for _ in range(2)]  # for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)
     ann.goto(f"{project}/annotate?frame=3")
@@ -31,7 +31,7 @@ def test_a_second_opinion_is_asked_given_and_compared(browser: Browser, server: 
     section = ann.get_by_role("region", name="Second opinions")
     section.get_by_label("Who gives the second opinion").select_option("bea")
     section.get_by_role("button", name="Ask for a second opinion").press("Enter")
-    expect(ann.locator(".toast", has_text="It is in the inbox of bea.")).to_be_visible()
+    wait_for_toast(ann, "It is in the inbox of bea.")
     expect(section.get_by_role("listitem")).to_contain_text("Sample kitchen (opinion of bea)")
     section.scroll_into_view_if_needed()
     picture(ann, f"opinions-overview-{theme}")
@@ -71,5 +71,3 @@ def test_a_second_opinion_is_asked_given_and_compared(browser: Browser, server: 
     assert (told[-1]["first object"], told[-1]["second category"], told[-1]["same category"]) == ("drawer_2", "oven", "no")
     ann.get_by_role("link", name="oven_1").press("Enter")  # into the other's project
     expect(ann.get_by_label("Name of oven_1")).to_be_visible()
-    for context in contexts:
-        context.close()

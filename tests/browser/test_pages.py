@@ -11,11 +11,11 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.serve import register_finished
 from tests.app.nouns import finish
-from tests.browser.serving import PATIENCE_MS, printed_again, served
+from tests.browser.serving import NewContext, printed_again, served, wait_for_toast
 
 REPORT = {
     "certificate": {"passed": True, "findings": [{"rule": "r", "severity": "warning", "where": "drawer_1", "message": "m"}]}
@@ -55,10 +55,9 @@ PAGES = ("", "/annotate", "/run", "/review", "/download")
 FIRST_LOAD_BYTES = 200_000
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str]]:
+@contextmanager
+def served_with_finished(data: Path) -> Iterator[tuple[str, str]]:
     """A served app with one finished project: its address and the project's id."""
-    data = tmp_path_factory.mktemp("finished")
     work = data / "kitchen" / "work"
     finish(work)
     (data / "prompts.json").write_text(json.dumps(PROMPTS))
@@ -78,71 +77,82 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, st
         yield address, project
 
 
-@contextmanager
-def signed_in(browser: Browser, address: str, **looks: Any) -> Iterator[Page]:
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str]]:
+    """For tests that only look at it."""
+    with served_with_finished(tmp_path_factory.mktemp("finished")) as found:
+        yield found
+
+
+@pytest.fixture
+def changed(tmp_path: Path) -> Iterator[tuple[str, str]]:
+    """For a test that changes it."""
+    with served_with_finished(tmp_path) as found:
+        yield found
+
+
+def signed_in(new_context: NewContext, address: str, **looks: Any) -> Page:
     """A page of a browser of its own, which opened the printed address."""
-    context = browser.new_context(**looks)
-    context.set_default_timeout(PATIENCE_MS)
-    page = context.new_page()
+    page = new_context(**looks).new_page()
     page.goto(printed_again(address))
-    yield page
-    context.close()
+    return page
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="npm ci was not run in static/")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_no_page_has_a_serious_finding(browser: Browser, finished: tuple[str, str], theme: Any, size: str) -> None:
+def test_no_page_has_a_serious_finding(new_context: NewContext, finished: tuple[str, str], theme: Any, size: str) -> None:
     address, project = finished
     width, height = SIZES[size]
     looks = {"viewport": {"width": width, "height": height}, "color_scheme": theme, "bypass_csp": True}
     base = address.split("/?")[0]
-    with signed_in(browser, address, **looks) as page:
-        found = serious(page, "projects")
-        page.goto(f"{base}/people")
-        page.get_by_role("heading", name="Add somebody").wait_for()
-        found += serious(page, "people")
-        for name in PAGES:
-            page.goto(f"{base}/p/{project}{name}")
-            page.locator("h1, h2").first.wait_for()
-            found += serious(page, name or "overview")
-            if name == "/review":
-                for key, shown in (("r", "candidates side by side"), ("3", "scene"), ("z", "section")):
-                    page.keyboard.press(key)
-                    found += serious(page, shown)
-        page.evaluate("document.body.append(document.createElement('button'))")
-        assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
+    page = signed_in(new_context, address, **looks)
+    found = serious(page, "projects")
+    page.goto(f"{base}/people")
+    page.get_by_role("heading", name="Add somebody").wait_for()
+    found += serious(page, "people")
+    for name in PAGES:
+        page.goto(f"{base}/p/{project}{name}")
+        page.locator("h1, h2").first.wait_for()
+        found += serious(page, name or "overview")
+        if name == "/review":
+            for key, shown in (("r", "candidates side by side"), ("3", "scene"), ("z", "section")):
+                page.keyboard.press(key)
+                found += serious(page, shown)
+    page.evaluate("document.body.append(document.createElement('button'))")
+    assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
     assert found == []
 
 
-def test_what_our_pages_load_first_is_small(browser: Browser, finished: tuple[str, str]) -> None:
+def test_what_our_pages_load_first_is_small(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, _ = finished
-    page = browser.new_page()
+    page = new_context().new_page()
     sizes: dict[str, int] = {}
     page.on("response", lambda answer: sizes.update({answer.url: len(answer.body())}) if "/static/" in answer.url else None)
     page.goto(printed_again(address))
     page.get_by_role("link", name="kitchen").wait_for()
     assert 0 < sum(sizes.values()) < FIRST_LOAD_BYTES, sizes
-    page.close()
 
 
-def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(browser: Browser, finished: tuple[str, str]) -> None:
+def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
+    new_context: NewContext, finished: tuple[str, str]
+) -> None:
     address, project = finished
-    with signed_in(browser, address, permissions=["clipboard-read", "clipboard-write"]) as page:
-        page.goto(f"{address.split('/?')[0]}/p/{project}/download")
-        page.locator("summary", has_text="PyBullet").focus()
-        page.keyboard.press("Enter")
-        expect(page.get_by_text("pip install pybullet")).to_be_visible()
-        expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # one is open at a time
-        page.get_by_role("button", name="Copy the lines for PyBullet").focus()
-        page.keyboard.press("Enter")
-        expect(page.get_by_text("Copied")).to_be_visible()
-        assert page.evaluate("navigator.clipboard.readText()").startswith("import pybullet")
-        expect(page.get_by_text("x 1.9, y 0.6 m, lifted 0.1 m: drawer_1_joint")).to_be_visible()
-        for name in ("A parallel gripper at drawer_1_joint", "The floor plan with the places where it may stand"):
-            picture = page.get_by_role("img", name=name)
-            picture.scroll_into_view_if_needed()
-            page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
+    page = signed_in(new_context, address, permissions=["clipboard-read", "clipboard-write"])
+    page.goto(f"{address.split('/?')[0]}/p/{project}/download")
+    page.locator("summary", has_text="PyBullet").focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("pip install pybullet")).to_be_visible()
+    expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # one is open at a time
+    page.get_by_role("button", name="Copy the lines for PyBullet").focus()
+    page.keyboard.press("Enter")
+    wait_for_toast(page, "Copied")
+    assert page.evaluate("navigator.clipboard.readText()").startswith("import pybullet")
+    expect(page.get_by_text("x 1.9, y 0.6 m, lifted 0.1 m: drawer_1_joint")).to_be_visible()
+    for name in ("A parallel gripper at drawer_1_joint", "The floor plan with the places where it may stand"):
+        picture = page.get_by_role("img", name=name)
+        picture.scroll_into_view_if_needed()
+        page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
 
 
 def serious(page: Page, where: str) -> list[str]:
@@ -157,62 +167,66 @@ def serious(page: Page, where: str) -> list[str]:
     ]
 
 
-def test_a_change_made_without_a_connection_is_stored_when_it_is_back(browser: Browser, finished: tuple[str, str]) -> None:
+def test_a_change_made_without_a_connection_is_stored_when_it_is_back(
+    changed: tuple[str, str], new_context: NewContext
+) -> None:
+    address, project = changed
+    page = signed_in(new_context, address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    page.get_by_role("button", name="drawer_1", exact=True).click()
+    page.context.set_offline(True)
+    page.get_by_label("Name of drawer_1").fill("top_drawer")
+    page.get_by_label("Name of drawer_1").press("Enter")
+    expect(page.locator(".banner")).to_contain_text("1 change not stored yet")
+    page.context.set_offline(False)
+    expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
+    expect(page.locator(".banner")).to_be_hidden()
+
+
+def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(
+    changed: tuple[str, str], new_context: NewContext
+) -> None:
+    address, project = changed
+    first = signed_in(new_context, address)
+    second = first.context.new_page()
+    first.route("**/api/projects/**", lambda route: route.abort() if route.request.method == "PATCH" else route.continue_())
+    first.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    first.locator(".object-list .pick").first.click()
+    first.get_by_label("Category of").last.fill("door")
+    first.get_by_label("Category of").last.press("Enter")
+    expect(first.locator(".banner")).to_contain_text("1 change not stored yet")
+    sent: list[str] = []
+    second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
+    second.goto(first.url)
+    second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
+    assert sent == []
+    first.close()
+    second.locator(".object-list .pick").first.click()
+    expect(second.get_by_label("Category of").last).to_have_value("door")
+    assert len(sent) == 1
+
+
+def test_who_is_at_a_list_by_keyboard_stays_there(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
-    with signed_in(browser, address) as page:
-        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-        page.get_by_role("button", name="drawer_1", exact=True).click()
-        page.context.set_offline(True)
-        page.get_by_label("Name of drawer_1").fill("top_drawer")
-        page.get_by_label("Name of drawer_1").press("Enter")
-        expect(page.locator(".banner")).to_contain_text("1 change not stored yet")
-        page.context.set_offline(False)
-        expect(page.get_by_role("button", name="top_drawer", exact=True)).to_be_visible()
-        expect(page.locator(".banner")).to_be_hidden()
+    page = signed_in(new_context, address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
+    hide.focus()
+    for button in (show, hide):
+        page.keyboard.press("Enter")
+        expect(button).to_be_focused()
 
 
-def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(browser: Browser, finished: tuple[str, str]) -> None:
+def test_a_control_reached_by_keyboard_is_used_by_it(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
-    with signed_in(browser, address) as first:
-        second = first.context.new_page()
-        first.route("**/api/projects/**", lambda route: route.abort() if route.request.method == "PATCH" else route.continue_())
-        first.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-        first.locator(".object-list .pick").first.click()
-        first.get_by_label("Category of").last.fill("door")
-        first.get_by_label("Category of").last.press("Enter")
-        expect(first.locator(".banner")).to_contain_text("1 change not stored yet")
-        sent: list[str] = []
-        second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
-        second.goto(first.url)
-        second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
-        assert sent == []
-        first.close()
-        second.locator(".object-list .pick").first.click()
-        expect(second.get_by_label("Category of").last).to_have_value("door")
-        assert len(sent) == 1
-
-
-def test_who_is_at_a_list_by_keyboard_stays_there(browser: Browser, finished: tuple[str, str]) -> None:
-    address, project = finished
-    with signed_in(browser, address) as page:
-        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
-        hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
-        hide.focus()
-        for button in (show, hide):
-            page.keyboard.press("Enter")
-            expect(button).to_be_focused()
-
-
-def test_a_control_reached_by_keyboard_is_used_by_it(browser: Browser, finished: tuple[str, str]) -> None:
-    address, project = finished
-    with signed_in(browser, address) as page:
-        page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
-        expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
-        for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
-            page.get_by_role("button", name=name).focus()
-            page.keyboard.press(key)
-            expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
-        page.get_by_label("Mask opacity").focus()
-        page.keyboard.press("ArrowRight")  # not: the next frame
-        expect(page.get_by_label("Mask opacity")).to_have_value("43")
-        expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+    page = signed_in(new_context, address)
+    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+    for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
+        page.get_by_role("button", name=name).focus()
+        page.keyboard.press(key)
+        expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Mask opacity").focus()
+    page.keyboard.press("ArrowRight")  # not: the next frame
+    expect(page.get_by_label("Mask opacity")).to_have_value("43")
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")

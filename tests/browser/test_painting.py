@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
@@ -18,8 +18,8 @@ def said(page: Page) -> list[dict[str, Any]]:
     return frames
 
 
-def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_mask_is_painted_kept_and_said_not_to_be_there(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -42,16 +42,15 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(browser: Browser, serve
     assert sum(painted["mask"]["runs"][1::2]) > 0
     page.keyboard.press("Escape")
     page.keyboard.press("a")
-    expect(page.locator(".toast", has_text="not visible")).to_be_visible()  # beside what the 3D view says of a stand-in
+    wait_for_toast(page, "not visible")  # beside what the 3D view says of a stand-in
     assert said(page) == [{"frame": painted["frame"], "mask": None}]
     page.keyboard.press("Control+z")
-    expect(page.locator(".toast", has_text="Undone")).to_be_visible()
+    wait_for_toast(page, "Undone")
     assert said(page) == [painted]
-    context.close()
 
 
-def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -90,7 +89,7 @@ def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(browser: Browser
     assert around > lassoed
     page.keyboard.press("Escape")
     page.keyboard.press("Control+z")
-    expect(page.locator(".toast", has_text="Undone")).to_be_visible()
+    wait_for_toast(page, "Undone")
     assert area() == erased
     page.keyboard.press("ArrowRight")
     with page.expect_response(lambda answer: answer.request.method == "PUT"):
@@ -99,4 +98,3 @@ def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(browser: Browser
     kept = said(page)
     assert len(kept) == 2
     assert all(one["mask"] is not None and sum(one["mask"]["runs"][1::2]) > 0 for one in kept)
-    context.close()

@@ -2,16 +2,17 @@
 
 import json
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from tests.app.nouns import finish
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_together import pick, ready, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_stages_models_and_roles_are_told_in_plain_words(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_stages_models_and_roles_are_told_in_plain_words(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     folder = server.data / "projects" / project.split("/p/")[1]
@@ -48,4 +49,3 @@ def test_stages_models_and_roles_are_told_in_plain_words(browser: Browser, serve
     page.goto(f"{server.address}/people")
     expect(page.get_by_text("does that too; accepts, rejects and corrects results")).to_be_visible()
     expect(page.get_by_label("Password, at least 10 characters", exact=True)).to_be_visible()
-    context.close()

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.app.test_imports import R3D
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_pages import serious
@@ -30,10 +31,10 @@ def downloaded(page: Page, to: Path) -> bytes:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_project_goes_to_another_person_as_one_file(browser: Browser, server: Server, tmp_path: Path, theme: str) -> None:
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+def test_a_project_goes_to_another_person_as_one_file(
+    new_context: NewContext, server: Server, tmp_path: Path, theme: str
+) -> None:
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = import_file(page, "Kitchen.r3d", R3D)
     expect(page.get_by_role("link", name="Click objects")).to_be_visible()
@@ -54,11 +55,8 @@ def test_a_project_goes_to_another_person_as_one_file(browser: Browser, server: 
     light = downloaded(page, tmp_path)
     assert R3D in whole
     assert R3D not in light
-    context.close()
 
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "cleo")
     import_file(page, "Kitchen.r2c2r.zip", light)
     expect(page.get_by_role("heading", name="The recording is missing")).to_be_visible()
@@ -74,4 +72,3 @@ def test_a_project_goes_to_another_person_as_one_file(browser: Browser, server: 
     page.goto(server.address)
     import_file(page, "Kitchen.r2c2r.zip", whole)
     expect(page.get_by_role("link", name="Run on 1 object")).to_be_visible()
-    context.close()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from tests.browser.serving import wait_for_toast
 from tests.browser.test_journey import LONG_MS, picture
 
 
@@ -39,7 +40,7 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     picture(page, "13-proposal-confirmed")
 
     page.keyboard.press("Control+z")
-    expect(page.locator(".toast", has_text="Undone: confirmed proposal")).to_be_visible(timeout=LONG_MS)
+    wait_for_toast(page, "Undone: confirmed proposal")
     expect(rows).to_have_count(count, timeout=LONG_MS)
 
     page.keyboard.press("n")
@@ -57,7 +58,6 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     assert sure >= 5
     page.emulate_media(color_scheme="dark")
     page.keyboard.press("n")
-    page.wait_for_timeout(500)
     picture(page, "14-proposals-dark")
     page.keyboard.press("Shift+Y")
     expect(objects.locator(".object-list > li")).to_have_count(sure, timeout=LONG_MS)

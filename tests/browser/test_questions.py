@@ -3,8 +3,9 @@
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_elevation import fronts, stored
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
@@ -29,8 +30,10 @@ def corners(page: Page) -> Any:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(
+    new_context: NewContext, server: Server, theme: str
+) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     clicked_cabinet(page)
     tip = page.locator(".elevation .tip")
@@ -47,4 +50,3 @@ def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(browser
     page.keyboard.press("Control+z")
     expect(tip).to_contain_text("2 edges hardly show")
     expect(fronts(page).first).to_contain_text("600 × 600")
-    context.close()

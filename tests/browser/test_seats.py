@@ -1,13 +1,14 @@
 """What each seat does, on the page People."""
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
 
-def test_a_seat_that_helps_another_names_its_objects(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_seat_that_helps_another_names_its_objects(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     job = {"id": 7, "project_id": "p", "project_name": "Kitchen A", "kind": "run", "stage": "generate", "progress": 0.4}
     seat = {"version": "1", "jobs_at_a_time": 1, "began": 1.0, "silent_s": 0.0, "draining": False, "here": False}
@@ -22,4 +23,3 @@ def test_a_seat_that_helps_another_names_its_objects(browser: Browser, server: S
     expect(rows.nth(1)).to_contain_text("Kitchen A generate, helps: drawer_1, mug_1")
     rows.nth(1).scroll_into_view_if_needed()
     picture(page, "seats")
-    context.close()

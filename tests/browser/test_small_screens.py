@@ -1,9 +1,9 @@
 """A phone, a page zoomed to 200 %, and a keyboard alone reach the picture; messages leave the lanes free."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
@@ -14,8 +14,10 @@ PHONE = {"width": 390, "height": 844}
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(
+    new_context: NewContext, server: Server, theme: str
+) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     for name, size in (("zoomed", ZOOMED), ("phone", PHONE)):
@@ -34,11 +36,10 @@ def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(browser: 
         expect(page.get_by_label("Name of drawer_1")).to_be_visible()
         page.locator("main").evaluate("main => main.scrollTo(0, 0)")
         picture(page, f"{name}-{theme}")
-    context.close()
 
 
-def test_one_key_skips_to_the_picture(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_one_key_skips_to_the_picture(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")
@@ -52,11 +53,10 @@ def test_one_key_skips_to_the_picture(browser: Browser, server: Server) -> None:
     page.goto(project)
     expect(page.get_by_role("heading", name="The recording")).to_be_visible()
     expect(skip).to_have_count(0)  # there is no picture here
-    context.close()
 
 
-def test_messages_leave_the_lanes_free(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_messages_leave_the_lanes_free(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     for _ in range(9):
@@ -71,4 +71,3 @@ def test_messages_leave_the_lanes_free(browser: Browser, server: Server) -> None
     expect(page.locator(".toast")).to_have_count(4)
     lowest = box_of(page.locator(".toast").last)
     assert lowest["y"] + lowest["height"] <= box_of(page.locator("r2c2r-film-strip"))["y"]
-    context.close()

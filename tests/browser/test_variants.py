@@ -2,14 +2,15 @@
 
 import json
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-def test_variants_are_made_by_keyboard_and_what_they_take_is_said_before(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+def test_variants_are_made_by_keyboard_and_what_they_take_is_said_before(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)
     folder = server.data / "projects" / project.split("/p/")[1]
@@ -46,4 +47,3 @@ def test_variants_are_made_by_keyboard_and_what_they_take_is_said_before(browser
     page.get_by_role("button", name="Delete 2 variants").press("Enter")
     expect(made).to_have_count(0)
     expect(make).to_be_enabled()
-    context.close()

@@ -1,8 +1,10 @@
 """An app with accounts and stand-ins for its slow parts, to be stopped and started again, and people who sign in to it."""
 
+import random
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
@@ -10,11 +12,13 @@ from playwright.sync_api import BrowserContext, Page
 
 from app.db.engine import open_engine
 from app.services import accounts
-from tests.browser.serving import PATIENCE_MS
 
 ROOT = Path(__file__).parents[2]
 PASSWORD = "correct horse battery"
 PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
+LENT = Path("/proc/sys/net/ipv4/ip_local_port_range")  # the ports that whoever asks for any gets
+LOWEST_PORT = 20_000  # below are some that Chromium refuses
+TRIES = 100
 
 
 class Server:
@@ -43,7 +47,10 @@ class Server:
         command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), self.live, "localhost"]
         self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         assert self.process.stdout is not None
-        assert "http://localhost" in self.process.stdout.readline()
+        said = self.process.stdout.readline()
+        if "http://localhost" not in said:
+            self.kill()
+            raise AssertionError(f"the server did not start: {said}")
 
     def kill(self) -> None:
         assert self.process is not None
@@ -54,14 +61,18 @@ class Server:
 
 
 def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port that nobody else gets while the server is down; any free one where the system does not say which it lends."""
+    kept = range(LOWEST_PORT, int(LENT.read_text().split()[0]) if LENT.is_file() else 0)
+    tried = random.SystemRandom().sample(kept, min(len(kept), TRIES))  # two workers do not try the same
+    for port in (*tried, 0):
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return int(probe.getsockname()[1])
+    raise AssertionError("no port is free")
 
 
 def signed_in(context: BrowserContext, server: Server, name: str, password: str = PASSWORD) -> Page:
     """A page of theirs, at the projects."""
-    context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
     page.goto(f"{server.address}/login")
     page.get_by_label("Name").fill(name)
