@@ -1,43 +1,39 @@
 """Accounts, from the admin's page to the one they are about."""
 
-import contextlib
 import json
 import re
 import shutil
 import threading
-from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from app.files import project_files
-from tests.browser.serving import printed_again, served
+from tests.browser.serving import NewContext, printed_again, served, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_scene_tools import ask
 from tests.browser.together import Server, signed_in
+from tests.waiting import until
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("R2C2R_WEBHOOKS_TO", "127.0.0.0/8")
-        with Server(tmp_path_factory.mktemp("people")) as running:
-            yield running
+@pytest.fixture(autouse=True)
+def webhooks_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("R2C2R_WEBHOOKS_TO", "127.0.0.0/8")
 
 
-def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser, server: Server) -> None:
-    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
+def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewContext, server: Server) -> None:
+    contexts = [new_context() for _ in range(2)]
     ann = signed_in(contexts[0], server, "ann")
     ann.get_by_role("link", name="People").click()
     ann.get_by_label("Name").fill("carl")
     ann.get_by_label("Password, at least 10 characters", exact=True).fill("carl123456")
     ann.get_by_role("button", name="Add").click()
-    expect(ann.locator(".toast", has_text="own name with little beside it")).to_be_visible()
+    wait_for_toast(ann, "own name with little beside it")
     ann.get_by_label("Password, at least 10 characters", exact=True).fill("a password of carl")
     ann.get_by_role("button", name="Add").click()
-    expect(ann.locator(".toast", has_text="carl may sign in now")).to_be_visible()
+    wait_for_toast(ann, "carl may sign in now")
 
     carl = signed_in(contexts[1], server, "carl", "a password of carl")
     me = carl.locator("r2c2r-who").get_by_role("link", name="carl")
@@ -47,7 +43,7 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser,
     expect(carl.get_by_role("heading", name="Accounts")).to_be_hidden()
 
     ann.get_by_label("Role of carl").select_option("reviewer")
-    expect(ann.locator(".toast", has_text="carl is reviewer now")).to_be_visible()
+    wait_for_toast(ann, "carl is reviewer now")
     expect(me).to_have_attribute("title", "reviewer: accounts and your password")  # by itself
     ann.reload()
     record = ann.locator("r2c2r-audit-record")
@@ -61,19 +57,19 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(browser: Browser,
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()  # his open page is shown out
     carl.goto(server.address)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()
-    for context in contexts:
-        context.close()
 
 
 def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are_said(
-    browser: Browser, tmp_path: Path, server: Server
+    new_context: NewContext, tmp_path: Path, server: Server
 ) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context = new_context()
     page = context.new_page()
-    with served(tmp_path) as address:
+    other = tmp_path / "other"
+    other.mkdir()
+    with served(other) as address:
         page.goto(address)
         expect(page.get_by_role("heading", name="Projects")).to_be_visible()
-        stranger = browser.new_context()
+        stranger = new_context()
         late = stranger.new_page()
         late.goto(address)
         expect(late.get_by_text("a printed address opens one browser")).to_be_visible()
@@ -88,10 +84,9 @@ def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_role("alert")).to_contain_text("the name or the password is wrong")
     expect(page.get_by_role("button", name="Sign in")).to_be_enabled()
-    context.close()
 
 
-def test_webhooks_are_added_tried_and_removed_by_keyboard(browser: Browser, server: Server) -> None:
+def test_webhooks_are_added_tried_and_removed_by_keyboard(new_context: NewContext, server: Server) -> None:
     heard: list[str] = []
 
     class Listening(BaseHTTPRequestHandler):
@@ -106,7 +101,7 @@ def test_webhooks_are_added_tried_and_removed_by_keyboard(browser: Browser, serv
     with ThreadingHTTPServer(("127.0.0.1", 0), Listening) as listening:
         threading.Thread(target=listening.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{listening.server_port}/r2c2r"
-        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        context = new_context()
         ann = signed_in(context, server, "ann")
         ann.keyboard.press("Control+k")
         ann.keyboard.type("Webhooks")
@@ -144,8 +139,8 @@ def test_webhooks_are_added_tried_and_removed_by_keyboard(browser: Browser, serv
         listening.shutdown()
 
 
-def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, server: Server) -> None:
-    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
+def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext, server: Server) -> None:
+    contexts = [new_context() for _ in range(2)]
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     ann.get_by_role("button", name="Sample kitchen", exact=True).click()
     card = bea.locator(".cards > li").get_by_role("link")
@@ -153,11 +148,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
 
     panel = ann.get_by_role("region", name="Who sees this project")
     nobody = panel.get_by_text("Nobody is named yet")
-    for _ in range(20):  # a key meets nothing while the page takes in what another message told it
-        panel.get_by_label("Everybody who may sign in").press("ArrowDown")
-        with contextlib.suppress(AssertionError):
-            expect(nobody).to_be_visible(timeout=3000)
-            break
+    panel.get_by_label("Everybody who may sign in").press("ArrowDown")
     expect(nobody).to_be_visible()
     expect(panel.get_by_label("Only these people")).to_be_focused()
     expect(card).to_have_count(0)  # by itself
@@ -165,7 +156,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
     name = panel.get_by_label("Name")
     name.fill("zoe")
     name.press("Enter")
-    expect(ann.locator(".toast", has_text="there is no account zoe")).to_be_visible()
+    wait_for_toast(ann, "there is no account zoe")
     name.press("Control+a")
     panel.get_by_role("group").evaluate("choices => (choices.dataset.before = '')")
     ask(ann, "PATCH", f"/api/projects/{ann.url.split('/p/')[1]}", {"tags": ["north"]})
@@ -188,24 +179,21 @@ def test_a_project_is_kept_to_the_people_its_owner_names(browser: Browser, serve
 
     panel.get_by_role("button", name="Remove bea").press("Enter")  # while she looks at it
     expect(name).to_be_focused()
-    expect(bea.locator(".toast", has_text="Sample kitchen is kept to its members now")).to_be_visible()
+    wait_for_toast(bea, "Sample kitchen is kept to its members now")
     expect(bea.get_by_role("heading", name="Projects")).to_be_visible()
     expect(card).to_have_count(0)
     panel.get_by_label("Everybody who may sign in").check()
     expect(card).to_have_count(1)
-    for context in contexts:
-        context.close()
 
 
-def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_an_admin_leaves_or_adopts_what_was_set_aside(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     ann = signed_in(context, server, "ann")
     ann.get_by_role("button", name="Sample kitchen", exact=True).click()
     ann.get_by_role("link", name="Run on 2 objects").wait_for()
     project = ann.url.rsplit("/", 1)[1]
     files = project_files(server.data, project)
-    while not (files.description.exists() and "mug_1" in files.description.read_text()):  # written a little after it is so
-        ann.wait_for_timeout(50)
+    until(lambda: files.description.exists() and "mug_1" in files.description.read_text())  # written a little after it is so
     shutil.copytree(files.root, server.data / "unknown" / project)
     for place in ("projects", "trash"):
         address = f"{server.address}/api/{place}/{project}"
@@ -216,7 +204,7 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: 
     expect(aside).to_contain_text(str(server.data / "unknown" / project))
     picture(ann, "24-set-aside")
     aside.get_by_role("button", name="Leave it there").click()
-    expect(ann.locator(".toast", has_text="stays where it is")).to_be_visible()
+    wait_for_toast(ann, "stays where it is")
     aside.get_by_text("1 folder left in place").click()
     card = ann.locator(f".cards a[href='/p/{project}']")
     expect(card).to_have_count(0)
@@ -225,4 +213,3 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(browser: Browser, server: 
     expect(aside).to_be_hidden()
     card.click()
     ann.get_by_role("link", name="Run on 2 objects").wait_for()
-    context.close()
