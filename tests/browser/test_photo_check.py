@@ -3,29 +3,32 @@
 import re
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.app.nouns import finish
 from tests.app.test_photos import FILMED, drawer, store
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
-from tests.browser.test_together import pick, ready, sample, say
+from tests.browser.test_together import pick, ready, sample, say, viewed
 from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_object_fills_the_picture_and_its_comments_are_pins(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")
     number = segmented(page, project)
     page.goto(f"{project}/review?object={number}")
+    viewed(page)
     expect(page.get_by_role("button", name="Outline")).to_have_attribute("aria-pressed", "true")
     sheet = page.locator("r2c2r-photo-check .sheet")
     near = box_of(sheet)
-    page.get_by_role("button", name="Photo", exact=True).click()
+    photo = page.get_by_role("button", name="Photo", exact=True)
+    photo.click()
+    expect(photo).to_have_attribute("aria-pressed", "true")
     whole = box_of(sheet)
     room = box_of(page.locator("r2c2r-photo-check .pictures"))
     assert near["width"] > 2 * whole["width"]  # the drawer is a twelfth of the photo
@@ -45,16 +48,13 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(browser: Browser
     assert shown["x"] + shown["width"] / 2 == pytest.approx(at[0], abs=2)
     assert shown["y"] + shown["height"] / 2 == pytest.approx(at[1], abs=2)
     picture(page, f"photo-check-{theme}")
-    context.close()
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
-    browser: Browser, server: Server, theme: str
+    new_context: NewContext, server: Server, theme: str
 ) -> None:
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = sample(page)
     work = server.data / "projects" / project.split("/p/")[1] / "work"
@@ -121,18 +121,17 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
     page.goto(f"{project}/annotate?frame=3&object={number}")
     ready(page)
     expect(page.locator(".opening .state")).to_have_text("closed, set by a person")
-    context.close()
 
 
-def test_who_annotates_sees_marks_and_makes_none(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_who_annotates_sees_marks_and_makes_none(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     ann = signed_in(context, server, "ann")
     project = sample(ann)
     work = server.data / "projects" / project.split("/p/")[1] / "work"
     finish(work)
     store(work, drawer(FILMED), FILMED)
     segmented(ann, project)
-    other = browser.new_context(viewport={"width": 1280, "height": 720})
+    other = new_context()
     cleo = signed_in(other, server, "cleo")
     cleo.goto(f"{project}/review")
     cleo.get_by_role("button", name="Photos").click()
@@ -140,9 +139,7 @@ def test_who_annotates_sees_marks_and_makes_none(browser: Browser, server: Serve
     expect(cleo.get_by_role("slider", name="How far it stands open in this photo")).to_be_disabled()
     expect(cleo.locator("r2c2r-photo-check .hold")).to_have_count(0)
     cleo.keyboard.press("Shift+c")
-    expect(cleo.locator("r2c2r-toasts")).to_contain_text("you can comment")
-    context.close()
-    other.close()
+    wait_for_toast(cleo, "you can comment")
 
 
 def segmented(page: Page, project: str) -> str:

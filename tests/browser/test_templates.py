@@ -1,25 +1,26 @@
 """A project's names and categories are kept as a template, and taken over as what is still to be clicked."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
-from tests.browser.test_together import click_frame, pick, ready, rows, sample, say
+from tests.browser.test_together import click_frame, pick, ready, rows, sample, say, viewed
 from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_template_is_kept_changed_taken_over_and_clicked(browser: Browser, server: Server, theme: str) -> None:
-    how = {"viewport": {"width": 1280, "height": 720}, "color_scheme": theme, "bypass_csp": True}  # for axe
-    context = browser.new_context(**how)  # type: ignore[arg-type]
+def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme, bypass_csp=True)  # for axe
     page = signed_in(context, server, "ann")
     expect(page.get_by_label("Objects to click")).to_be_hidden()  # nobody made a template
     sample(page)
+    viewed(page)
     page.get_by_role("button", name="Keep this project's objects as a template…").press("Enter")
     expect(page.get_by_role("dialog")).to_contain_text("2 objects: names and categories, no clicks")
     say(page, "Keep", "Flat 3")
-    expect(page.locator(".toast", has_text="Flat 3 is a template")).to_be_visible()
+    wait_for_toast(page, "Flat 3 is a template")
 
     page.get_by_role("region", name="Objects to click").get_by_role("link", name="Templates").press("Enter")
     page.locator("summary", has_text="Flat 3").press("Enter")
@@ -89,4 +90,3 @@ def test_a_template_is_kept_changed_taken_over_and_clicked(browser: Browser, ser
     expect(todo).to_contain_text("Annotate offers them")
     page.get_by_label("Take the objects of").select_option("Flat 3 (4)")
     expect(todo).to_contain_text("4 of 4 are clicked.")
-    context.close()

@@ -2,31 +2,27 @@
 
 import json
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.app.nouns import finish
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_pages import serious
 from tests.browser.together import Server, signed_in
 
 FRAME = (160, 120)
-CLOSES_MS = 5000
 STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
 
 
 @pytest.fixture
-def people(browser: Browser, server: Server) -> Iterator[tuple[Page, Page]]:
+def people(new_context: NewContext, server: Server) -> tuple[Page, Page]:
     """A page of Ann's and one of Bea's, both signed in."""
-    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in range(2)]
+    contexts = [new_context() for _ in range(2)]
     pages = [signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True)]
-    yield pages[0], pages[1]
-    for context in contexts:
-        context.close()
+    return pages[0], pages[1]
 
 
 def sample(page: Page) -> str:
@@ -171,9 +167,11 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
 
     # to review, back, and to review again: reasons are asked for where something is unmet or refused
     ann.goto(f"{project}/review")
+    viewed(ann)
     move(ann, "Send to review", "the stand-in sees little")
     expect(bea.get_by_text("ready", exact=True)).to_be_visible()  # on the list of projects, by itself
     bea.goto(f"{project}/review")
+    viewed(bea)
     move(bea, "Start the review")
     move(bea, "Request changes", "answer the comment")
     expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
@@ -190,9 +188,9 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     bea.keyboard.press("l")
     expect(bea.get_by_label("Right (mm)")).to_have_value("5")  # by a key, shown over the photo and not stored yet
     bea.keyboard.press("Enter")
-    expect(bea.locator(".toast", has_text="drawer_1: place (0.005, 0.000, 0.000) m")).to_be_visible()
+    wait_for_toast(bea, "drawer_1: place (0.005, 0.000, 0.000) m")
     bea.keyboard.press("Control+z")
-    expect(bea.locator(".toast", has_text="Undone: drawer_1: place")).to_be_visible()
+    wait_for_toast(bea, "Undone: drawer_1: place")
     bea.context.set_offline(True)  # both judge one candidate, one of them without a connection
     bea.keyboard.press("y")
     expect(bea.locator(".banner")).to_contain_text("1 change not stored yet")
@@ -218,7 +216,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     say(ann, "Reject", "looks too small")
     expect(ann.get_by_role("button", name="Reject", exact=True).first).to_have_attribute("aria-pressed", "true")
     bea.context.set_offline(False)
-    expect(bea.locator(".toast", has_text="drawer_1 was reviewed meanwhile: ann, rejected c0")).to_be_visible()
+    wait_for_toast(bea, "drawer_1 was reviewed meanwhile: ann, rejected c0")
     expect(bea.get_by_role("button", name="Reject", exact=True).first).to_have_attribute("aria-pressed", "true")
     bea.keyboard.press("Control+z")  # now that she has seen it
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
@@ -230,8 +228,8 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     picture(bea, "18-approved")
 
 
-def test_a_tablet_reaches_everything_by_touch(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+def test_a_tablet_reaches_everything_by_touch(new_context: NewContext, server: Server) -> None:
+    context = new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
     ann = signed_in(context, server, "ann")
     ann.goto(f"{sample(ann)}/annotate?frame=3")
     ready(ann)
@@ -248,21 +246,22 @@ def test_a_tablet_reaches_everything_by_touch(browser: Browser, server: Server) 
     picture(ann, "19-tablet")
     drawer.get_by_role("button", name="Close").tap()
     expect(drawer).to_be_hidden()
-    lane = box_of(ann.get_by_role("img", name=re.compile("^drawer_2: seen")))
-    ann.touchscreen.tap(lane["x"] + lane["width"] - 3, lane["y"] + lane["height"] / 2)
+    lane = ann.get_by_role("img", name=re.compile("^drawer_2: seen"))
+    box = box_of(lane)
+    lane.tap(position={"x": box["width"] - 3, "y": box["height"] / 2})
     expect(ann.locator("r2c2r-film-strip output")).to_contain_text("frame 7 ")
-    context.close()
 
 
 def say(page: Page, button: str, text: str) -> None:
     dialog = page.get_by_role("dialog")
     dialog.get_by_role("textbox").fill(text)
-    answer = dialog.get_by_role("button", name=button, exact=True)
-    answer.click()
-    try:
-        expect(dialog).to_be_hidden(timeout=CLOSES_MS)
-    except AssertionError:  # seen once in eight, just as the 3D view's frame is attached: the click never reaches the dialog
-        answer.click()
+    dialog.get_by_role("button", name=button, exact=True).click()
+    expect(dialog).to_be_hidden()
+
+
+def viewed(page: Page) -> None:
+    """Wait until the 3D view is in its frame: a click just as that is attached reaches nothing."""
+    page.frame_locator("r2c2r-viewer iframe").locator("canvas").first.wait_for(state="attached")
 
 
 def move(page: Page, step: str, reason: str = "") -> None:
@@ -272,16 +271,16 @@ def move(page: Page, step: str, reason: str = "") -> None:
 
 
 def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_on_the_overview(
-    browser: Browser, server: Server
+    new_context: NewContext, server: Server
 ) -> None:
-    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True) for _ in range(2)]  # for axe
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     address = sample(ann)
     inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
     bea.goto(address)
     expect(bea.get_by_label("Assigned to")).to_have_value("")
     ann.get_by_label("Assigned to").select_option("bea")
-    expect(ann.locator(".toast", has_text="Assigned to bea")).to_be_visible()
+    wait_for_toast(ann, "Assigned to bea")
     expect(bea.get_by_label("Assigned to")).to_have_value("bea")  # by itself
     expect(inbox).to_have_text("Inbox 1")
 
@@ -325,5 +324,3 @@ def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_o
     bea.get_by_role("button", name="Resolve: one drawer or two, @bea").press("Enter")
     expect(bea.get_by_role("region", name="Comments that name you")).to_be_hidden()
     expect(inbox).to_have_text("Inbox 1")
-    for context in contexts:
-        context.close()
