@@ -2,30 +2,33 @@
 
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, TimeoutError, expect
 
 from app.viewer.assembly import Assembly, shapes_of
 from app.viewer.camera import USUAL_FOV, from_axis
 from r2c2r_core.export.plan import facing, plan_bundle
 from tests.app.finished import keep_results
 from tests.app.nouns import finish
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
-from tests.browser.test_together import sample, say
+from tests.browser.test_together import sample, say, viewed
 from tests.browser.together import Server, signed_in
 from tests.core.export.kitchen import kitchen
 from tests.core.export.test_report import certificate
+from tests.waiting import until
 
 ASK = """async ([method, path, body]) => {
   const options = { method, headers: { "content-type": "application/json", "x-requested-with": "r2c2r" } };
   const answer = await fetch(path, body === null ? options : { ...options, body: JSON.stringify(body) });
   return await answer.json();
 }"""
+HEARD_MS = 6000  # the page asks so long what a click was on
 CLICK = {"frame": 3, "x": 80, "y": 60, "label": 1}
 
 
@@ -52,16 +55,27 @@ def finished(page: Page, server: Server) -> str:
     page.goto(f"{project}/review")
     page.get_by_role("button", name="Scene", exact=True).click()
     expect(page.locator(".joints strong")).to_contain_text("joint")
+    viewed(page)
     return project
 
 
-def from_front(page: Page, name: str) -> tuple[float, float]:
-    """Where the middle of an object's front face is on the screen, looked at from the front."""
+def front_camera() -> tuple[np.ndarray, np.ndarray]:
+    """Where the camera stands that looks from the front, and what it looks at."""
     plan = plan_bundle(kitchen())
     shown = Assembly(None, plan, {body.name: list(shapes_of(body.link, "meshes")) for body in plan.bodies})
     ahead = facing(plan)
     assert ahead is not None
-    place, target = from_axis("front", ahead, *shown.bounds)
+    return from_axis("front", ahead, *shown.bounds)
+
+
+def stands_in_front(page: Page) -> bool:
+    camera = ask(page, "GET", f"/api/projects/{page.url.split('/p/')[1].split('/')[0]}/viewer/camera")
+    return np.allclose(camera["position"], front_camera()[0], atol=0.01)
+
+
+def from_front(page: Page, name: str) -> tuple[float, float]:
+    """Where the middle of an object's front face is on the screen, looked at from the front."""
+    place, target = front_camera()
     depth = (target - place) / np.linalg.norm(target - place)
     right = np.cross(depth, [0.0, 0.0, 1.0])
     item = next(item for item in kitchen().objects if item.name == name)
@@ -74,11 +88,12 @@ def from_front(page: Page, name: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_click_in_the_scene_chooses_and_the_scene_stays(browser: Browser, server: Server, theme: Any) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme=theme)
+def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContext, server: Server, theme: Any) -> None:
+    context = new_context(color_scheme=theme)
     page = signed_in(context, server, "ann")
     finished(page, server)
     page.keyboard.press("6")
+    until(lambda: stands_in_front(page), "the view was not turned to the front")
     scene = page.get_by_role("button", name="Scene", exact=True)
     for name in ("cabinet_1", "double_1", "counter_1"):
         chosen = page.locator(".review nav button[aria-pressed=true]")
@@ -90,26 +105,27 @@ def test_a_click_in_the_scene_chooses_and_the_scene_stays(browser: Browser, serv
     page.get_by_role("button", name="Hide bottle_1 in the scene").click()
     expect(page.get_by_role("button", name="Show bottle_1 in the scene")).to_be_visible()
     page.get_by_label("What is drawn of the scene").select_option("both")
-    page.wait_for_timeout(1500)
-    picture(page, f"scene-tools-{theme}")
-    context.close()
+    picture(page, f"scene-tools-{theme}", still=True)
 
 
 def clicked(page: Page, name: str) -> Any:
-    """Click the object until the list says that it is chosen: the view turns when it can."""
+    """Click the object until the list says that it is chosen: the view hears clicks once it has drawn itself."""
     chosen = page.locator(".review nav button[aria-pressed=true]", has_text=name)
-    for _ in range(80):  # a busy machine takes its time to draw the first view
+
+    def heard() -> bool:
         page.mouse.click(*from_front(page, name))
-        page.wait_for_timeout(1500)
-        if chosen.count():
-            break
+        with suppress(TimeoutError):
+            chosen.first.wait_for(timeout=HEARD_MS)
+        return chosen.count() > 0
+
+    until(heard, f"no click chose {name}")
     return chosen
 
 
 def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_marked_stale(
-    browser: Browser, server: Server
+    new_context: NewContext, server: Server
 ) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
     page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
@@ -121,11 +137,10 @@ def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_ma
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was made anew
-    context.close()
 
 
-def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     finished(page, server)
     made = page.locator(".review nav section", has_text="Made from the scan")
@@ -140,19 +155,18 @@ def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(browser
     expect(made.get_by_role("button", name="Bring back counter_1")).to_be_visible()
     made.get_by_role("button", name="Bring back counter_1").click()
     expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
-    context.close()
 
 
 def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_ones_own(
-    browser: Browser, server: Server
+    new_context: NewContext, server: Server
 ) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
     page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
     page.get_by_text("Correct it").click()
     page.get_by_label("Hinge of cabinet_1").select_option("right")
-    expect(page.locator(".toast", has_text="cabinet_1: hinge right")).to_be_visible()
+    wait_for_toast(page, "cabinet_1: hinge right")
     nav = page.locator(".review nav")
     page.keyboard.press("/")
     nav.get_by_role("button", name="double_1", exact=True).click(modifiers=["ControlOrMeta"])
@@ -160,7 +174,7 @@ def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_on
     expect(chosen).to_contain_text("2 objects selected")
     picture(page, "copy")
     chosen.get_by_role("button", name="Copy hinge of cabinet_1").click()
-    expect(page.locator(".toast", has_text="Copied hinge to double_1")).to_be_visible()
+    wait_for_toast(page, "Copied hinge to double_1")
     chosen.get_by_role("button", name="None").click()
     expect(chosen).to_be_hidden()
     page.get_by_label("Order").select_option("risk")
@@ -174,10 +188,10 @@ def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_on
     page.get_by_label("Order").select_option("")
     nav.get_by_role("button", name="cabinet_1", exact=True).click()
     page.get_by_label("How cabinet_1 opens").select_option("drawer")
-    expect(page.locator(".toast", has_text="cabinet_1: built as drawer")).to_be_visible()
+    wait_for_toast(page, "cabinet_1: built as drawer")
     page.get_by_label("Category of cabinet_1").fill("spice_rack")
     page.get_by_label("Category of cabinet_1").press("Enter")
-    expect(page.locator(".toast", has_text="cabinet_1 is a spice_rack from the next run on")).to_be_visible()
+    wait_for_toast(page, "cabinet_1 is a spice_rack from the next run on")
     name = project.split("/p/")[1]
     objects = {one["name"]: one for one in ask(page, "GET", f"/api/projects/{name}/objects")}
     assert objects["cabinet_1"]["category"] == "spice_rack"
@@ -185,13 +199,12 @@ def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_on
     assert override["built_as"] == "drawer"
     copied = ask(page, "GET", f"/api/projects/{name}/objects/{objects['double_1']['id']}/override")
     assert (copied["hinge"], copied["built_as"], copied["dimensions_m"]) == ("right", None, None)
-    context.close()
 
 
 def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_the_view(
-    browser: Browser, server: Server
+    new_context: NewContext, server: Server
 ) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context = new_context()
     page = signed_in(context, server, "ann")
     finished(page, server)
     page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
@@ -203,6 +216,7 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     left = section.get_by_label("Width from the left")
     left.press("ArrowRight")
     expect(section.locator("output").nth(0)).not_to_have_text(narrow)
+    expect(left).to_be_focused()  # the next key moves it on, though the view has answered
     page.get_by_label("What is drawn of the scene").select_option("unobserved")
     expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
     picture(page, "section")
@@ -223,11 +237,10 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     page.get_by_label("Look from").select_option("run")
     page.keyboard.press("z")
     expect(section).to_be_hidden()
-    context.close()
 
 
-def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
     (server.data / "projects" / project.split("/p/")[1] / "behave.json").unlink()
@@ -261,4 +274,3 @@ def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(browser: Br
     warning.get_by_role("button", name=re.compile(r"Multiply every length by 1\.010\d")).click()
     expect(card).to_contain_text("Every length is multiplied by 1.010")
     expect(card.get_by_role("button", name="Read lengths as recorded")).to_be_visible()
-    context.close()
