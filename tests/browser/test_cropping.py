@@ -1,12 +1,13 @@
 """A thing's crop box: begun around its points, a side dragged and one moved by keys, in prompts.json, undone, taken away."""
 
+from contextlib import AbstractContextManager
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.app.nouns import finish
-from tests.browser.serving import box_of
+from tests.browser.serving import NewContext, box_of
 from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
@@ -22,9 +23,15 @@ def crop(page: Page) -> dict[str, Any] | None:
     return box
 
 
+def changed(page: Page) -> AbstractContextManager[object]:
+    """Wait until the server has taken the change that is made meanwhile."""
+    return page.expect_response(lambda answer: answer.request.method == "PATCH" and answer.ok)
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_crop_box_is_dragged_typed_undone_and_taken_away(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light")
+def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme)
+    context.clock.install()
     page = signed_in(context, server, "ann")
     project = sample(page).split("/p/")[1]
     finish(server.data / "projects" / project / "work")  # cameras and depth, as a reading leaves them
@@ -43,7 +50,8 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(browser: Browser, ser
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 60, y, steps=5)
-    page.mouse.up()
+    with changed(page):
+        page.mouse.up()
     wider = int(right.get_attribute("aria-valuenow") or 0)
     assert wider > before
     dragged = crop(page)
@@ -53,10 +61,12 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(browser: Browser, ser
     top = page.get_by_role("slider", name="Top of the crop box")
     tall = int(top.get_attribute("aria-valuenow") or 0)
     top.focus()
+    context.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)
     page.keyboard.press("Shift+ArrowUp")
-    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowUp")  # one after the other they are one change, however slow the machine is
     expect(top).to_have_attribute("aria-valuenow", str(tall + 11))
-    page.wait_for_timeout(500)  # keys pressed one after the other are one change
+    with changed(page):
+        context.clock.resume()
     typed = crop(page)
     assert typed is not None
     assert typed != dragged
@@ -65,7 +75,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(browser: Browser, ser
     assert crop(page) == dragged
     page.keyboard.press("Escape")
     expect(sides).to_have_count(0)
-    page.get_by_role("button", name="Take it away").click()
+    with changed(page):
+        page.get_by_role("button", name="Take it away").click()
     expect(page.get_by_role("button", name="Take it away")).to_have_count(0)
     assert crop(page) is None
-    context.close()

@@ -1,11 +1,13 @@
 """Two names clicked on one panel show a mask each, and the page says whose front gave way; taken back, it is whole again."""
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
+from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, on_canvas, sample
 from tests.browser.together import Server, signed_in
+from tests.waiting import until
 
 LEFT, RIGHT, BESIDE = (15, 30), (65, 30), (120, 30)  # on the panel's halves and off it
 PIXEL = """(canvas, at) => {
@@ -28,15 +30,15 @@ def alike(page: Page, one: tuple[float, float], other: tuple[float, float]) -> b
 
 def until_drawn(page: Page, *, whole: bool) -> None:
     """Wait until the panel has masks, of one object or of two."""
-    for _ in range(600):
-        if not alike(page, LEFT, BESIDE) and not alike(page, RIGHT, BESIDE) and alike(page, LEFT, RIGHT) is whole:
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError("not drawn")
+
+    def is_drawn() -> bool:
+        return not alike(page, LEFT, BESIDE) and not alike(page, RIGHT, BESIDE) and alike(page, LEFT, RIGHT) is whole
+
+    until(is_drawn, "not drawn")
 
 
-def test_two_names_on_one_panel_show_two_masks(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_two_names_on_one_panel_show_two_masks(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -46,12 +48,10 @@ def test_two_names_on_one_panel_show_two_masks(browser: Browser, server: Server)
     until_drawn(page, whole=True)
     page.get_by_role("button", name="New object").click()
     click_frame(page, 60, 60)
-    toasts = page.get_by_role("status").filter(has_text="drawer_2")
-    expect(toasts).to_contain_text("drawer_2 gave way at the seam to drawer_3")
+    wait_for_toast(page, "drawer_2 gave way at the seam to drawer_3")
     until_drawn(page, whole=False)
     picture(page, "disputes-two")
     page.get_by_role("button", name="Delete drawer_3").click()
-    expect(toasts).to_contain_text("drawer_2 has its whole front again")
+    wait_for_toast(page, "drawer_2 has its whole front again")
     until_drawn(page, whole=True)
     picture(page, "disputes-whole")
-    context.close()

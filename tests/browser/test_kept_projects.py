@@ -1,8 +1,9 @@
 """Projects are tagged, archived, duplicated and deleted from their list, and each of these is undone there."""
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_pages import serious
@@ -11,10 +12,8 @@ from tests.browser.together import Server, signed_in
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_that_is_put_away_is_lost(browser: Browser, server: Server, theme: str) -> None:
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="dark" if theme == "dark" else "light", bypass_csp=True
-    )
+def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Server, theme: str) -> None:
+    context = new_context(color_scheme=theme, bypass_csp=True)
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic"):
         post(page, "/api/projects/sample", {"name": name})
@@ -44,14 +43,15 @@ def test_nothing_that_is_put_away_is_lost(browser: Browser, server: Server, them
     assert serious(page, "projects") == []
 
     page.get_by_role("button", name="Delete: Cellar", exact=True).click()
+    deleted = page.locator(".toast", has_text="in the trash")
+    deleted.hover()  # from under the mouse it does not go
     expect(names).to_have_count(2)
     page.get_by_label("Which projects").select_option("Trash")
     expect(page.locator(".trash-list > li")).to_contain_text(["deleted by ann"])
     expect(page.locator(".trash-list > li")).to_contain_text(["2 objects"])
     picture(page, f"projects-trash-{theme}")
     assert serious(page, "trash") == []
-    page.locator(".toast", has_text="in the trash").get_by_role("button", name="Undo").click()
+    deleted.get_by_role("button", name="Undo").click()
     expect(page.get_by_text("The trash is empty.")).to_be_visible()
     page.get_by_label("Which projects").select_option("In work")
     expect(names).to_have_count(3)
-    context.close()

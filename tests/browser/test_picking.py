@@ -1,11 +1,12 @@
 """A click on a mask chooses its object instead of making a second one there; Space held moves the picture."""
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Locator, expect
 
-from tests.browser.serving import box_of
+from tests.browser.serving import STEADY, NewContext, box_of, wait_for_toast
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, on_canvas, ready, rows, sample
 from tests.browser.together import Server, signed_in
+from tests.waiting import until
 
 PIXELS = """(canvas) => {
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -13,8 +14,22 @@ PIXELS = """(canvas) => {
 }"""
 
 
-def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_for(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def pixels(canvas: Locator) -> int:
+    """A sum of what is drawn, once it stays so: a picture and its masks come one after the other."""
+    seen: list[int] = []
+
+    def stays() -> bool:
+        seen.append(canvas.evaluate(PIXELS))
+        return len(seen) >= STEADY and len(set(seen[-STEADY:])) == 1
+
+    until(stays)
+    return seen[-1]
+
+
+def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_for(
+    new_context: NewContext, server: Server
+) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -28,7 +43,7 @@ def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_fo
     expect(row).to_have_count(0)
 
     click_frame(page, 103, 42)
-    expect(page.locator(".toast", has_text="drawer_2 is chosen")).to_be_visible()
+    wait_for_toast(page, "drawer_2 is chosen")
     expect(row).to_contain_text("drawer_2")
     expect(rows(page)).to_have_count(3)
     picture(page, "picking")
@@ -38,21 +53,22 @@ def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_fo
     page.keyboard.press("Enter")
     page.locator("r2c2r-frame-canvas canvas").click(position=on_canvas(page, 98, 38), modifiers=["Control"])  # type: ignore[arg-type]
     expect(rows(page)).to_have_count(4)
-    context.close()
 
 
-def test_space_held_moves_the_picture_and_tapped_plays(browser: Browser, server: Server) -> None:
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+def test_space_held_moves_the_picture_and_tapped_plays(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
     ready(page)
-    count = rows(page).count()
-    page.keyboard.press("Home")
+    expect(rows(page)).to_have_count(2)
     counter = page.locator("r2c2r-film-strip output")
+    expect(counter).to_contain_text("frame")
+    page.keyboard.press("Home")
+    expect(counter).to_contain_text(" 1 of ")
     first = counter.inner_text()
     canvas = page.locator("r2c2r-frame-canvas canvas").first
-    before = canvas.evaluate(PIXELS)
+    before = pixels(canvas)
     start, end = on_canvas(page, 40, 60), on_canvas(page, 90, 90)
     box = box_of(canvas)
     page.mouse.move(box["x"] + start["x"], box["y"] + start["y"])
@@ -61,10 +77,9 @@ def test_space_held_moves_the_picture_and_tapped_plays(browser: Browser, server:
     page.mouse.move(box["x"] + end["x"], box["y"] + end["y"], steps=4)
     page.mouse.up()
     page.keyboard.up("Space")
-    page.wait_for_timeout(400)
-    assert canvas.evaluate(PIXELS) != before
-    assert counter.inner_text() == first  # nothing plays
-    assert rows(page).count() == count  # and no box was drawn
+    until(lambda: pixels(canvas) != before, "the picture did not move")
+    expect(page.get_by_role("button", name="Play or pause")).not_to_have_attribute("aria-pressed", "true")
+    expect(counter).to_have_text(first)  # nothing plays
+    expect(rows(page)).to_have_count(2)  # and no box was drawn
     page.keyboard.press("Space")
     expect(counter).not_to_have_text(first)
-    context.close()

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.review import review_html
+from tests.browser.serving import NewContext
 from tests.core.export.kitchen import kitchen
 from tests.core.export.test_report import certificate
+from tests.waiting import until
 
 
 def shot(page: Page) -> np.ndarray:
@@ -21,20 +23,20 @@ def shot(page: Page) -> np.ndarray:
 
 def shot_when(page: Page, shows: Callable[[np.ndarray], bool]) -> np.ndarray:
     """The view, once it shows that and two looks in a row are alike: a software GL draws when it can."""
-    before = shot(page)
-    for _ in range(120):
-        page.wait_for_timeout(250)
-        seen = shot(page)
-        if shows(seen) and np.array_equal(seen, before):
-            return seen
-        before = seen
-    raise AssertionError("the view never showed it")
+    seen = [shot(page)]
+
+    def still() -> bool:
+        seen.append(shot(page))
+        return shows(seen[-1]) and np.array_equal(seen[-1], seen[-2])
+
+    until(still, "the view never showed it")
+    return seen[-1]
 
 
-def test_the_page_draws_the_scene_and_opens_a_door_without_a_server(browser: Browser, tmp_path: Path) -> None:
+def test_the_page_draws_the_scene_and_opens_a_door_without_a_server(new_context: NewContext, tmp_path: Path) -> None:
     file = tmp_path / "review.html"
     file.write_text(review_html(plan_bundle(kitchen()), certificate(), np.array([0.0, -3.0, 1.5])), encoding="utf-8")
-    page = browser.new_page(viewport={"width": 900, "height": 600})
+    page = new_context(viewport={"width": 900, "height": 600}).new_page()
     thrown: list[str] = []
     page.on("pageerror", lambda error: thrown.append(str(error)))
     page.goto(file.as_uri())
@@ -44,4 +46,3 @@ def test_the_page_draws_the_scene_and_opens_a_door_without_a_server(browser: Bro
     page.get_by_role("button", name="Close all").click()
     expect(page.locator("output").first).to_have_text("0°")
     assert thrown == []
-    page.close()

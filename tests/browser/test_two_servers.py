@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 from app.db.engine import opened
 from app.services import accounts
 from tests.app import postgres
+from tests.browser.serving import NewContext
 from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import PASSWORD, PEOPLE, Server, free_port, signed_in
@@ -36,18 +37,18 @@ def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Serve
             yield a, b
 
 
-def test_two_people_at_two_servers_work_on_one_project(browser: Browser, two: tuple[Server, Server]) -> None:
+def test_two_people_at_two_servers_work_on_one_project(new_context: NewContext, two: tuple[Server, Server]) -> None:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
-    contexts = [browser.new_context(viewport={"width": 1280, "height": 720}) for _ in two]
+    contexts = [new_context() for _ in two]
     ann, bea = (signed_in(*given) for given in zip(contexts, two, ("ann", "bea"), strict=True))
     path = sample(ann).removeprefix(two[0].address)
     ann.goto(f"{two[0].address}{path}/annotate")
     bea.goto(f"{two[1].address}{path}/annotate")
     expect(ann.locator("r2c2r-presence .chip")).to_contain_text("bea")
     expect(bea.locator("r2c2r-presence .chip")).to_contain_text("ann")
-    before = rows(bea).count()
+    expect(rows(bea)).to_have_count(2)
     click_frame(ann, 40, 60)
-    expect(rows(bea)).to_have_count(before + 1)
+    expect(rows(bea)).to_have_count(3)
     expect(rows(bea).last).to_contain_text(re.compile("3 frames|3 of"))
     picture(bea, "26-two-servers")
     bea.goto(f"{two[1].address}{path}/run")
@@ -58,5 +59,3 @@ def test_two_people_at_two_servers_work_on_one_project(browser: Browser, two: tu
     two[0].kill()
     expect(bea.locator("r2c2r-presence .chip")).to_have_count(0)  # she is there no more
     two[0].start()
-    for context in contexts:
-        context.close()
