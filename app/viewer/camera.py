@@ -14,6 +14,7 @@ AXES: tuple[Axis, ...] = get_args(Axis)
 USUAL_FOV = np.radians(75.0)  # viser's field of view, upright
 LONG_FOV = np.radians(3.0)  # viser has no orthographic camera: from this far off nothing looks smaller for being behind
 _REMEMBERED = 32  # turns that may come while a page opens
+_UNDRAWN = (-5.0, 0.0, 0.0)  # where three.js puts a camera: so a slow page says before it has drawn anything
 _NEAR_M = {USUAL_FOV: 0.01, LONG_FOV: 2.0}  # the long lens stands some 80 m off, where 1 cm of near plane is 0.1 m of depth
 
 
@@ -32,11 +33,12 @@ class Lens:
     def meet(self, client: Any) -> None:
         """Turn the camera of a page that was told where to stand before it was turned: viser moves only pages it knows.
 
-        Such a page is known by where it stands: a person's own place, after a lost connection, is none of the earlier ones.
+        Such a page is known by where it stands, at one of the earlier places or where it began before it drew anything: a
+        person's own place, after a lost connection, is none of them.
         """
         with self._turning:
             place = np.asarray(client.camera.position)
-            if any(np.allclose(place, earlier, atol=1e-3) for earlier in self._left):
+            if any(np.allclose(place, earlier, atol=1e-3) for earlier in (_UNDRAWN, *self._left)):
                 first = self.server.initial_camera
                 _turn(client.camera, tuple(first.position), tuple(first.look_at), self.fov)
 

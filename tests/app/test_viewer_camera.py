@@ -82,6 +82,9 @@ def test_a_page_that_opened_while_the_camera_was_turned_is_turned_too(view: View
     meet = server.on_client_connect.call_args.args[0]
     meet(SimpleNamespace(camera=late))
     assert late.position == server.initial_camera.position
+    late.position = (-5.0, 0.0, 0.0)  # it has drawn nothing: three.js's own place, with z upwards
+    meet(SimpleNamespace(camera=late))
+    assert late.position == server.initial_camera.position
     late.position = MOVED  # a person's own place after a lost connection
     meet(SimpleNamespace(camera=late))
     assert late.position == MOVED
