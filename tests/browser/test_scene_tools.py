@@ -70,7 +70,7 @@ def front_camera() -> tuple[np.ndarray, np.ndarray]:
 
 def stands_in_front(page: Page) -> bool:
     camera = ask(page, "GET", f"/api/projects/{page.url.split('/p/')[1].split('/')[0]}/viewer/camera")
-    return np.allclose(camera["position"], front_camera()[0], atol=0.01)
+    return "position" in camera and np.allclose(camera["position"], front_camera()[0], atol=0.01)
 
 
 def from_front(page: Page, name: str) -> tuple[float, float]:
