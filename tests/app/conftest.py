@@ -191,13 +191,10 @@ def _note_where_asked(connection: Connection) -> None:
         ASKED_ON_THE_LOOP.append((connection.engine.url, "".join(traceback.format_stack(limit=12))))
 
 
-ONE_APP = frozenset({"shared", "made"})  # of a module: what they start serves all of its tests, from a file
-
-
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """What starts the app runs with both databases, unless it chooses its own."""
+    """Tests that start the app run on SQLite, and on Postgres too where its outcome could differ."""
     starts = "start" in metafunc.fixturenames or hasattr(metafunc.module, "running")
-    if starts and not ONE_APP.intersection(metafunc.fixturenames) and not any(metafunc.definition.iter_markers("own_database")):
+    if starts and any(metafunc.definition.iter_markers("both_databases")):
         metafunc.parametrize("rows_in", ["sqlite", "postgres"], indirect=True)
 
 

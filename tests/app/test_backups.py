@@ -18,7 +18,6 @@ from r2c2r_core.cli import main
 from tests.app.conftest import Running
 
 Start = Callable[..., Any]
-pytestmark = pytest.mark.own_database
 
 
 @pytest.fixture

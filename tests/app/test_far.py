@@ -16,8 +16,6 @@ from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
 from tests.app.test_live import CLICK, listening, until
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

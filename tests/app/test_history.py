@@ -6,6 +6,7 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
+import pytest
 from alembic.config import Config
 from sqlmodel import Session, create_engine, select
 
@@ -17,6 +18,9 @@ from app.db.tables import Bundle, Event, Project, SceneObject
 from app.settings import shipped
 from r2c2r_core.workspace import content_key
 from tests.app.conftest import Running
+
+pytestmark = pytest.mark.both_databases
+
 
 OLD = "0010"  # the last revision that kept whole states
 

@@ -153,7 +153,6 @@ def test_another_sites_page_makes_no_change_in_the_name_of_who_the_proxy_knows(w
         ("R2C2R_TRUSTED_PROXIES", "proxy.example", "R2C2R_TRUSTED_PROXIES proxy.example"),
     ],
 )
-@pytest.mark.own_database
 def test_a_setting_by_which_nobody_could_be_believed_is_said_before_anything_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str, value: str, said: str
 ) -> None:

@@ -22,6 +22,9 @@ from app.settings import Settings
 from tests.app.conftest import Running
 from tests.waiting import PATIENCE_S
 
+pytestmark = pytest.mark.both_databases
+
+
 STAGES = ["segment", "generate", "align", "synthesize", "warp", "export"]
 
 

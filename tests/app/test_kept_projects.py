@@ -4,7 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.app.conftest import Running
+
+pytestmark = pytest.mark.both_databases
 
 
 def clicks(web: Running, project: str) -> list[tuple[str, list[tuple[float, float]]]]:

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from sqlmodel import select
 
 from app.db.engine import opened, reading
@@ -19,7 +18,6 @@ from tests.app.test_deploy import caddy, free_port
 from tests.app.test_oidc import Identities, provider  # noqa: F401  # a fixture
 from tests.waiting import PATIENCE_S
 
-pytestmark = pytest.mark.own_database
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "lab.md"
 

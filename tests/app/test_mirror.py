@@ -15,7 +15,6 @@ from app.store.objects import Objects, open_objects
 from r2c2r_core.errors import InputError
 from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
 
-pytestmark = pytest.mark.own_database
 LONG = timedelta(days=1)
 
 if not REQUIRED:

@@ -16,8 +16,6 @@ from tests.app.conftest import running
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import run
 
-pytestmark = pytest.mark.own_database
-
 
 @pytest.fixture
 def worked_on(tmp_path: Path) -> Path:

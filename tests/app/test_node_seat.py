@@ -18,7 +18,6 @@ from app.store.opening import open_store
 from tests.app.object_server import REQUIRED
 from tests.waiting import PATIENCE_S, until
 
-pytestmark = pytest.mark.own_database
 SAYS = """
 import json, pathlib, sys
 print("not JSON", flush=True)

@@ -116,7 +116,6 @@ def test_the_sign_in_page_has_the_button_where_there_is_a_provider(web: Running,
     assert "&lt;b&gt;" in browser(web).get("/login").text
 
 
-@pytest.mark.own_database
 def test_without_a_provider_there_is_neither_button_nor_way(start: Callable[..., Any]) -> None:
     with start(accounts_only=True) as web:
         stranger = browser(web)
@@ -270,14 +269,12 @@ def test_the_provider_is_asked_again_after_a_day_and_a_password_is_not(
     assert (ann.get("/api/projects").status_code, bob.get("/api/projects").status_code) == (401, 200)
 
 
-@pytest.mark.own_database
 def test_a_provider_that_does_not_answer_is_said_on_the_page(start: Callable[..., Any], provider: Identities) -> None:
     with start(**asking(provider, identity="oidc:http://127.0.0.1:9")) as web:
         answer = browser(web).get("/login/provider", follow_redirects=False)
         assert (answer.status_code, "http://127.0.0.1:9 does not answer" in answer.text) == (503, True)
 
 
-@pytest.mark.own_database
 def test_a_provider_that_calls_itself_otherwise_is_not_asked(start: Callable[..., Any], provider: Identities) -> None:
     with start(**asking(provider, identity=f"oidc:{provider.issuer.replace('127.0.0.1', 'localhost')}")) as web:
         web.context.provider._app._server_metadata_url = f"{provider.issuer}/.well-known/openid-configuration"
@@ -285,14 +282,12 @@ def test_a_provider_that_calls_itself_otherwise_is_not_asked(start: Callable[...
         assert (answer.status_code, "calls itself" in answer.text) == (503, True)
 
 
-@pytest.mark.own_database
 @pytest.mark.parametrize("text", ["lab", "=admin", "lab=owner"])
 def test_groups_without_a_role_are_said(text: str) -> None:
     with pytest.raises(InputError):
         roles_of_groups(text)
 
 
-@pytest.mark.own_database
 @pytest.mark.parametrize(
     "issuer", ["", "http://id.lab.example", "https://", "ftp://id.lab.example", "https://id.lab.example?x"]
 )
@@ -302,7 +297,6 @@ def test_an_issuer_without_tls_is_none(tmp_path: Path, monkeypatch: pytest.Monke
         serve(host="127.0.0.1", port=0, data_dir=tmp_path / "data")
 
 
-@pytest.mark.own_database
 def test_a_provider_to_which_this_server_is_nobody_is_said_before_anything_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -37,6 +37,9 @@ from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
 from tests.app.test_uploads import begin, send
 
+pytestmark = pytest.mark.both_databases
+
+
 CLICK = {"frame": 3, "x": 20.0, "y": 20.0, "label": 1}
 
 

@@ -33,7 +33,6 @@ def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypat
     engine.dispose()
 
 
-@pytest.mark.own_database
 def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project, digest = web.sample(), outcomes._sha256
     looked: list[Path] = []

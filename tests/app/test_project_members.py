@@ -14,6 +14,9 @@ from app.services import accounts
 from app.viewer.client import Opened
 from tests.app.conftest import ORIGIN, SOCKETS, Running, running
 
+pytestmark = pytest.mark.both_databases
+
+
 PASSWORD = "correct horse battery"
 PEOPLE = {"alice": "annotator", "bob": "reviewer", "carol": "reviewer", "root": "admin"}
 

@@ -1,9 +1,14 @@
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from app.db import queries
 from app.db.engine import writing
 from tests.app.conftest import Running
+
+pytestmark = pytest.mark.both_databases
+
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
 

@@ -16,6 +16,9 @@ from app.settings import Quotas, quotas_from
 from r2c2r_core.errors import InputError
 from tests.app.conftest import ORIGIN, Running, running
 
+pytestmark = pytest.mark.both_databases
+
+
 PASSWORD = "correct horse battery"
 
 

@@ -19,8 +19,6 @@ from tests.app.test_jobs import behave, run
 from tests.app.test_sharing import FREE, NAMES, SHARED, held, stored
 from tests.waiting import PATIENCE_S
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

@@ -25,6 +25,9 @@ from tests.app.conftest import Running, statements
 from tests.app.nouns import candidates, finish, placement
 from tests.app.test_jobs import run
 
+pytestmark = pytest.mark.both_databases
+
+
 OBJECTS, CLICKS = 40, 12  # more of each than there were
 MOST_BYTES = 40_000  # on the wire, at that size: 300 kB at 200 objects and 5,000 clicks
 

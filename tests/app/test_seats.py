@@ -23,8 +23,6 @@ from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
 from tests.app.test_sharing import held
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

@@ -24,8 +24,6 @@ from tests.app.conftest import running
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import behave, run
 
-pytestmark = pytest.mark.own_database
-
 
 @pytest.fixture
 def engine(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[Engine]:

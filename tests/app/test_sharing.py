@@ -261,7 +261,6 @@ def held_at(web: Running, one: subprocess.Popen[bytes], two: subprocess.Popen[by
     return job, at
 
 
-@pytest.mark.own_database
 def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Running, tmp_path: Path) -> None:
     with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
         job, folders = held_at(served, one, two)
@@ -284,7 +283,6 @@ def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Runnin
     assert sorted(nouns) == sorted(f"nouns/{stage}/{name}.noun" for stage in SHARED for name in NAMES)
 
 
-@pytest.mark.own_database
 def test_a_job_that_is_cancelled_where_pages_are_served_stops_at_every_machine(served: Running, tmp_path: Path) -> None:
     with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
         job, folders = held_at(served, one, two)

@@ -13,8 +13,6 @@ from r2c2r_core.errors import InputError
 from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
 from tests.app.test_deploy import free_port
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

@@ -16,8 +16,6 @@ from tests.app.postgres import PostgresServer
 from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

@@ -8,7 +8,6 @@ import pytest
 from tests.app.object_server import object_server
 from tests.app.postgres import PostgresServer
 
-pytestmark = pytest.mark.own_database
 ROOT = Path(__file__).resolve().parents[2]
 
 

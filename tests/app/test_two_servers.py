@@ -22,8 +22,6 @@ from tests.app.test_jobs import run
 from tests.app.test_live import CLICK, listening, until
 from tests.waiting import PATIENCE_S
 
-pytestmark = pytest.mark.own_database
-
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
 

@@ -85,7 +85,6 @@ def lose(data: Path) -> None:
         path.unlink()
 
 
-@pytest.mark.own_database
 def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -104,7 +103,6 @@ def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tm
         assert [item["name"] for item in web.get(f"{base}/objects")] == ["drawer_1", "mug_1"]
 
 
-@pytest.mark.own_database
 def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -140,7 +138,6 @@ def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted
         assert web.get("/api/unknown") == []
 
 
-@pytest.mark.own_database
 def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
 
@@ -222,7 +219,6 @@ def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_
     assert {path.name for path in folder.iterdir()} == {"project"}
 
 
-@pytest.mark.own_database
 def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
@@ -249,7 +245,6 @@ def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told
         assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [1]
 
 
-@pytest.mark.own_database
 def test_a_recording_that_was_never_read_is_read_after_it_is_adopted(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
