@@ -13,6 +13,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
+PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))
+LONGEST_S = 900 * PATIENCE  # a test, its fixtures included
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 WITHOUT_BROWSER = ("-m", "not browser", "-n", "2", "--dist", "loadfile")
 WITH_BROWSER = ("-m", "browser", "-n", "0")  # a test is a server, a segmenter and a Chromium: two cores have work enough
@@ -62,7 +64,7 @@ def run_pytest(*arguments: str) -> tuple[int, dict[str, str]]:
     """Exit code of one pytest run, and the report of each test that failed by its node id."""
     path = BUILD / "failures.jsonl"
     path.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", *arguments]
+    command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", f"--timeout={LONGEST_S}", *arguments]
     code = subprocess.call(command, cwd=ROOT)
     lines = path.read_text().splitlines() if path.exists() else []
     return code, {line["test"]: line["report"] for line in map(json.loads, lines)}
