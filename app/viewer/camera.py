@@ -14,7 +14,7 @@ AXES: tuple[Axis, ...] = get_args(Axis)
 USUAL_FOV = np.radians(75.0)  # viser's field of view, upright
 LONG_FOV = np.radians(3.0)  # viser has no orthographic camera: from this far off nothing looks smaller for being behind
 _REMEMBERED = 32  # turns that may come while a page opens
-_UNDRAWN = (-5.0, 0.0, 0.0)  # where three.js puts a camera: so a slow page says before it has drawn anything
+_UNDRAWN: Vector3 = np.array([-5.0, 0.0, 0.0])  # where three.js puts a camera: so a slow page says before it has drawn anything
 _NEAR_M = {USUAL_FOV: 0.01, LONG_FOV: 2.0}  # the long lens stands some 80 m off, where 1 cm of near plane is 0.1 m of depth
 
 
