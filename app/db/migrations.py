@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from alembic.config import Config
@@ -36,6 +37,8 @@ def _migrate_server(engine: Engine, revision: str) -> None:
         if now is not None and now not in known:
             found = f"revision {now}, where this r2c2r knows {known[0]} to {known[-1]}"
             raise DatabaseUnusable(f"{shown(engine.url)}: {found}", hint="use the r2c2r that made it")
+        if _is_newest(now, revision):
+            return
         config.attributes["connection"] = connection
         command.upgrade(config, revision)
 
@@ -44,6 +47,8 @@ def _migrate_file(engine: Engine, revision: str) -> None:
     config = _config()
     with engine.begin() as connection:
         now = MigrationContext.configure(connection).get_current_revision()
+    if _is_newest(now, revision):
+        return
     if now not in (None, revisions()[-1]):
         _keep_copy(Path(engine.url.database or ""), str(now))
     with _without_foreign_keys(engine) as connection, connection.begin():
@@ -56,9 +61,14 @@ def _migrate_file(engine: Engine, revision: str) -> None:
             raise DatabaseUnusable(f"{engine.url.database}: {found}, none expected", hint=RESTORE)
 
 
-def revisions() -> list[str]:
+def _is_newest(now: str | None, revision: str) -> bool:
+    return revision == "head" and now == revisions()[-1]
+
+
+@cache  # every migration is read for it
+def revisions() -> tuple[str, ...]:
     """All revisions, oldest first."""
-    return [script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()][::-1]
+    return tuple(script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions())[::-1]
 
 
 def require_tables(engine: Engine) -> None:

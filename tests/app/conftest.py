@@ -1,12 +1,16 @@
 """An app of one's own, with workers that obey the tests."""
 
 import asyncio
+import atexit
+import shutil
 import sys
+import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +19,12 @@ from fastapi import FastAPI
 from sqlalchemy import URL, Connection, Engine, event
 from starlette.testclient import TestClient
 
+from app.db.engine import open_engine
 from app.jobs.plans import Commands
 from app.main import create_app
 from app.services import launch_keys
 from app.services.context import Context
-from app.settings import Settings
+from app.settings import DATABASE, Settings
 from app.viewer.client import Viewer
 from tests.app import postgres
 from tests.app.postgres import PostgresServer
@@ -101,6 +106,15 @@ class Running:
         return answer.json()
 
 
+@cache
+def _migrated() -> Path:
+    """A database without rows, brought to the newest tables once a process."""
+    folder = Path(tempfile.mkdtemp(prefix="r2c2r-db-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    open_engine(folder / DATABASE).dispose()
+    return folder / DATABASE
+
+
 @contextmanager
 def running(
     data_dir: Path, commands: Commands = FAKE_COMMANDS, viewer: Viewer | None = None, **options: Any
@@ -118,6 +132,9 @@ def running(
     }
     rows = {"postgres": _POSTGRES[-1].of_folder(data_dir)} if _POSTGRES else {}
     settings = Settings(data_dir=data_dir, **{**given, **rows, **options})
+    if not data_dir.exists() and not settings.postgres:
+        data_dir.mkdir(parents=True)
+        shutil.copy(_migrated(), settings.database)
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
         client.get(f"/?token={settings.launch_token}")
