@@ -1,4 +1,4 @@
-"""Everything CI runs: JavaScript tests, Python tests on two workers, browser tests on one; failed tests once more, alone.
+"""Everything CI runs: JavaScript tests, Python tests, then browser tests, each on two workers; failed tests once more, alone.
 
 Arguments go to both pytest passes. With R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, what cannot
 run is reported as not run.
@@ -17,7 +17,7 @@ PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))
 LONGEST_S = 900 * PATIENCE  # a test, its fixtures included
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 WITHOUT_BROWSER = ("-m", "not browser", "-n", "2", "--dist", "loadfile")
-WITH_BROWSER = ("-m", "browser", "-n", "0")  # a test is a server, a segmenter and a Chromium: two cores have work enough
+WITH_BROWSER = ("-m", "browser", "-n", "2", "--dist", "load")  # a file may take minutes: its tests go to either worker
 PASSED, FAILED, NOTHING_RAN = 0, 1, 5  # exit codes of pytest
 MAX_RERUN = 20  # tests; more failures than that are no accident of timing
 
