@@ -129,7 +129,10 @@ class Hub:
         who: str = "",
         sees: Callable[[str | None], bool] = lambda _: True,
     ) -> Listener:
-        """A new listener: hello first (`reset`: it must fetch everything anew), then what it missed after `since`."""
+        """A new listener: hello first (`reset`: it must fetch everything anew), then what it missed after `since`.
+
+        One that joins for the first time is told that its project changed: it may have read it before it was heard here.
+        """
         listener = Listener(asyncio.get_running_loop(), project, who, sees=sees)
         with self._lock:
             missed, complete = self._missed(since, epoch)
@@ -138,6 +141,8 @@ class Hub:
                 if message.type == "hello" or listener.wants(message):
                     listener.take(message, self.epoch)
             self._listeners.add(listener)
+            if since is None or not epoch:
+                self._tell_to_read(listener)
         self._people_changed(project)
         return listener
 
@@ -148,10 +153,15 @@ class Hub:
         self._people_changed(listener.project)
 
     def move(self, listener: Listener, project: str | None, page: str, number: int | None) -> None:
-        """The tab looks at something else; everybody at the projects it comes from and goes to is told."""
+        """The tab looks at something else; everybody at the projects it comes from and goes to is told.
+
+        At another project it is told that this one changed: it may have read it before it was heard here.
+        """
         with self._lock:
             before = listener.project
             listener.project, listener.page, listener.object = project, page, number
+            if project != before:
+                self._tell_to_read(listener)
         for told in {before, project}:
             self._people_changed(told)
 
@@ -222,6 +232,11 @@ class Hub:
         self._recent_bytes += len(message.text)
         while self._recent_bytes > KEPT_BYTES:
             self._recent_bytes -= len(self._recent.popleft().text)
+
+    def _tell_to_read(self, listener: Listener) -> None:
+        message = self._message("project", listener.project, {})
+        if listener.project is not None and listener.wants(message):
+            self._hand(listener, message)
 
     def _people_changed(self, project: str | None) -> None:
         """Tell everybody at the project who is there, once for all changes of a moment."""

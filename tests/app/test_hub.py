@@ -20,7 +20,7 @@ def test_a_listener_gets_what_it_missed_while_it_is_remembered(monkeypatch: pyte
         for number in range(5):
             hub.publish("object", "p", number=number)
         await asyncio.sleep(0)
-        (size,) = {len(text) for text in list(first.queue._queue)[1:]}  # type: ignore[attr-defined]
+        (size,) = {len(text) for text in list(first.queue._queue)[2:]}  # type: ignore[attr-defined]
         assert [each["seq"] for each in told(first, "object")] == [1, 2, 3, 4, 5]
         monkeypatch.setattr(hubs, "KEPT_BYTES", 3 * size + 1)
         hub.publish("object", "p", number=5)
@@ -55,11 +55,27 @@ def test_a_tab_hears_of_its_own_project_and_of_every_job() -> None:
         for kind, project in (("mask", "other"), ("mask", "mine"), ("job", "other"), ("projects", None)):
             hub.publish(kind, project)
         await asyncio.sleep(0)
-        assert [each["type"] for each in told(listener)] == ["hello", "mask", "job", "projects"]
+        assert [each["type"] for each in told(listener)] == ["hello", "project", "mask", "job", "projects"]
         hub.leave(listener)
         hub.publish("job", "mine")
         await asyncio.sleep(0)
         assert listener.queue.empty()
+
+    asyncio.run(scene())
+
+
+def test_a_tab_that_comes_to_a_project_reads_what_changed_before_it_was_heard_there() -> None:
+    async def scene() -> None:
+        hub = Hub()
+        listener = hub.join(None, None, None)
+        hub.publish("project", "kitchen")  # after the tab has read it, before its word of where it is
+        hub.move(listener, "kitchen", "overview", None)
+        hub.move(listener, "kitchen", "overview", 1)
+        await asyncio.sleep(0)
+        assert [(each["type"], each["project"]) for each in told(listener, "project")] == [("project", "kitchen")]
+        hidden = hub.join("kitchen", None, None, sees=lambda project: project is None)
+        await asyncio.sleep(0)
+        assert told(hidden, "project") == []
 
     asyncio.run(scene())
 
@@ -104,7 +120,7 @@ def test_no_text_is_beyond_the_wire(text: str) -> None:
         hub.publish("comments", "p", text=text)
         hub.tell(listener, "refused", message=text)
         await asyncio.sleep(0)
-        raw = [listener.queue.get_nowait() for _ in range(3)]
+        raw = [listener.queue.get_nowait() for _ in range(4)][1:]
         assert all(each.encode("ascii") for each in raw)
         assert [json.loads(raw[1])["text"], json.loads(raw[2])["message"]] == [text, text]
 
@@ -137,7 +153,7 @@ def test_many_tabs_that_come_at_once_are_told_once_who_is_here() -> None:
         for tab in tabs:
             hub.move(tab, "kitchen", "annotate", 1)
         assert len(await here(tabs[0])) == 300
-        assert {tab.queue.qsize() for tab in tabs[1:]} == {2}  # hello, presence
+        assert {tab.queue.qsize() for tab in tabs[1:]} == {3}  # hello, project, presence
 
     asyncio.run(scene())
 

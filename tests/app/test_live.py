@@ -257,7 +257,7 @@ def test_a_bad_message_is_answered_to_its_sender_and_to_nobody_else(web: Running
         web.patch(f"/api/projects/{project}/objects/{number}", {"colour": 5})
         until(socket, type="object")
         seen, _ = until(other, type="object")
-        assert {message["type"] for message in seen} <= {"hello", "presence"}
+        assert {message["type"] for message in seen} <= {"hello", "project", "presence"}
 
 
 def test_the_tabs_of_a_person_are_bounded(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -133,7 +133,7 @@ def test_signing_out_closes_the_open_connections_of_that_session_and_no_other(sh
         leaving.post("/api/logout")
         assert closed_with(gone) == 4401
         kept.send_text('{"type": "watch", "project": "p"}')
-        assert {kept.receive_json()["type"] for _ in range(2)} == {"hello", "presence"}
+        assert {kept.receive_json()["type"] for _ in range(3)} == {"hello", "project", "presence"}
 
 
 def test_an_admin_lets_somebody_in_changes_what_they_may_and_removes_them(shared: Running) -> None:

@@ -1,7 +1,7 @@
 /** What the recording is, before any work starts; and where the project stands. */
 
 import { changeProject, getHistory, getProject, getSystem, readAgain } from "../api.js";
-import { detailOf, h, LiveElement } from "../dom.js";
+import { detailOf, h, LiveElement, renew } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
 import { Assignee } from "../elements/assignee.js";
 import { BackendChoice } from "../elements/backend-choice.js";
@@ -137,7 +137,7 @@ export class OverviewPage extends LiveElement {
     const ready = project.status === "ready";
     const capture = ready ? project.capture : null;
     this.#title.textContent = project.name;
-    this.#next.replaceChildren(exporting(project), " ", nextStep(project));
+    renew(this.#next, exporting(project), " ", nextStep(project));
     this.#assignee.name = project.assignee;
     this.#importing.hidden = ready;
     const missing = project.awaits_recording;
@@ -290,7 +290,11 @@ function failure(project) {
 /** @param {Project} project */
 function exporting(project) {
   if (project.status !== "ready") return "";
-  return h("button", { type: "button", onClick: () => offerExport(project).catch(sayError) }, "Export…");
+  return h(
+    "button",
+    { type: "button", "data-at": "export:", onClick: () => offerExport(project).catch(sayError) },
+    "Export…",
+  );
 }
 
 /** @param {Project} project */
@@ -303,5 +307,5 @@ function nextStep(project) {
       : project.counts.objects
         ? ["run", `Run on ${counted(project.counts.objects, "object")}`]
         : ["annotate", "Click objects"];
-  return h("a", { class: "button primary", href: `${base}/${path}` }, text ?? "");
+  return h("a", { class: "button primary", href: `${base}/${path}`, "data-at": "next:" }, text ?? "");
 }
