@@ -123,7 +123,7 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
 
 @pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main"])
 def test_importing_costs_nothing_heavy(module: str) -> None:
-    heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "transformers", "pybullet", "viser"]
+    heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "transformers", "pybullet", "viser", "trimesh"]
     code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from scipy.spatial import cKDTree
 
 from app import schemas
@@ -106,6 +105,8 @@ class _Model:
         return np.asarray(scale * places + onto)
 
     def _stood(self, candidate: str) -> _Upright:
+        import trimesh
+
         mesh = candidate_mesh(self._files, self._name, candidate).mesh
         points = mesh.vertices @ upright(self._files, self._name, candidate).T
         shape = trimesh.Trimesh(points, mesh.faces, process=False)
