@@ -107,7 +107,7 @@ class Running:
 
 
 @cache
-def _migrated() -> Path:
+def migrated() -> Path:
     """A database without rows, brought to the newest tables once a process."""
     folder = Path(tempfile.mkdtemp(prefix="r2c2r-db-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -134,7 +134,7 @@ def running(
     settings = Settings(data_dir=data_dir, **{**given, **rows, **options})
     if not data_dir.exists() and not settings.postgres:
         data_dir.mkdir(parents=True)
-        shutil.copy(_migrated(), settings.database)
+        shutil.copy(migrated(), settings.database)
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
         client.get(f"/?token={settings.launch_token}")

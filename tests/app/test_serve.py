@@ -1,8 +1,6 @@
 import io
 import json
 import socket
-import subprocess
-import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -19,6 +17,7 @@ from app.settings import Settings
 from r2c2r_core.cli import main
 from r2c2r_core.errors import EnvironmentProblem, InputError
 from tests.app.conftest import Running
+from tests.forked import forked
 from tests.waiting import PATIENCE_S
 
 
@@ -74,20 +73,13 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 
 
 def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> None:
-    call = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(tmp_path)!r}))"
-    code = f"from pathlib import Path; from app.serve import serve; {call}"
-    server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    try:
-        assert server.stdout is not None
-        address = server.stdout.readline().split(" ", 1)[1].strip()
+    with forked(serve, host="127.0.0.1", port=0, data_dir=tmp_path) as server:
+        address = server.readline().split(" ", 1)[1].strip()
         assert address.startswith("http://127.0.0.1:")
         Running.until(lambda: _answers(address))
         with pytest.raises(EnvironmentProblem, match=f"process {server.pid}"):
             serve(host="127.0.0.1", port=0, data_dir=tmp_path)
-    finally:
-        server.terminate()
-        assert server.wait(timeout=PATIENCE_S) in (0, -15)
-        server.stdout.close()  # type: ignore[union-attr]
+        assert server.end() in (0, -15)
 
 
 def test_a_key_for_another_browser_is_printed_while_the_server_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -142,17 +134,8 @@ def test_a_proxy_is_named_by_its_address(tmp_path: Path, address: str) -> None:
 @contextmanager
 def served(data: Path, **options: Any) -> Iterator[str]:
     """A server of its own process; the address it prints."""
-    call = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(data)!r}), **{options!r})"
-    code = f"from pathlib import Path; from app.serve import serve; {call}"
-    words = [sys.executable, "-c", code]
-    server = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    assert server.stdout is not None
-    try:
-        yield server.stdout.readline().split(" ", 1)[1].strip()
-    finally:
-        server.terminate()
-        server.wait(timeout=PATIENCE_S)
-        server.stdout.close()
+    with forked(serve, host="127.0.0.1", port=0, data_dir=data, **options) as server:
+        yield server.readline().split(" ", 1)[1].strip()
 
 
 def _status(address: str) -> int:

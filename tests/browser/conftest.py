@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from app.settings import DATABASE
+from tests.app.conftest import migrated
 from tests.browser.serving import REMEMBER, NewContext, printed_again, served
 from tests.browser.together import Server
 from tests.waiting import PATIENCE_MS
@@ -49,16 +51,16 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def address(tmp_path: Path, sample: Path) -> Iterator[str]:
-    """The app on a free port, with an empty database; the sample lies where it may be imported from by path."""
+def address(tmp_path: Path) -> Iterator[str]:
+    """The app on a free port, with an empty database."""
     data = tmp_path / "served"
     data.mkdir()
-    shutil.copy(sample / "scan.r3d", data / "scan.r3d")
+    shutil.copy(migrated(), data / DATABASE)
     with served(data) as found:
         yield found
 
 
-@pytest.fixture(scope="module")  # its event loop must not outlive the browser tests: others start loops of their own
+@pytest.fixture(scope="package")  # its event loop must not outlive the browser tests: others start loops of their own
 def browser() -> Iterator[Browser]:
     with (
         sync_playwright() as playwright,

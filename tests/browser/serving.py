@@ -1,16 +1,15 @@
 """The app served on a free port over a data folder, its printed addresses, and how tests wait for its pages."""
 
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from playwright.sync_api import BrowserContext, FloatRect, Locator, Page, expect
 
-from app.serve import new_address
-from tests.waiting import PATIENCE_S, until
+from app.serve import new_address, serve
+from tests.forked import forked
+from tests.waiting import until
 
 NewContext = Callable[..., BrowserContext]
 """Takes what `Browser.new_context` takes."""
@@ -37,30 +36,12 @@ def printed_again(address: str) -> str:
 @contextmanager
 def served(data: Path) -> Iterator[str]:
     """The app on a free port over a data folder; the address it prints."""
-    serve = f"serve(host='127.0.0.1', port=0, data_dir=Path({str(data)!r}))"
-    code = f"from pathlib import Path; from app.serve import serve; {serve}"
-    server = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    try:
-        line = server.stdout.readline()
+    with forked(serve, host="127.0.0.1", port=0, data_dir=data) as server:
+        line = server.readline()
         found = re.search(r"(http://\S+?/)\S*", line)
         assert found, line
         _folders[found.group(1)] = data
         yield found.group()
-    finally:
-        end(server)
-
-
-def end(server: "subprocess.Popen[str]") -> None:
-    """Ask it to end; one that does not is killed."""
-    assert server.stdout is not None
-    server.terminate()
-    try:
-        server.wait(PATIENCE_S)
-    except subprocess.TimeoutExpired:
-        server.kill()
-        server.wait()
-    server.stdout.close()
 
 
 def box_of(locator: Locator) -> FloatRect:

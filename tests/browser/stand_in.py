@@ -1,9 +1,6 @@
-"""The app with stand-ins for its slow parts: `python -m tests.browser.stand_in DATA PORT LIVE [NAME]`.
+"""The app with stand-ins for its slow parts."""
 
-LIVE is the live segmenter among tests/app/fakes, live or panels; a NAME asks for accounts.
-"""
-
-import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,11 +10,7 @@ from app.main import create_app
 from tests.app.conftest import FAKE_COMMANDS, fake
 
 
-def main() -> None:
-    data, port, live, names = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3], sys.argv[4:]
+def serve_stand_in(data: Path, port: int, live: str, names: Sequence[str]) -> None:
+    """Serve it until it is stopped; `live` is the live segmenter among tests/app/fakes, and a name asks for accounts."""
     vars(serve)["create_app"] = partial(create_app, commands=replace(FAKE_COMMANDS, live=fake(live)))
     serve.serve(host="127.0.0.1", port=port, data_dir=data, names=names)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,8 @@
 """An app with accounts and stand-ins for its slow parts, to be stopped and started again, and people who sign in to it."""
 
 import random
+import shutil
 import socket
-import subprocess
-import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Self
@@ -12,8 +11,11 @@ from playwright.sync_api import BrowserContext, Page
 
 from app.db.engine import open_engine
 from app.services import accounts
+from app.settings import DATABASE
+from tests.app.conftest import migrated
+from tests.browser.stand_in import serve_stand_in
+from tests.forked import Forked
 
-ROOT = Path(__file__).parents[2]
 PASSWORD = "correct horse battery"
 PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
 LENT = Path("/proc/sys/net/ipv4/ip_local_port_range")  # the ports that whoever asks for any gets
@@ -26,8 +28,9 @@ class Server:
 
     def __init__(self, data: Path, live: str = "live") -> None:
         self.data, self.port, self.live = data, free_port(), live
-        self.process: subprocess.Popen[str] | None = None
-        engine = open_engine(data / "r2c2r.db")
+        self.process: Forked | None = None
+        shutil.copy(migrated(), data / DATABASE)
+        engine = open_engine(data / DATABASE)
         for name, role in PEOPLE.items():
             accounts.add(engine, name, role, PASSWORD)
         engine.dispose()
@@ -44,20 +47,15 @@ class Server:
         return f"http://localhost:{self.port}"
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "tests.browser.stand_in", str(self.data), str(self.port), self.live, "localhost"]
-        self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        assert self.process.stdout is not None
-        said = self.process.stdout.readline()
+        self.process = Forked(serve_stand_in, self.data, self.port, self.live, ["localhost"])
+        said = self.process.readline()
         if "http://localhost" not in said:
             self.kill()
             raise AssertionError(f"the server did not start: {said}")
 
     def kill(self) -> None:
         assert self.process is not None
-        assert self.process.stdout is not None
         self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
 
 
 def free_port() -> int:
