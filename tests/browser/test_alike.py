@@ -3,13 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_many import post
-from tests.browser.test_pages import serious
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
 
@@ -17,9 +15,8 @@ from tests.browser.together import Server, signed_in
 CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)
+def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext, server: Server) -> None:
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "cleo")
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")
@@ -43,7 +40,7 @@ def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext
     expect(shown.first).to_contain_text("50 % alike")
     expect(shown.first).to_have_class("current")
     proposals.scroll_into_view_if_needed()
-    picture(page, f"alike-{theme}")
+    picture(page, "alike")
     assert serious(page, "alike") == []
     answers: list[Callable[[], None]] = []
     page.route("**/proposals/confirm", lambda route: answers.append(partial(route.fulfill, response=route.fetch())))

@@ -1,18 +1,16 @@
 """Who may not decide sees no button that would be refused, and can comment."""
 
-import pytest
 from playwright.sync_api import expect
 
 from tests.app.nouns import finish
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_an_annotator_is_told_that_a_reviewer_decides(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_an_annotator_is_told_that_a_reviewer_decides(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")
@@ -25,4 +23,4 @@ def test_an_annotator_is_told_that_a_reviewer_decides(new_context: NewContext, s
     expect(page.get_by_role("button", name="Comment", exact=True)).to_be_enabled()
     page.keyboard.press("y")
     wait_for_toast(page, "A reviewer accepts")
-    picture(page, f"annotator-{theme}")
+    picture(page, "annotator")

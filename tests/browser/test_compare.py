@@ -2,12 +2,11 @@
 
 import re
 
-import pytest
 from playwright.sync_api import expect
 
 from tests.app.test_differences import with_a_deeper_one
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
@@ -20,11 +19,8 @@ SHOWN = """async () => {
 }"""
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme)
+def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     with_a_deeper_one(server.data / "projects" / project.split("/p/")[1] / "work")
@@ -50,7 +46,7 @@ def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(
     turned = page.evaluate(SIDES)
     assert len(set(turned)) == 1
     assert turned != first
-    picture(page, f"compare-{theme}")
+    picture(page, "compare")
     compare.get_by_label("Turn all candidates").press("End")
     assert page.evaluate(SIDES) == ["100%", "100%"]
 

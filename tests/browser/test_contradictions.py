@@ -2,20 +2,16 @@
 
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme)
+def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -29,7 +25,7 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(
     expect(rows(page)).to_have_count(4)
     expect(said).to_have_count(2)
     expect(said.first).to_contain_text("On the same thing as drawer_3")
-    picture(page, f"contradiction-{theme}")
+    picture(page, "contradiction")
     page.get_by_role("button", name="Delete drawer_3").click()
     expect(said).to_have_count(0)
     page.keyboard.press("Control+z")

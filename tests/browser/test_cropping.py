@@ -3,12 +3,11 @@
 from contextlib import AbstractContextManager
 from typing import Any
 
-import pytest
 from playwright.sync_api import Page, expect
 
 from tests.app.nouns import finish
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_journey import picture
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
@@ -28,9 +27,8 @@ def changed(page: Page) -> AbstractContextManager[object]:
     return page.expect_response(lambda answer: answer.request.method == "PATCH" and answer.ok)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     context.clock.install()
     page = signed_in(context, server, "ann")
     project = sample(page).split("/p/")[1]
@@ -56,7 +54,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewConte
     assert wider > before
     dragged = crop(page)
     assert dragged is not None
-    picture(page, f"crop-box-{theme}")
+    picture(page, "crop-box")
 
     top = page.get_by_role("slider", name="Top of the crop box")
     tall = int(top.get_attribute("aria-valuenow") or 0)

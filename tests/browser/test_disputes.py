@@ -3,8 +3,8 @@
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, on_canvas, sample
 from tests.browser.together import Server, signed_in
 from tests.waiting import until

@@ -5,9 +5,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_journey import picture
-from tests.browser.test_pages import serious
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
@@ -205,9 +204,8 @@ def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(ne
         assert merged["handle"][side] == pytest.approx(alone["handle"][side] - 0.3, abs=0.02)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)
+def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: NewContext, server: Server) -> None:
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Elevation").click()
@@ -230,7 +228,7 @@ def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: New
         page.mouse.click(*at(page, across, 0.4))
         page.keyboard.up("Shift")
     expect(copy).to_be_visible()
-    picture(page, f"copy-handle-{theme}")
+    picture(page, "copy-handle")
     assert serious(page, "elevation") == []
     page.keyboard.press("c")
     expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")

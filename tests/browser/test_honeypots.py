@@ -3,20 +3,17 @@
 import csv
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import expect
 
 from tests.app.test_honeypots import write_truth
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_journey import picture
-from tests.browser.test_pages import serious
 from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, server: Server, theme: str) -> None:
-    contexts = [new_context(color_scheme=theme, bypass_csp=True) for _ in range(2)]  # for axe
+def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, server: Server) -> None:
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
     ann, cleo = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
     project = sample(ann).split("/p/")[1]
     write_truth(server.data / "projects" / project / "source")
@@ -48,7 +45,7 @@ def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, serve
     expect(line.locator("td").nth(2)).to_have_text("1")
     expect(line.locator("th")).to_have_text("cleo")
     line.scroll_into_view_if_needed()
-    picture(ann, f"honeypots-{theme}")
+    picture(ann, "honeypots")
     assert serious(ann, "people with honeypots") == []
     ann.set_viewport_size({"width": 390, "height": 800})
     assert ann.evaluate("document.documentElement.scrollWidth") <= 390

@@ -1,16 +1,14 @@
 """A recording on the server's machine: a refused path stays with its reason, one from a folder that was allowed comes in."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     page.get_by_role("button", name="From this machine…").click()
     field = page.get_by_label("Path on this machine")
@@ -22,4 +20,4 @@ def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, s
     expect(alert).to_contain_text("/usr/share/kitchen.r3d is outside the folders recordings may come from")
     expect(alert).to_contain_text("--import-from DIR")
     expect(field).to_have_value("/usr/share/kitchen.r3d")
-    picture(page, f"import-refused-{theme}")
+    picture(page, "import-refused")

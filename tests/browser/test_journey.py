@@ -1,32 +1,17 @@
 """The journey: project, import, click, run, review, accept, download; in a real Chromium."""
 
 import json
-import os
 import re
 import zipfile
 from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import box_of, drawn
-from tests.waiting import PATIENCE_MS, until
+from tests.waiting import PATIENCE_MS
 
-PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: the journey leaves a screenshot of every page there
 LONG_MS = 4 * PATIENCE_MS  # the pipeline on two busy cores
-
-
-def picture(page: Page, name: str, *, still: bool = False) -> None:
-    """Leave a screenshot; a still one when two in a row are alike, as a software GL draws a 3D view when it can."""
-    if not PICTURES:
-        return
-    taken = [b""]
-
-    def taken_twice() -> bool:
-        taken.append(page.screenshot(timeout=LONG_MS))
-        return not still or taken[-1] == taken[-2]
-
-    until(taken_twice, f"{name} goes on changing")
-    Path(f"{PICTURES}/{name}.png").write_bytes(taken[-1])
 
 
 def click_of(sample: Path, category: str) -> tuple[int, float, float]:
@@ -69,6 +54,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
 
     # Annotate: click, mask, name; a wrong click is undone
     page.get_by_role("link", name="Annotate").click()
+    expect(page.get_by_label("Proposals", exact=True)).to_contain_text("They appear once the scan is prepared")
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
     frame, x, y = click_of(sample, "drawer")
     seek(page, frame)
@@ -150,4 +136,3 @@ def test_the_help_lists_the_keys_and_dark_mode_is_kept(page: Page, address: str)
     theme = page.evaluate("document.documentElement.dataset.theme")
     page.reload()
     expect(page.locator("html")).to_have_attribute("data-theme", theme)
-    picture(page, "10-other-theme")

@@ -1,19 +1,16 @@
 """Projects are tagged, archived, duplicated and deleted from their list, and each of these is undone there."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_many import post
-from tests.browser.test_pages import serious
 from tests.browser.test_together import say
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)
+def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Server) -> None:
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic"):
         post(page, "/api/projects/sample", {"name": name})
@@ -39,7 +36,7 @@ def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Serve
     expect(page.get_by_text("Nothing is archived.")).to_be_visible()
     page.get_by_label("Which projects").select_option("In work")
     expect(names).to_have_count(3)
-    picture(page, f"projects-tagged-{theme}")
+    picture(page, "projects-tagged")
     assert serious(page, "projects") == []
 
     page.get_by_role("button", name="Delete: Cellar", exact=True).click()
@@ -49,7 +46,7 @@ def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Serve
     page.get_by_label("Which projects").select_option("Trash")
     expect(page.locator(".trash-list > li")).to_contain_text(["deleted by ann"])
     expect(page.locator(".trash-list > li")).to_contain_text(["2 objects"])
-    picture(page, f"projects-trash-{theme}")
+    picture(page, "projects-trash")
     assert serious(page, "trash") == []
     deleted.get_by_role("button", name="Undo").click()
     expect(page.get_by_text("The trash is empty.")).to_be_visible()

@@ -2,11 +2,10 @@
 
 import re
 
-import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
 
@@ -19,9 +18,8 @@ def post(page: Page, path: str, body: dict[str, str]) -> None:
     assert page.evaluate(script, [path, body]) in (201, 202)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     for number in range(14):
@@ -36,14 +34,13 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: Ne
     expect(rows(page).first).to_be_in_viewport()
     expect(page.locator(".find")).to_contain_text("7 of 16")
     expect(rows(page).first.locator(".badge")).to_have_text("4")  # the number it has on the picture
-    picture(page, f"many-objects-{theme}")
+    picture(page, "many-objects")
     page.get_by_label("Find objects").fill("")
     expect(rows(page)).to_have_count(16)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     for number in range(58):
@@ -82,7 +79,7 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewC
     page.get_by_label("Category for all").press("Enter")
     expect(page.get_by_role("heading", name="sink 3")).to_be_visible()
     page.get_by_label("Selected objects").get_by_role("button", name="Lock").click()
-    picture(page, f"sixty-objects-{theme}")
+    picture(page, "sixty-objects")
     page.get_by_label("Selected objects").get_by_role("button", name="Delete").click()
     wait_for_toast(page, "jar_1 is locked")
     page.get_by_label("Which objects").select_option("locked")

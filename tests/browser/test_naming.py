@@ -1,18 +1,16 @@
 """Naming objects: any words are joined to a name, categories are offered, and what is to know of one is said once."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     for _ in range(3):
@@ -42,4 +40,4 @@ def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewC
     assert "at least" in proposals.inner_text()
     page.get_by_label("Least confidence").select_option("95 % sure")
     expect(proposals.get_by_role("button", name="Confirm 1", exact=True)).to_be_enabled()
-    picture(page, f"naming-{theme}")
+    picture(page, "naming")

@@ -1,19 +1,15 @@
 """A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed too."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme)
+def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
@@ -28,7 +24,7 @@ def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(
     page.keyboard.press("ArrowRight")
     expect(state).to_have_text("opening, 40° ± 6°")
     expect(page.locator(".opening .chip.at_least")).to_have_text("86°: ≥ at least")
-    picture(page, f"opening-{theme}")
+    picture(page, "opening")
     box = box_of(lane)
     lane.click(position={"x": 0.9 * box["width"], "y": box["height"] / 2})  # its last third is the last frame
     expect(state).to_have_text("open, 86° ± 2°")

@@ -11,8 +11,8 @@ import pytest
 from playwright.sync_api import expect
 
 from app.files import project_files
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, printed_again, served, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_scene_tools import ask
 from tests.browser.together import Server, signed_in
 from tests.waiting import until

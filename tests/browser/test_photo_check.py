@@ -7,16 +7,14 @@ from playwright.sync_api import Page, expect
 
 from tests.app.nouns import finish
 from tests.app.test_photos import FILMED, drawer, store
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_journey import picture
-from tests.browser.test_pages import serious
 from tests.browser.test_together import pick, ready, sample, say, viewed
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme)
+def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")
@@ -47,14 +45,11 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: New
     shown = box_of(pin)
     assert shown["x"] + shown["width"] / 2 == pytest.approx(at[0], abs=2)
     assert shown["y"] + shown["height"] / 2 == pytest.approx(at[1], abs=2)
-    picture(page, f"photo-check-{theme}")
+    picture(page, "photo-check")
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)
+def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_context: NewContext, server: Server) -> None:
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = sample(page)
     work = server.data / "projects" / project.split("/p/")[1] / "work"
@@ -72,7 +67,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
     expect(page.locator(".opening-marks .chip.measured")).to_be_visible()
     seek(page, 7)
     expect(said).to_have_text("not known in this photo")
-    picture(page, f"opening-marks-measured-{theme}")
+    picture(page, "opening-marks-measured")
 
     # by keyboard: opened, marked, undone, redone
     drawn = page.locator("r2c2r-photo-check img.over").last
@@ -81,13 +76,13 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(
         page.keyboard.press("=")
     expect(page.get_by_role("button", name="Open here: 3 cm")).to_be_visible()
     expect(page.locator("r2c2r-photo-check line")).to_have_count(12)
-    picture(page, f"opening-marks-turned-{theme}")
+    picture(page, "opening-marks-turned")
     page.keyboard.press("Shift+o")
     expect(said).to_have_text("opening, 3 cm")
     expect(page.locator(".opening-marks .chip.person")).to_be_visible()
     expect(page.get_by_role("img", name="marked in 1")).to_be_visible()
     assert drawn.get_attribute("src") != before  # the leaf over the photo is drawn anew
-    picture(page, f"opening-marks-{theme}")
+    picture(page, "opening-marks")
     assert serious(page, "a marked leaf") == []
     page.keyboard.press("Control+z")
     expect(said).to_have_text("not known in this photo")

@@ -2,8 +2,8 @@
 
 from playwright.sync_api import Locator, expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import STEADY, NewContext, box_of, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, on_canvas, ready, rows, sample
 from tests.browser.together import Server, signed_in
 from tests.waiting import until

@@ -5,8 +5,8 @@ import json
 from playwright.sync_api import expect
 
 from tests.app.nouns import finish
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_together import pick, ready, sample
 from tests.browser.together import Server, signed_in
 

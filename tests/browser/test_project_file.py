@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Page, expect
 
 from tests.app.test_imports import R3D
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_many import post
-from tests.browser.test_pages import serious
 from tests.browser.together import Server, signed_in
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
@@ -30,11 +28,8 @@ def downloaded(page: Page, to: Path) -> bytes:
     return (to / "Kitchen.r2c2r.zip").read_bytes()
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_project_goes_to_another_person_as_one_file(
-    new_context: NewContext, server: Server, tmp_path: Path, theme: str
-) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)
+def test_a_project_goes_to_another_person_as_one_file(new_context: NewContext, server: Server, tmp_path: Path) -> None:
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = import_file(page, "Kitchen.r3d", R3D)
     expect(page.get_by_role("link", name="Click objects")).to_be_visible()
@@ -44,7 +39,7 @@ def test_a_project_goes_to_another_person_as_one_file(
     dialog = page.get_by_role("dialog", name="Export Kitchen")
     expect(dialog).to_contain_text("approvals stay here")
     expect(dialog.get_by_label("With the recording")).to_be_checked()
-    picture(page, f"export-{theme}")
+    picture(page, "export")
     assert serious(page, "export") == []
     whole = downloaded(page, tmp_path)
     expect(dialog).to_have_count(0)
@@ -56,18 +51,18 @@ def test_a_project_goes_to_another_person_as_one_file(
     assert R3D in whole
     assert R3D not in light
 
-    context = new_context(color_scheme=theme, bypass_csp=True)
+    context = new_context(bypass_csp=True)
     page = signed_in(context, server, "cleo")
     import_file(page, "Kitchen.r2c2r.zip", light)
     expect(page.get_by_role("heading", name="The recording is missing")).to_be_visible()
     expect(page.get_by_role("alert")).to_contain_text("choose the recording it was made from")
     expect(page.get_by_text("Kept until it is here: 1 object")).to_be_visible()
-    picture(page, f"recording-missing-{theme}")
+    picture(page, "recording-missing")
     assert serious(page, "overview") == []
     page.locator("r2c2r-overview > input").set_input_files({"name": "scan.r3d", "mimeType": "application/zip", "buffer": R3D})
     expect(page.get_by_role("link", name="Run on 1 object")).to_be_visible()
     expect(page.get_by_text("imported from Kitchen.r2c2r.zip (objects: 1, comments: 1)")).to_be_visible()
-    picture(page, f"recording-given-{theme}")
+    picture(page, "recording-given")
 
     page.goto(server.address)
     import_file(page, "Kitchen.r2c2r.zip", whole)

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
 from tests.browser.test_elevation import fronts, stored
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
 
@@ -29,18 +29,15 @@ def corners(page: Page) -> Any:
     return front["front"]["corners_m"]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme)
+def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     clicked_cabinet(page)
     tip = page.locator(".elevation .tip")
     expect(tip).to_contain_text("2 edges hardly show: Q asks")
     page.keyboard.press("q")
     expect(tip).to_contain_text("Is there a seam at the right edge of cabinet_1 (10 % sure)?")
-    picture(page, f"question-{theme}")
+    picture(page, "question")
     page.keyboard.press("x")  # the front goes on to the next line of the plane
     expect(tip).to_contain_text("Is there a seam at the bottom edge of cabinet_1 (20 % sure)?")
     page.keyboard.press("y")

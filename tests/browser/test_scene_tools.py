@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from playwright.sync_api import Page, TimeoutError, expect
 
 from app.viewer.assembly import Assembly, shapes_of
@@ -15,8 +14,8 @@ from app.viewer.camera import USUAL_FOV, from_axis
 from r2c2r_core.export.plan import facing, plan_bundle
 from tests.app.finished import keep_results
 from tests.app.nouns import finish
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_journey import picture
 from tests.browser.test_together import sample, say, viewed
 from tests.browser.together import Server, signed_in
 from tests.core.export.kitchen import kitchen
@@ -87,9 +86,8 @@ def from_front(page: Page, name: str) -> tuple[float, float]:
     return frame["x"] + frame["width"] / 2 + float(across), frame["y"] + frame["height"] / 2 + float(down)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContext, server: Server, theme: Any) -> None:
-    context = new_context(color_scheme=theme)
+def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     finished(page, server)
     page.keyboard.press("6")
@@ -105,7 +103,7 @@ def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContex
     page.get_by_role("button", name="Hide bottle_1 in the scene").click()
     expect(page.get_by_role("button", name="Show bottle_1 in the scene")).to_be_visible()
     page.get_by_label("What is drawn of the scene").select_option("both")
-    picture(page, f"scene-tools-{theme}", still=True)
+    picture(page, "scene-tools", still=True)
 
 
 def clicked(page: Page, name: str) -> Any:

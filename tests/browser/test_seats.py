@@ -2,8 +2,8 @@
 
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.together import Server, signed_in
 
 

@@ -1,10 +1,9 @@
 """A phone, a page zoomed to 200 %, and a keyboard alone reach the picture; messages leave the lanes free."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_journey import picture
 from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, signed_in
@@ -13,11 +12,8 @@ ZOOMED = {"width": 640, "height": 360}  # 1280 × 720 at 200 %
 PHONE = {"width": 390, "height": 844}
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(
-    new_context: NewContext, server: Server, theme: str
-) -> None:
-    context = new_context(color_scheme=theme)
+def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(new_context: NewContext, server: Server) -> None:
+    context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
     for name, size in (("zoomed", ZOOMED), ("phone", PHONE)):
@@ -35,7 +31,7 @@ def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(
         rows(page).first.locator(".pick").click()  # the list is below, and can be reached
         expect(page.get_by_label("Name of drawer_1")).to_be_visible()
         page.locator("main").evaluate("main => main.scrollTo(0, 0)")
-        picture(page, f"{name}-{theme}")
+        picture(page, name)
 
 
 def test_one_key_skips_to_the_picture(new_context: NewContext, server: Server) -> None:

@@ -1,18 +1,15 @@
 """A project's names and categories are kept as a template, and taken over as what is still to be clicked."""
 
-import pytest
 from playwright.sync_api import expect
 
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_journey import picture
-from tests.browser.test_pages import serious
 from tests.browser.test_together import click_frame, pick, ready, rows, sample, say, viewed
 from tests.browser.together import Server, signed_in
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewContext, server: Server, theme: str) -> None:
-    context = new_context(color_scheme=theme, bypass_csp=True)  # for axe
+def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewContext, server: Server) -> None:
+    context = new_context(bypass_csp=True)  # for axe
     page = signed_in(context, server, "ann")
     expect(page.get_by_label("Objects to click")).to_be_hidden()  # nobody made a template
     sample(page)
@@ -32,7 +29,7 @@ def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewConte
     expect(page.locator("summary", has_text="4 objects")).to_be_visible()
     page.locator("summary", has_text="Flat 3").press("Enter")
     expect(objects).to_have_value("drawer_1, drawer\nmug_1, mug\noven_1, oven\nrange_hood, hood")
-    picture(page, f"templates-{theme}")
+    picture(page, "templates")
     assert serious(page, "templates") == []
     page.set_viewport_size({"width": 390, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -40,12 +37,12 @@ def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewConte
 
     page.goto(server.address)  # when a project is made
     page.get_by_label("Objects to click").select_option("Flat 3")
-    picture(page, f"templates-projects-{theme}")
+    picture(page, "templates-projects")
     project = sample(page)
     todo = page.get_by_role("region", name="Objects to click")
     expect(todo).to_contain_text("2 of 4 are clicked. Still to click: oven_1, range_hood.")
     todo.scroll_into_view_if_needed()
-    picture(page, f"templates-overview-{theme}")
+    picture(page, "templates-overview")
     assert serious(page, "overview with objects to click") == []
 
     page.goto(f"{project}/annotate?frame=3")
@@ -55,7 +52,7 @@ def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewConte
     expect(left).to_contain_text("Still to click: 2 of 4")
     expect(name).to_have_value("oven_1")
     expect(category).to_have_value("oven")
-    picture(page, f"templates-annotate-{theme}")
+    picture(page, "templates-annotate")
     assert serious(page, "annotate with objects to click") == []
     click_frame(page, 30, 60)
     expect(page.get_by_label("Name of oven_1")).to_have_value("oven_1")

@@ -8,9 +8,8 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.app.nouns import finish
+from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_journey import picture
-from tests.browser.test_pages import serious
 from tests.browser.together import Server, signed_in
 
 FRAME = (160, 120)

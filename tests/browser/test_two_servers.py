@@ -10,8 +10,8 @@ from playwright.sync_api import expect
 from app.db.engine import opened
 from app.services import accounts
 from tests.app import postgres
+from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_journey import picture
 from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import PASSWORD, PEOPLE, Server, free_port, signed_in
 
