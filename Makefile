@@ -1,5 +1,6 @@
 # make demo   the sample kitchen through every stage, its certified bundle, and the app opened on it
 # make test   everything CI runs
+# make slow   the tests that take long: before a release
 # make env | check | docs | bench beside them
 SHELL := /bin/bash
 PYTHON ?= python3
@@ -10,13 +11,16 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LEARNED := $(VENV)/.learned
 
-.PHONY: demo test env check docs bench libs clean
+.PHONY: demo test slow env check docs bench libs clean
 
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
 
 test: env check $(LEARNED)
 	"$(BIN)/python" scripts/run_tests.py
+
+slow: env $(LEARNED)
+	"$(BIN)/python" scripts/run_tests.py --slow
 
 env: libs $(STAMP)
 

@@ -1,7 +1,7 @@
 """Everything CI runs: JavaScript tests, Python tests, then browser tests, each on two workers; failed tests once more, alone.
 
-Arguments go to both pytest passes. With R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, what cannot
-run is reported as not run.
+Tests marked `slow` are left out; `--slow` runs them and nothing else. Other arguments go to both pytest passes. With
+R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, what cannot run is reported as not run.
 """
 
 import json
@@ -16,8 +16,9 @@ BUILD = ROOT / "build"
 PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))
 LONGEST_S = 900 * PATIENCE  # a test, its fixtures included
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
-WITHOUT_BROWSER = ("-m", "not browser", "-n", "2", "--dist", "loadfile")
-WITH_BROWSER = ("-m", "browser", "-n", "2", "--dist", "load")  # a file may take minutes: its tests go to either worker
+TWO_WORKERS = ("-n", "2", "--dist", "worksteal")  # half of the tests each, then what the other has not begun
+WITHOUT_BROWSER = ("not browser", "--ignore=tests/browser")  # what is ignored is not even imported
+WITH_BROWSER = ("browser", "--ignore=tests/app", "--ignore=tests/core")
 PASSED, FAILED, NOTHING_RAN = 0, 1, 5  # exit codes of pytest
 MAX_RERUN = 20  # tests; more failures than that are no accident of timing
 
@@ -32,11 +33,17 @@ def main() -> int:
     if REQUIRED and not_run:
         sys.stderr.write(f"required here but not possible: {', '.join(not_run)}\n")
         return 1
+    arguments = sys.argv[1:]
+    slow = "--slow" in arguments
+    passes = [
+        ("-m", f"{tests} and {'slow' if slow else 'not slow'}", *ignored, *TWO_WORKERS)
+        for tests, *ignored in ([WITHOUT_BROWSER, WITH_BROWSER] if chromium else [WITHOUT_BROWSER])
+    ]
     codes = []
-    if node:
+    if node and not slow:
         tests = sorted(str(path) for path in (ROOT / "tests" / "js").glob("*.test.js"))
         codes.append(subprocess.call([node, "--test", *tests], cwd=ROOT))
-    codes.append(run_python([WITHOUT_BROWSER, WITH_BROWSER] if chromium else [WITHOUT_BROWSER], sys.argv[1:]))
+    codes.append(run_python(passes, [one for one in arguments if one != "--slow"]))
     for what in not_run:
         sys.stdout.write(f"NOT RUN: {what}\n")
     return max(codes)
