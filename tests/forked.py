@@ -10,7 +10,7 @@ from typing import Any
 from tests.waiting import PATIENCE_S
 
 _CONTEXT = multiprocessing.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(["tests.browser.stand_in"])
+_CONTEXT.set_forkserver_preload(["tests.preloaded"])
 
 
 class Forked:

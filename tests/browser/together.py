@@ -4,6 +4,7 @@ import random
 import shutil
 import socket
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Self
 
@@ -29,11 +30,7 @@ class Server:
     def __init__(self, data: Path, live: str = "live") -> None:
         self.data, self.port, self.live = data, free_port(), live
         self.process: Forked | None = None
-        shutil.copy(migrated(), data / DATABASE)
-        engine = open_engine(data / DATABASE)
-        for name, role in PEOPLE.items():
-            accounts.add(engine, name, role, PASSWORD)
-        engine.dispose()
+        shutil.copy(_with_people(), data / DATABASE)
 
     def __enter__(self) -> Self:
         self.start()
@@ -56,6 +53,18 @@ class Server:
     def kill(self) -> None:
         assert self.process is not None
         self.process.kill()
+
+
+@cache
+def _with_people() -> Path:
+    """A database with the accounts, made once a process: to hash passwords takes its time."""
+    path = migrated().with_name("people.db")
+    shutil.copy(migrated(), path)
+    engine = open_engine(path)
+    for name, role in PEOPLE.items():
+        accounts.add(engine, name, role, PASSWORD)
+    engine.dispose()
+    return path
 
 
 def free_port() -> int:

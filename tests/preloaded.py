@@ -1,0 +1,18 @@
+"""What a served app takes long to import and to build, made at import: servers are forked from a process that has it."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from starlette.testclient import TestClient
+
+import tests.browser.stand_in
+from app.main import create_app
+from app.settings import Settings
+
+with TemporaryDirectory() as folder:  # the first request builds what every route needs
+    assert tests.browser.stand_in
+    assert (
+        TestClient(create_app(Settings(data_dir=Path(folder))), base_url="http://127.0.0.1")
+        .get("/static/js/main.js")
+        .is_success
+    )
