@@ -26,7 +26,7 @@ MAX_RERUN = 20  # tests; more failures than that are no accident of timing
 def main() -> int:
     """Run the suites; the exit code is 0 when every test passed, at the latest when it was run alone."""
     node = shutil.which("node")
-    chromium = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+    chromium = any(map(shutil.which, ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")))
     not_run = [
         what for what, tool in (("JavaScript tests (no node)", node), ("browser tests (no Chromium)", chromium)) if not tool
     ]

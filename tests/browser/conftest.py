@@ -45,7 +45,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from r2c2r_core.synthetic.stage import write_sample
 
     folder = tmp_path_factory.mktemp("sample")
-    write_sample(folder, seed=3, frames=36, size=(480, 360))
+    write_sample(folder, seed=3, frames=16, size=(320, 240))
     return folder
 
 

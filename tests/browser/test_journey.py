@@ -23,11 +23,11 @@ def click_of(sample: Path, category: str) -> tuple[int, float, float]:
 
 
 def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
-    """Click a pixel of the stored frame (480 x 360), wherever it is drawn."""
+    """Click a pixel of the stored frame (320 x 240), wherever it is drawn."""
     canvas = page.locator("r2c2r-frame-canvas canvas")
     box = box_of(canvas)
-    scale = min(box["width"] / 480, box["height"] / 360)
-    left, top = (box["width"] - 480 * scale) / 2, (box["height"] - 360 * scale) / 2
+    scale = min(box["width"] / 320, box["height"] / 240)
+    left, top = (box["width"] - 320 * scale) / 2, (box["height"] - 240 * scale) / 2
     canvas.click(position={"x": left + x * scale, "y": top + y * scale}, button=button)  # type: ignore[arg-type]
 
 
@@ -47,7 +47,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     chooser.value.set_files(sample / "scan.r3d")
     page.wait_for_url(re.compile(r"/p/\w+"))
     page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
-    expect(page.get_by_text("480 × 360")).to_be_visible()
+    expect(page.get_by_text("320 × 240")).to_be_visible()
     expect(page.locator(".scan-pictures img")).to_have_count(2)
     expect(page.get_by_role("img", name=re.compile("Sharpness over the frames"))).to_be_visible()
     picture(page, "2-overview")
@@ -63,7 +63,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
     expect(page.locator("r2c2r-object-list")).to_contain_text(re.compile(r"1 click · \d+ frames"), timeout=LONG_MS)
     picture(page, "3-annotate")
-    click_frame(page, 240, 20, button="right")
+    click_frame(page, 160, 14, button="right")
     expect(page.locator("r2c2r-object-list")).to_contain_text("2 clicks")
     page.keyboard.press("Control+z")
     expect(page.locator("r2c2r-object-list")).to_contain_text("1 click ")
