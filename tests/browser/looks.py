@@ -8,6 +8,7 @@ from playwright.sync_api import Page
 
 from tests.waiting import PATIENCE_MS, until
 
+LONG_MS = 4 * PATIENCE_MS  # a software GL draws when it can
 PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: tests leave screenshots of the pages there
 AXE = Path(__file__).parents[2] / "static" / "node_modules" / "axe-core" / "axe.min.js"
 SETTLE = "document.getAnimations().forEach((one) => one.effect.getComputedTiming().endTime < Infinity && one.finish())"
@@ -31,7 +32,7 @@ def picture(page: Page, name: str, *, still: bool = False) -> None:
         taken = [b""]
 
         def taken_twice(taken: list[bytes] = taken) -> bool:
-            taken.append(page.screenshot(timeout=4 * PATIENCE_MS))
+            taken.append(page.screenshot(timeout=LONG_MS))
             return not still or taken[-1] == taken[-2]
 
         until(taken_twice, f"{name} goes on changing")
