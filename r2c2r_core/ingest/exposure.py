@@ -123,11 +123,23 @@ def solve_gains(looks: Looks, frames: int) -> np.ndarray:
 def spread(looks: Looks, gains: np.ndarray) -> float:
     """Median over points seen five times of one robust sigma of log colour across the frames that show it."""
     value = looks.log_rgb + gains[looks.frame]
-    order = np.argsort(looks.point, kind="stable")
-    ends = np.flatnonzero(np.diff(looks.point[order])) + 1
-    groups = [value[rows] for rows in np.split(order, ends) if len(rows) >= 5]
-    sigmas = [1.4826 * np.median(np.abs(g - np.median(g, axis=0)), axis=0).mean() for g in groups]
-    return float(np.median(sigmas)) if sigmas else 0.0
+    counts = np.bincount(looks.point)
+    enough = counts >= 5
+    if not enough.any():
+        return 0.0
+    kept = enough[looks.point]
+    counts, group, value = counts[enough], (np.cumsum(enough) - 1)[looks.point[kept]], value[kept]
+    middle = _medians(value, group, counts)
+    apart = _medians(np.abs(value - middle[group]), group, counts)
+    return float(np.median(1.4826 * apart.mean(axis=1)))
+
+
+def _medians(value: np.ndarray, group: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The medians (groups, channels) of each group's rows; all at once, since calls for a few rows each take seconds."""
+    ends = np.cumsum(counts)
+    low, high = ends - counts + (counts - 1) // 2, ends - counts + counts // 2
+    ordered = np.stack([channel[np.lexsort((channel, group))] for channel in value.T], axis=1)
+    return np.asarray((ordered[low] + ordered[high]) / 2.0)
 
 
 def _solved(looks: Looks, value: np.ndarray, weight: np.ndarray, frames: int, held: float) -> np.ndarray:
