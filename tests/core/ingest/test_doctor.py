@@ -1,6 +1,8 @@
 """The doctor calls a good recording good, and names what is wrong with a bad one."""
 
+import functools
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -43,9 +45,23 @@ def named(name: str) -> Corruption:
     return next(c for c in CORRUPTIONS if c.name == name)
 
 
-def corrupted(name: str, scan, tmp_path) -> CaptureReport:
-    bad = corrupt_r3d(named(name), scan, tmp_path / f"{name.replace('/', '')}.r3d")
-    return examine(read_capture(bad, tmp_path / "store", CONFIG), open_recording(bad))
+@pytest.fixture(scope="module")
+def report(capture, scan) -> CaptureReport:
+    """Of the good recording."""
+    return examine(capture, open_recording(scan))
+
+
+@pytest.fixture(scope="module")
+def corrupted(scan, tmp_path_factory) -> Callable[[str], CaptureReport]:
+    """The report of the recording with a corruption, each read once."""
+
+    @functools.cache
+    def report_of(name: str) -> CaptureReport:
+        folder = tmp_path_factory.mktemp("corrupted")
+        bad = corrupt_r3d(named(name), scan, folder / f"{name.replace('/', '')}.r3d")
+        return examine(read_capture(bad, folder / "store", CONFIG), open_recording(bad))
+
+    return report_of
 
 
 def with_frames(capture: Capture, change) -> Capture:
@@ -70,8 +86,7 @@ class Darker:
         return self.images.depth(index)
 
 
-def test_a_good_recording_is_good(capture, scan):
-    report = examine(capture, open_recording(scan))
+def test_a_good_recording_is_good(report):
     assert report.verdict == "good", report.reasons
     assert report.reasons == ()
     assert report.convention is None
@@ -95,7 +110,7 @@ def test_a_good_recording_is_good(capture, scan):
     [
         "poses inverted",
         "OpenGL taken for OpenCV",
-        "quaternions w first",
+        pytest.param("quaternions w first", marks=pytest.mark.slow),
         "depth x0.9",
         "depth in mm",
         "focal length x1.1",
@@ -105,13 +120,13 @@ def test_a_good_recording_is_good(capture, scan):
         "zero confidence",
     ],
 )
-def test_a_corrupted_recording_is_told_by_its_cause(name, scan, tmp_path):
-    report = corrupted(name, scan, tmp_path)
+def test_a_corrupted_recording_is_told_by_its_cause(name, corrupted):
+    report = corrupted(name)
     assert report.verdict != "good"
     assert report.remarks[0].cause in named(name).causes, report.reasons
 
 
-@pytest.mark.parametrize("factor", [1000.0, 10.0, 0.1])
+@pytest.mark.parametrize("factor", [1000.0, pytest.param(10.0, marks=pytest.mark.slow), 0.1])
 def test_depth_in_another_unit_is_named_with_the_option_that_mends_it(factor, scan, tmp_path):
     other = Corruption(name="unit", depth=lambda depth, _: depth * np.float32(factor))
     bad = corrupt_r3d(other, scan, tmp_path / "unit.r3d")
@@ -123,22 +138,22 @@ def test_depth_in_another_unit_is_named_with_the_option_that_mends_it(factor, sc
 
 
 @pytest.mark.parametrize("name", ["all poses NaN", "all LZFSE truncated"])
-def test_a_hopeless_recording_is_refused_in_one_line(name, scan, tmp_path):
+def test_a_hopeless_recording_is_refused_in_one_line(name, corrupted):
     with pytest.raises(CaptureError, match=named(name).refusal) as problem:
-        corrupted(name, scan, tmp_path)
+        corrupted(name)
     document = refusal_to_json(problem.value)
     assert document["verdict"] == "unusable"
     assert document["remarks"][0]["cause"] == "unreadable"
     assert document["figures"] is None
 
 
-def test_a_wrong_scale_and_focal_length_are_measured(scan, tmp_path):
-    report = corrupted("depth x0.9", scan, tmp_path)
+def test_a_wrong_scale_and_focal_length_are_measured(corrupted):
+    report = corrupted("depth x0.9")
     assert report.verdict == "unusable"
     depth = report.scale
     assert depth.factor == pytest.approx(1 / 0.9, rel=0.02)
     assert depth.text == "the depth is 10 % too small"  # and not perhaps something else
-    assert corrupted("focal length x1.1", scan, tmp_path).scale.factor == pytest.approx(1 / 1.1, rel=0.03)
+    assert corrupted("focal length x1.1").scale.factor == pytest.approx(1 / 1.1, rel=0.03)
 
 
 def test_images_turned_against_their_poses_and_shifted_frames_are_told(capture):
@@ -169,8 +184,7 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     assert report.verdict == "unusable"
 
 
-def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(capture):
-    report = examine(capture)
+def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(report):
     slight = replace(report.registration, off_px=2.4, limit_px=2.0, edge_px=2.0, edge_best_px=1.5, focal_only=False)
     remarks = judge(report.figures, None, None, slight)
     assert ("usable with care", "unregistered") in {(r.verdict, r.cause) for r in remarks}
@@ -240,8 +254,8 @@ def test_up_in_doubt_is_told_with_the_direction_that_would_mend_it(capture):
 
 
 @pytest.mark.parametrize(("factor", "told"), [(0.72, "28% too small"), (1.0, None), (1.4, "24% too large")])
-def test_furniture_of_no_usual_height_is_a_hint_of_a_wrong_scale(factor, told, capture):
-    figures = replace(examine(capture).figures, level_heights_m=(0.2, 0.9 * factor if factor < 1 else 0.8 * factor))
+def test_furniture_of_no_usual_height_is_a_hint_of_a_wrong_scale(factor, told, report):
+    figures = replace(report.figures, level_heights_m=(0.2, 0.9 * factor if factor < 1 else 0.8 * factor))
     hints = [r for r in judge(figures, None, None, None) if r.cause == "furniture_height"]
     assert [told in hint.line for hint in hints] == ([True] if told else [])
     assert all(hint.verdict == "good" for hint in hints)
@@ -261,8 +275,8 @@ def test_a_floor_at_the_wrong_height_is_told(capture):
     assert any(r.cause == "camera_height" for r in examine(high).remarks)
 
 
-def test_the_report_is_json(capture):
-    document = json.loads(json.dumps(examine(capture).to_json()))
+def test_the_report_is_json(report):
+    document = json.loads(json.dumps(report.to_json()))
     assert document["version"] == 2
     assert document["verdict"] == "good"
     assert document["figures"]["frames"] == 24

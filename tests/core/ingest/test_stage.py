@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 import stat
 import zipfile
 from dataclasses import replace
@@ -38,13 +39,25 @@ def rewritten(source: Path, target: Path, change) -> Path:
     return target
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    return write_r3d(tmp_path_factory.mktemp("written") / "scan.r3d", ROOM)
+
+
 @pytest.fixture
-def scan(tmp_path):
-    return write_r3d(tmp_path / "scan.r3d", ROOM)
+def scan(written, tmp_path):
+    """The test's own copy."""
+    return Path(shutil.copyfile(written, tmp_path / "scan.r3d"))
 
 
-def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(scan, tmp_path):
-    capture = read(scan, tmp_path)
+@pytest.fixture(scope="module")
+def once(written, tmp_path_factory):
+    """The capture of the scan, read once; tests leave its store as it is."""
+    return read_capture(written, tmp_path_factory.mktemp("once") / "store", QUICK)
+
+
+def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(once):
+    capture = once
     assert capture.name == "scan"
     assert len(capture.frames) == ROOM.count
     assert capture.room.up_source == "file"
@@ -69,9 +82,8 @@ def test_without_gravity_in_the_file_the_room_itself_tells_up(tmp_path):
 
 
 @pytest.mark.parametrize("write", [write_exr, write_seven_scenes, write_tum])
-def test_every_format_gives_the_same_surface(write, scan, tmp_path):
+def test_every_format_gives_the_same_surface(write, once, tmp_path):
     other = read_capture(write(tmp_path / "other", ROOM), tmp_path / "b", QUICK)
-    capture = read_capture(scan, tmp_path / "a", QUICK)
     from scipy.spatial import cKDTree
 
     # x and y start at each recording's own origin: compare the heights and the way to the camera instead
@@ -79,7 +91,7 @@ def test_every_format_gives_the_same_surface(write, scan, tmp_path):
         eye = c.frames[0].world_from_camera
         return eye.inverse.apply(c.surface.vertices_world)
 
-    distance = cKDTree(around(capture)).query(around(other))[0]
+    distance = cKDTree(around(once)).query(around(other))[0]
     assert np.median(distance) < 0.02
 
 
@@ -147,7 +159,7 @@ def test_nan_is_unknown(tmp_path):
     assert np.isfinite(depth.metres).all()
 
 
-def test_the_identity_follows_the_content(scan, tmp_path):
+def test_the_identity_follows_the_content(tmp_path):
     folder = write_exr(tmp_path / "export", ROOM)
     first = read_capture(folder, tmp_path / "a", QUICK).sha256
     (folder / "notes.txt").write_text("not part of the recording")
@@ -156,8 +168,8 @@ def test_the_identity_follows_the_content(scan, tmp_path):
     assert read_capture(folder, tmp_path / "a", QUICK).sha256 != first
 
 
-def test_reading_twice_gives_the_same(scan, tmp_path):
-    a, b = read_capture(scan, tmp_path / "a", QUICK), read_capture(scan, tmp_path / "b", QUICK)
+def test_reading_twice_gives_the_same(once, scan, tmp_path):
+    a, b = once, read_capture(scan, tmp_path / "b", QUICK)
     assert np.array_equal(a.surface.vertices_world, b.surface.vertices_world)
     assert np.array_equal(a.world_from_capture.matrix, b.world_from_capture.matrix)
     assert a.sha256 == b.sha256
@@ -390,13 +402,12 @@ def test_metadata_with_a_wrong_type_is_an_error_not_a_crash(scan, tmp_path):
             read(broken, tmp_path)
 
 
-def test_a_scale_multiplies_every_length_alike_and_is_noticed(scan, tmp_path):
-    capture = read(scan, tmp_path)
+def test_a_scale_multiplies_every_length_alike_and_is_noticed(once, scan, tmp_path):
     larger = read_capture(scan, tmp_path / "larger", replace(QUICK, scale=1.25))
-    for one, other in zip(capture.frames, larger.frames, strict=True):
+    for one, other in zip(once.frames, larger.frames, strict=True):
         assert np.allclose(other.world_from_camera.translation, 1.25 * one.world_from_camera.translation, atol=0.01)
         assert np.allclose(other.world_from_camera.rotation, one.world_from_camera.rotation, atol=0.01)
-    sizes = [np.ptp(one.surface.vertices_world, axis=0) for one in (capture, larger)]
+    sizes = [np.ptp(one.surface.vertices_world, axis=0) for one in (once, larger)]
     assert sizes[1] == pytest.approx(1.25 * sizes[0], rel=0.02)  # a voxel of 3 cm is no larger
     assert "every length was multiplied by 1.2500, as a person measured" in larger.notices
-    assert not any("multiplied" in notice for notice in capture.notices)
+    assert not any("multiplied" in notice for notice in once.notices)
