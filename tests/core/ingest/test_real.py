@@ -75,6 +75,7 @@ def test_the_kitchens_pictures_agree_better_on_its_colours_than_as_filmed(kitche
     assert spread(looks, np.log([f.gain for f in kitchen.frames])) < 0.7 * filmed
 
 
+@pytest.mark.slow
 def test_the_cabinet_has_its_measured_size_and_yaw(real, tmp_path):
     capture = read_capture(real("cabinet-tum-fr3-58"), tmp_path / "store", IngestConfig(most_frames=20, finest_voxel_m=0.012))
     assert examine(capture).figures.pair_error_mm < 20
@@ -93,6 +94,7 @@ def test_the_cabinet_has_its_measured_size_and_yaw(real, tmp_path):
     assert abs(np.degrees(off)) < 3.0
 
 
+@pytest.mark.slow
 def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
     capture = read_capture(
         real("record3d-exr-door-handle/derived/door-handle-repacked.r3d"), tmp_path / "store", IngestConfig()
@@ -105,6 +107,7 @@ def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
     assert walls == list(capture.room.walls)
 
 
+@pytest.mark.slow
 def test_the_chairs_frames_agree_within_8_mm_and_their_scale_is_no_reason_to_refuse_them(real, tmp_path):
     capture = read_capture(real("3d-scanner-app-chair"), tmp_path / "store", IngestConfig())
     report = examine(capture)
