@@ -1,5 +1,6 @@
 """A bundle's scene with a gripper in it: its bodies by name, its commands, and what it touches."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -88,12 +89,12 @@ class Rig(ABC):
         import mujoco
 
         force = np.zeros(6)
-        contacts = self.data.contact
-        for number, (a, b) in enumerate(contacts.geom[: self.data.ncon]):
+        pairs: list[tuple[int, int]] = self.data.contact.geom[: self.data.ncon].tolist()  # quicker to look up than NumPy's
+        for number, (a, b) in enumerate(pairs):
             if (a in self.own) != (b in self.own):
                 mine, other = (a, b) if a in self.own else (b, a)
                 mujoco.mj_contactForce(self.model, self.data, number, force)
-                yield Pull(int(self.model.geom_bodyid[other]), int(mine), float(np.linalg.norm(force[:3])))
+                yield Pull(int(self.model.geom_bodyid[other]), mine, math.sqrt(force[:3].dot(force[:3])))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
