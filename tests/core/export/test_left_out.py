@@ -17,7 +17,7 @@ from r2c2r_core.export.writers import table
 from r2c2r_core.model.report import Certificate
 from tests.core.export.kitchen import CREATED, reconstruction
 
-QUICK = ExportConfig(pictures=False, texture_max_px=64)
+QUICK = ExportConfig(pictures=False, gripper=False, texture_max_px=64)
 
 
 @pytest.fixture(autouse=True)

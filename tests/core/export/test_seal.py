@@ -5,15 +5,18 @@ import os
 import shutil
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from r2c2r_core.export import stage
 from r2c2r_core.export.archive import write_zip
+from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.seal import check_seal
 from r2c2r_core.export.stage import ExportConfig, check_bundle, write_bundle
 from r2c2r_core.model.report import Certificate
-from tests.core.export.kitchen import CREATED, reconstruction
+from tests.core.export.kitchen import CREATED, kitchen, reconstruction
 
 TEXTURE = "meshes/cabinet_1/cabinet_1_door_vis.png"
 
@@ -63,7 +66,21 @@ def test_a_manifest_without_checksums_is_told_or_left_to_the_linter(folder: Path
     assert found(folder) <= {("warning", "file-unsealed", "manifest.json")}
 
 
-def test_equal_inputs_give_equal_bytes_however_long_it_took(
+def test_equal_inputs_give_equal_bytes_however_long_it_took(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = replace(kitchen(), objects=tuple(item for item in kitchen().objects if item.name in ("cabinet_1", "bottle_1")))
+    assert len(one.objects) == 2
+    monkeypatch.setattr(stage, "preview_png", lambda plan, seen_from: preview_png(plan, seen_from, 64))
+    write_bundle(reconstruction(one), tmp_path / "first.zip", ExportConfig(), created=CREATED)
+    spent = time.thread_time
+    monkeypatch.setattr(time, "thread_time", lambda: 3 * spent())
+    monkeypatch.setenv("TZ", "Asia/Kathmandu")
+    os.utime(tmp_path / "first.zip", (0, 0))
+    write_bundle(reconstruction(one), tmp_path / "again.zip", ExportConfig(), created=CREATED)
+    assert (tmp_path / "again.zip").read_bytes() == (tmp_path / "first.zip").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_whole_kitchen_again_gives_equal_bytes_however_long_it_took(
     kitchen_bundle: tuple[Path, Certificate], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spent = time.thread_time
