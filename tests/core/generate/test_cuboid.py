@@ -20,7 +20,15 @@ def shape_of(scene):
     return best_thing(evidence)
 
 
-@pytest.mark.parametrize(("arc_deg", "elevation_deg"), [(0.0, 35.0), (35.0, 10.0), (60.0, 30.0), (120.0, 15.0)])
+@pytest.mark.parametrize(
+    ("arc_deg", "elevation_deg"),
+    [
+        (0.0, 35.0),
+        pytest.param(35.0, 10.0, marks=pytest.mark.slow),
+        pytest.param(60.0, 30.0, marks=pytest.mark.slow),
+        (120.0, 15.0),
+    ],
+)
 def test_a_cartons_depth_is_seen_in_its_outlines(arc_deg, elevation_deg):
     """The segmenter's box is three times too deep: it took the wall's shine for the carton's back."""
     shape = shape_of(carton_scene(SIZE, arc_deg=arc_deg, elevation_deg=elevation_deg, yaw_rad=0.3))
@@ -45,7 +53,7 @@ def test_an_open_depth_is_not_carried_through_the_wall():
 
 def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
     evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=10.0, yaw_rad=0.3), 12)
-    shapes = [best_thing(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(4)]
+    shapes = [best_thing(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(3)]
     depths = [np.ptp(shape.vertices_local[:, 1]) for shape in shapes]
     assert np.std(depths) > 0.2 * shapes[0].parameters["depth_sigma_m"]
     assert all(is_watertight(s.vertices_local, s.faces) and is_manifold(s.vertices_local, s.faces) for s in shapes)
@@ -54,7 +62,7 @@ def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
 def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
     scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0)
     evidence = gather_evidence(*scene, 12)
-    for draw in (-1.5, 0.5, 1.5):
+    for draw in (-1.5, 1.5):
         shape = best_thing(evidence, replace(whole_pool(evidence), depth_draw=draw))
         assert shape.parameters["boxed"] == 1.0
         assert np.ptp(shape.vertices_local[:, 1]) < SIZE[0]

@@ -54,7 +54,9 @@ def test_angles_are_found_again_and_keep_their_limits(chain: Chain) -> None:
     assert ((out.angles >= chain.low) & (out.angles <= chain.high)).all()
 
 
-@pytest.mark.parametrize(("kind", "bar"), [("drawer", Bar(wide=0.16, high=0.012)), ("hinge", Bar())])
+@pytest.mark.parametrize(
+    ("kind", "bar"), [pytest.param("drawer", Bar(wide=0.16, high=0.012), marks=pytest.mark.slow), ("hinge", Bar())]
+)
 def test_an_arm_opens_and_closes_a_drawer_and_a_door(tmp_path: Path, kind: str, bar: Bar) -> None:
     found = certify_with_arm(scene(tmp_path, kind=kind, bar=bar))
     (grip,) = found.grips

@@ -23,13 +23,19 @@ LEVEL = Bar(wide=0.16, high=0.012)
         ("sliding", None, "drag"),
     ],
 )
-@pytest.mark.parametrize("turned", [0.0, 2.5])
+@pytest.mark.parametrize("turned", [0.0, pytest.param(2.5, marks=pytest.mark.slow)])
 def test_it_opens_and_closes_what_it_can_hold(tmp_path: Path, kind: str, bar: Bar | None, method: str, turned: float) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind=kind, bar=bar, turned=turned)).grips
     assert grip.passed, grip
     assert grip.method == method
     assert grip.opened >= OPEN_SHARE
     assert grip.left_open <= 0.02
+
+
+def test_it_opens_and_closes_what_stands_askew(tmp_path: Path) -> None:
+    (grip,) = certify_with_gripper(scene(tmp_path, kind="drawer", bar=LEVEL, turned=2.5)).grips
+    assert grip.passed, grip
+    assert grip.method == "pinch"
 
 
 def test_friction_alone_holds_the_handle(tmp_path: Path) -> None:

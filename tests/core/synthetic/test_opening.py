@@ -152,6 +152,7 @@ def in_capture(meta: dict, frame: int, rows: np.ndarray, columns: np.ndarray, de
     return rays @ Rotation.from_quat(quaternion).as_matrix().T + [x, y, z]
 
 
+@pytest.mark.slow
 def test_the_same_seed_opens_the_same_in_the_same_bytes(sample: SamplePaths, tmp_path: Path) -> None:
     again = write_sample(tmp_path, seed=3, frames=24, size=(240, 180), opened=True)
     assert again.scan.read_bytes() == sample.scan.read_bytes()
