@@ -113,13 +113,13 @@ def test_the_walk_keeps_clear_of_walls_and_units_and_shows_every_front(kitchen: 
         apart = np.maximum(low[:2] - eyes[:, :2], eyes[:, :2] - high[:2]).max(axis=1)
         assert apart.min() > 0.1, name
     camera = Intrinsics(fx=484.0, fy=484.0, cx=320.0, cy=240.0, width=640, height=480)
-    for thing in true_objects(kitchen):
-        face = thing.kitchen_from_object.apply(np.array([[0.0, -thing.dimensions_m[1] / 2, 0.0]]))
-        outward = thing.kitchen_from_object.rotation @ [0.0, -1.0, 0.0]
-        seen = 0
-        for shot in shots:
-            (x, y, z), *_ = shot.kitchen_from_camera.inverse.apply(face)
-            u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-            before = (shot.kitchen_from_camera.translation - face[0]) @ outward > 0.2
-            seen += bool(before and z > 0.2 and 20 < u < 620 and 20 < v < 460)
-        assert seen >= 3, thing.name
+    things = true_objects(kitchen)
+    faces = np.concatenate([t.kitchen_from_object.apply(np.array([[0.0, -t.dimensions_m[1] / 2, 0.0]])) for t in things])
+    outward = np.array([t.kitchen_from_object.rotation @ [0.0, -1.0, 0.0] for t in things])
+    seen = np.zeros(len(things), int)
+    for shot in shots:
+        x, y, z = shot.kitchen_from_camera.inverse.apply(faces).T
+        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+        before = ((shot.kitchen_from_camera.translation - faces) * outward).sum(axis=1) > 0.2
+        seen += before & (z > 0.2) & (u > 20) & (u < 620) & (v > 20) & (v < 460)
+    assert (seen >= 3).all(), [thing.name for thing, count in zip(things, seen, strict=True) if count < 3]

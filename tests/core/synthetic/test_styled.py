@@ -133,8 +133,8 @@ def test_travels_and_depths_do_not_follow_the_tables_that_estimate_them() -> Non
 @pytest.mark.parametrize("style", STYLES)
 def test_an_objects_surfaces_lie_on_its_box(style: str) -> None:
     kitchen = plan_styled_kitchen(2, Choice(style=style))
-    objects = true_objects(kitchen)
-    for patch in build_kitchen(kitchen):
+    objects, patches = true_objects(kitchen), build_kitchen(kitchen)
+    for patch in patches:
         if patch.object_id == 0 or patch.is_handle or objects[patch.object_id - 1].category == "bottle":
             continue
         thing = objects[patch.object_id - 1]
@@ -143,7 +143,7 @@ def test_an_objects_surfaces_lie_on_its_box(style: str) -> None:
     for index, thing in enumerate(objects):
         if thing.category == "bottle":
             continue
-        own = [p for p in build_kitchen(kitchen) if p.object_id == index + 1 and not p.is_handle]
+        own = [p for p in patches if p.object_id == index + 1 and not p.is_handle]
         points = thing.kitchen_from_object.inverse.apply(np.concatenate([p.grid.reshape(-1, 3) for p in own]))
         reach = np.array([points[:, 0].max(), -points[:, 1].min(), points[:, 2].max()])
         assert reach == pytest.approx(thing.dimensions_m / 2, abs=0.004), thing.name
