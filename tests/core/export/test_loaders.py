@@ -157,13 +157,8 @@ USD_DEFECTS = (
     ),
 )
 
-SLOW_DEFECTS = ("is prismatic, not revolute", "its frame differs by 0.1")  # told as the limits are, by the same comparison
 
-
-@pytest.mark.parametrize(
-    ("asset", "old", "new", "says"),
-    [pytest.param(*d, id=d[3], marks=[pytest.mark.slow] if d[3] in SLOW_DEFECTS else []) for d in USD_DEFECTS],
-)
+@pytest.mark.parametrize(("asset", "old", "new", "says"), USD_DEFECTS, ids=[d[3] for d in USD_DEFECTS])
 def test_a_usd_that_says_something_else_fails(good_folder: Path, asset: str | None, old: str, new: str, says: str) -> None:
     scene = good_folder / ("scene.usda" if asset is None else f"assets/{asset}/{asset}.usda")
     text = scene.read_text()
