@@ -1,6 +1,7 @@
-"""A small kitchen of coloured boxes with known panels, filmed by a few exact cameras."""
+"""A small kitchen of coloured boxes with known panels, filmed by a few exact cameras; each scene once a process: only read."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -55,6 +56,7 @@ class Shapes:
     ids: np.ndarray  # a vertex: 0 none
 
 
+@cache
 def kitchen(
     drawn_out_m: float = 0.0, from_step: int = 0, swung_rad: float = 0.0
 ) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
@@ -63,9 +65,9 @@ def kitchen(
     Or door_c is swung open on its left edge; the carcass then begins further back.
     """
     poses = [look_at(np.array([x, y, z]), np.array(target)) for x, y, z, target in _path()]
-    states = [(drawn_out_m, swung_rad) if step >= from_step else (0.0, 0.0) for step in range(len(poses))]
+    before, after = (_shapes(*state, bool(swung_rad)) for state in ((0.0, 0.0), (drawn_out_m, swung_rad)))
     wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
-    return _filmed("boxes", poses, [_shapes(*state, bool(swung_rad)) for state in states], (wall,))
+    return _filmed("boxes", poses, [after if step >= from_step else before for step in range(len(poses))], (wall,))
 
 
 def _filmed(
@@ -116,6 +118,7 @@ def _filmed(
     return capture, truth
 
 
+@cache
 def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     """A table with a carton on it and a chair drawn up to it, seen from all around, and their true masks."""
     boxes: list[Named] = [((-2.5, -2.5, -0.02), (2.5, 2.5, 0.0), (120, 100, 80), None)]
@@ -138,6 +141,7 @@ BOTTLE_PROFILE = ((0.04, 0.0), (0.04, 0.16), (0.014, 0.19), (0.014, 0.215))
 CAP_M, WORKTOP_M = 0.24, 0.90
 
 
+@cache
 def bottle() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     """A bottle with a cap before a wall with a dark patch, beside another one, and their true masks.
 

@@ -4,16 +4,34 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import open_session
+from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, kitchen, prompt
 
 OUT_M = 0.25
+Filmed = tuple[Capture, Truth, SegmentSession]
 
 
-def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def drawn_out(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    """The middle drawer stands out in the last frames."""
     capture, truth = kitchen(OUT_M, from_step=10)
+    return capture, truth, open_session(capture, tmp_path_factory.mktemp("drawn_out"))
+
+
+@pytest.fixture(scope="module")
+def swung(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    """A door stands open for longer than it is closed."""
+    capture, truth = kitchen(from_step=4, swung_rad=np.deg2rad(60.0))
+    return capture, truth, open_session(capture, tmp_path_factory.mktemp("swung"))
+
+
+def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(drawn_out: Filmed) -> None:
+    capture, truth, session = drawn_out
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y, 0.5), 60))
-    track = open_session(capture, tmp_path).track(drawer)
+    track = session.track(drawer)
     shown = [f for f, mask in truth["drawer_mid"].items() if mask.sum() > 3000]
     assert {f for f in shown if f in track.opened_frames} == {f for f in shown if f >= 100}
     (motion,) = track.motions
@@ -43,10 +61,9 @@ def test_a_door_open_in_the_last_frames_tells_its_hinge_and_its_angle(tmp_path: 
     assert np.mean(overlap) > 0.85
 
 
-def test_clicks_on_what_stands_open_mean_what_is_closed_there(tmp_path: Path) -> None:
+def test_clicks_on_what_stands_open_mean_what_is_closed_there(drawn_out: Filmed) -> None:
     """The same click on a front, where it is closed and where it stands open for a while."""
-    capture, _ = kitchen(OUT_M, from_step=12)
-    session = open_session(capture, tmp_path)
+    capture, _, session = drawn_out
     closed, opened = (
         session.track(prompt("drawer_mid", "drawer", click_on(capture, (1.5, y, 0.5), frame))).front
         for y, frame in ((FRONT_Y, 20), (FRONT_Y - OUT_M, 120))
@@ -58,23 +75,23 @@ def test_clicks_on_what_stands_open_mean_what_is_closed_there(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("swung_deg", "frame"), [(0.0, 20), (60.0, 100)])
-def test_a_door_filmed_open_for_longer_than_closed_is_clicked_in_either(swung_deg: float, frame: int, tmp_path: Path) -> None:
-    capture, _ = kitchen(from_step=4, swung_rad=np.deg2rad(60.0))
+def test_a_door_filmed_open_for_longer_than_closed_is_clicked_in_either(swung_deg: float, frame: int, swung: Filmed) -> None:
+    capture, _, session = swung
     x, width = DOORS["door_c"]
     half = width / 2 * np.array([np.cos(np.deg2rad(swung_deg)), -np.sin(np.deg2rad(swung_deg))])
     door = prompt("door_c", "cabinet", click_on(capture, (x + half[0], FRONT_Y + half[1], 0.5), frame))
-    track = open_session(capture, tmp_path).track(door)
+    track = session.track(door)
     assert track.front is not None
     np.testing.assert_allclose(track.front.world_from_front.translation[:2], [x + width / 2, FRONT_Y], atol=0.01)
     (motion,) = track.motions
     assert motion.largest == pytest.approx(np.deg2rad(60.0), abs=np.deg2rad(1.0))
 
 
-def test_a_drawer_that_is_held_open_is_no_front_where_it_stands(tmp_path: Path) -> None:
+def test_a_drawer_that_is_held_open_is_no_front_where_it_stands(drawn_out: Filmed) -> None:
     """For half of the recording it is a board in the room, on a plane of its own."""
-    capture, _ = kitchen(OUT_M, from_step=10)
+    capture, _, session = drawn_out
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y - OUT_M, 0.5), 110))
-    track = open_session(capture, tmp_path).track(drawer)
+    track = session.track(drawer)
     assert track.front is not None
     np.testing.assert_allclose(track.front.world_from_front.translation[1], FRONT_Y, atol=0.01)
     (motion,) = track.motions

@@ -2,21 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.mosaics.edges import Refined
 from r2c2r_core.segment.mosaics.lines import Evidence
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.segment.runs.contrast import Contrast
+from r2c2r_core.segment.runs.run import Run, make_run
 from r2c2r_core.segment.runs.stiles import evenly_framed, whole_frames
-from r2c2r_core.segment.stage import open_session
-from tests.core.segment.scenes import kitchen
 
 CELL_M, BLOCK = 0.0025, 20
 DOOR, PANEL = Cell(80, 20, 280, 320), Cell(110, 50, 250, 290)
@@ -39,6 +38,11 @@ def lines(upright: list[float], level: list[float]) -> tuple[Evidence, Evidence]
             score[:, round(position)] = 4
         found.append(Evidence(score, np.ones(score.shape, bool), BLOCK))
     return found[0], found[1]
+
+
+def cut_anew(session: GeometricSession) -> Run | None:
+    """The first run of the boxes, of as few frames as show all of it, whatever is kept of it."""
+    return make_run(session.planes[0], session.scene, session.config.cell_m, frame_count=4)
 
 
 def door_of(cells: list[Cell]) -> Cell:
@@ -122,7 +126,7 @@ def test_a_door_beside_a_door_is_no_stile() -> None:
     assert door_of(whole_frames(odds(0), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)) == CUT
 
 
-def test_the_panels_of_a_run_are_whole_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_panels_of_a_run_are_whole_frames(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[list[Cell]] = []
 
     def noted(
@@ -137,14 +141,14 @@ def test_the_panels_of_a_run_are_whole_frames(tmp_path: Path, monkeypatch: pytes
         return made[-1]
 
     monkeypatch.setattr("r2c2r_core.segment.runs.run.whole_frames", noted)
-    capture, _ = kitchen()
-    session = open_session(capture, tmp_path)
-    run = session.run_of(session.planes[0])
+    run = cut_anew(session)
     assert run is not None
     assert list(run.cells) in made
 
 
-def test_the_panels_of_a_run_are_inset_before_they_are_made_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_panels_of_a_run_are_inset_before_they_are_made_whole(
+    session: GeometricSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made: list[Cell] = []
 
     def halved(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Sequence[Cell], cell_m: float) -> list[Cell]:
@@ -152,8 +156,6 @@ def test_the_panels_of_a_run_are_inset_before_they_are_made_whole(tmp_path: Path
         return list(made)
 
     monkeypatch.setattr("r2c2r_core.segment.runs.run.inset_fronts", halved)
-    capture, _ = kitchen()
-    session = open_session(capture, tmp_path)
-    run = session.run_of(session.planes[0])
+    run = cut_anew(session)
     assert run is not None
     assert set(run.cells) & set(made)
